@@ -10,7 +10,7 @@ Read the package in this order. A module imports only from its own entry of the 
 6. `effects`      physical effects and methods that a scene can request
 7. `disk`         atomic writes, locks and the user's cache
 8. `compiled`     machine code of the kernels and its cache
-9. `closed_forms` exact solutions of contact problems
+9. `closed_forms` exact solutions of contact at rounded edges
 10. `scene`        parsing and validation of a TOML file, with values in SI units
 11. `inputs`       measured data files: columns, slide paths, signals, loops
 12. `mesh`         tagged meshes of two coated pieces

@@ -12,6 +12,7 @@ perform computations; `run` returns a `Result`. `profile` and `compare` evaluate
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
@@ -529,11 +530,13 @@ def backbone(
     5
     """
 
-    def build_with(tables: BackboneTables, *, is_written: bool, sets: tuple[str, ...]) -> Model:
+    def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
         if isinstance(scene, Model):
             return build(scene, **changes)
-        values = {} if is_written else changes | dict(text.split("=", 1) for text in sets)
+        values = {}
+        if sets is not None:
+            values = changes | dict(text.split("=", 1) for text in sets)
         loaded = _load_and_prepare(scene, tables, values)
         return build_model(remember_written(loaded, _count_written(scene), tables))
 
@@ -633,7 +636,12 @@ def sweep(
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed)
+    words = [word for text in ranges for word in ("--over", text)]
+    if draw:
+        words += [f"--{'sobol' if sobol else 'random'}", str(draw), "--seed", str(seed)]
+    command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets)
     cases = parse_request.read_cases(sweep_scene, request)
+    cases = replace(cases, command=shlex.join([*shlex.split(command), *words]))
     pool = executors.make_executor(executor, jobs)
     if out is None:
         answer = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
@@ -1500,11 +1508,6 @@ class Result(run_result.Result):
         warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in self.warnings)
         title = f"<b>{escape(answer.title)}</b><br>" if answer.title else ""
         return f"<div>{title}{sentences}{warnings}<table>{rows}</table></div>"
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes about effects that the model neglects."""
-        return list(self.extra.get("notes", ()))
 
     @property
     def plot(self) -> Plots:

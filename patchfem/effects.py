@@ -83,11 +83,6 @@ class Waveform(NamedTuple):
         return trait in self.traits.split()
 
     @property
-    def required_keys(self) -> list[str]:
-        """Keys of the table [drive] that the waveform requires."""
-        return self.keys[0].split()
-
-    @property
     def is_sine(self) -> bool:
         """Whether the drive is a single sine of constant amplitude and frequency."""
         return self._has_trait("sine")
@@ -413,7 +408,6 @@ WAVEFORMS = {
     if name.startswith("drive.waveform=")
 }
 NO_WAVEFORM = Waveform()  # waveform of a release and of an unknown name
-SINE_WAVEFORM = WAVEFORMS["sine"]  # default waveform of a scene
 
 
 def find_waveform(drive) -> Waveform:

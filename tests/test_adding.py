@@ -20,6 +20,7 @@ length = "12.7 mm"
 width = "12.7 mm"
 height = "12.7 mm"
 load = "115 N"
+element_size = "63.5 um"
 substrate = {young = "120 GPa", poisson = 0.3, density = "4400 kg/m^3"}
 [contact.ripple]
 height = "35 nm"
@@ -149,7 +150,7 @@ def test_refuses_shape_table_without_piece_key(tmp_path):
     assert on in PAGE
     adding.copy_package(tmp_path, PAGE.replace(on, ""))
     (tmp_path / "waved.toml").write_text(WAVED, "utf-8")
-    with pytest.raises(AssertionError, match=r"waved.toml:7: contact.ripple: .* has no key `on`"):
+    with pytest.raises(AssertionError, match=r"waved.toml:8: contact.ripple: .* has no key `on`"):
         adding.run_commands(tmp_path, ["check waved.toml"])
 
 

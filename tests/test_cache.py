@@ -95,18 +95,11 @@ def test_exact_only_first_of_two_processes_compiles(parallel_results):
 
 
 def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_results):
-    """An edited law is compiled again, and its stiffness factor of 0.8 changes the peak force by 0.8.
-
-    Before the edit, a second run takes the code from the cache.
-    """
+    """An edited law is compiled again, and its stiffness factor of 0.8 changes the peak force by 0.8."""
     package = copy_package(tmp_path / "home")
     cache = shutil.copytree(shared_cache, tmp_path / "cache")
     first = parallel_results[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
-    again = run_slide(package, cache)
-    assert not again["numba"] and again["said"] == []
-    assert (again["work"], again["peak"]) == (first["work"], first["peak"])
-
     law = package / "patchfem" / "points" / "return_maps_kernels.py"
     text, count = re.subn(
         r"PointState\((?=mu \* state, 0.5)", "PointState(0.8 * ", law.read_text("utf-8")

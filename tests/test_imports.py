@@ -65,7 +65,7 @@ FOLDERS = {  # kind of scene -> text, folders that `patchfem run` loads for the 
 }
 
 
-@pytest.mark.share(3, 7, 8)
+@pytest.mark.share(7, 8)
 @pytest.mark.parametrize("kind", FOLDERS)
 def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     """`patchfem run` in a new process loads the physics folders listed for its kind of scene and no others."""
@@ -116,7 +116,7 @@ def modules_of_run(text: str) -> set:
         return modules_after(FROM_PYTHON, path)
 
 
-@pytest.mark.share(0, 6)
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
@@ -154,16 +154,8 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
         "pyvista vtkmodules numba meshio skfem scipy matplotlib pandas xarray",
     ),
     "check": (rig_without_files(), ("check", "SCENE"), "", HEAVY),
-    "check of a bench": (
-        BENCH,
-        ("check", "SCENE"),
-        "campaigns export.sweeps scene.assignments runs.batch",
-        "email socket",
-    ),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
     "help": ("", ("--help",), "", HEAVY),
-    "help of a verb": ("", ("check", "--help"), "", HEAVY),
-    "version": ("", ("--version",), "", HEAVY),
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),
@@ -176,17 +168,11 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
         "runs.bench.bench runs.wear",
         "numpy.random cyclopts.completion numba email socket",
     ),
-    "profile": (
-        TRACE,
-        ("profile", "SCENE", "--cutoff", "80 um"),
-        "",
-        SLOW_SCIPY + " scipy.optimize",
-    ),
     "compare": (TRACE, ("compare", "SCENE", "SCENE"), "", SLOW_SCIPY),
 }
 
 
-@pytest.mark.share(0, 3, 6, 10, 11, 12, 13)
+@pytest.mark.share(3, 5, 7, 8, 9)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""

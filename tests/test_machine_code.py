@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import njit
+from scene_texts import PLASTIC, POINT, STRUCTURE
 
+import patchfem as pf
 from patchfem.compiled import jit, machine
 
 
@@ -113,40 +115,6 @@ def test_exact_stored_code_gives_same_bits(stored_sum):
     assert result[1] == pytest.approx(weighted_sum(-1, other, 2.0, out)[1][0], rel=1e-13)
 
 
-def test_exact_tuples_are_passed_by_address(stored_sum, tmp_path):
-    """Tuples are passed by address, to inner functions too, and the sums agree with numba's within 1e-14.
-
-    The tuples contain numbers, arrays of any layout and nested tuples.
-    """
-    _, (first, outer, step, _), answer, _, numba_sum = stored_sum
-    inner = jit.njit(error_model="numpy", _nrt=False)(weighted_sum)
-
-    @jit.njit(error_model="numpy", _nrt=False)
-    def call_inlined(first, outer, step, out):
-        """Return the result of the inlined function."""
-        return inner(first, outer, step, out)
-
-    for function in (inner, call_inlined):
-        code = machine.compile_and_store(
-            tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.compile_optimised
-        )
-        result = np.zeros(5)
-        assert code(pack_arguments(first, outer, step, result)) == (8, (result[-1], 7))
-        assert result[-1] == pytest.approx(answer[1][0], rel=1e-14)
-        other = outer._replace(
-            first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5)
-        )
-        expected = np.zeros(5)
-        assert (
-            code(pack_arguments(-1, other, 2.0, result))[0]
-            == numba_sum(-1, other, 2.0, expected)[0]
-            == 1
-        )
-        assert result[:2] == pytest.approx(expected[:2], rel=1e-14)
-    [compiled] = inner.overloads.values()  # compiled inside `call_inlined`
-    assert compiled.signature.args[1].tuple_type.fields == Outer._fields
-
-
 @pytest.mark.parametrize(
     "damage",
     [
@@ -229,16 +197,12 @@ def test_always_argument_kinds_distinguish_types():
     ) == words.convert(7)
 
 
-MOTIONS = """
+MEASURES = ("slip_amplitude", "friction_work")
+MOTIONS = f"""
 import json, sys
 import patchfem as pf
-rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
-    '[structure]\\nmoving_mass = "1 kg"\\n' \\
-    '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\
-    '[drive]\\nkind = "base"\\nfrequency = "90 Hz"\\nacceleration = "5 g"\\ncycles = 1\\n'
-found = pf.run(rig.replace("LAW", "elastic-plastic").replace("MORE", 'bond_length = "2 um"'))
-out = [found.measures[name].value for name in ("slip_amplitude", "friction_work")]
-print(json.dumps([out, "numba" in sys.modules]))
+found = pf.run(sys.argv[1], **{{"drive.cycles": 1}})
+print(json.dumps([found.measures[name].value for name in {MEASURES}]))
 """
 
 
@@ -247,16 +211,15 @@ def test_exact_motions_agree_without_compilation(monkeypatch):
 
     Round-off changes the lengths of the steps, whose tolerance is larger.
     """
-    answers = []
-    for switch in "0", "1":
-        monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
-        done = subprocess.run(
-            [sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True
-        )
-        answers.append(json.loads(done.stdout))
-    (compiled, _), (interpreted, numba) = answers
-    assert numba and all(np.ravel(compiled))
-    np.testing.assert_allclose(interpreted, compiled, rtol=1e-8)
+    scene = POINT + PLASTIC + STRUCTURE
+    measures = pf.run(scene, **{"drive.cycles": 1}).measures
+    compiled = [measures[name].value for name in MEASURES]
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    done = subprocess.run(
+        [sys.executable, "-c", MOTIONS, scene], capture_output=True, text=True, check=True
+    )
+    assert all(compiled)
+    np.testing.assert_allclose(json.loads(done.stdout), compiled, rtol=1e-8)
 
 
 def sum_with_enum_indices(table):

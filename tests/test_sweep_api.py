@@ -6,6 +6,8 @@ import xarray as xr
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 import patchfem as pf
+from patchfem.export import store
+from patchfem.runs.batch import lumped
 
 RIG = POINT + COULOMB + SHORT
 OVER = {"friction.static": [0.1, 0.3], "drive.acceleration": ["1 g", "5 g"]}
@@ -44,6 +46,36 @@ def test_exact_sweep_folder_has_same_data(swept_rig, tmp_path):
     with xr.open_dataset(tmp_path / "a" / "sweep.nc") as stored:
         xr.testing.assert_equal(stored, found)
     xr.testing.assert_equal(pf.sweep(RIG, OVER, out=tmp_path / "a", resume=True), found)
+
+
+def test_exact_page_names_command(tmp_path):
+    """The page of a sweep in Python names the command that repeats it, with the keywords of the scene and random cases."""
+    scene = tmp_path / "rig.toml"
+    scene.write_text(RIG, "utf-8")
+    loaded = pf.load(scene, **{"drive.cycles": 10})
+    pf.sweep(loaded, {"friction.static": "0.1..0.3"}, draw=2, seed=4, out=tmp_path / "drawn")
+    command = "patchfem sweep rig.toml --set drive.cycles=10 --over friction.static=0.1..0.3 --random 2 --seed 4"
+    assert store.read(tmp_path / "drawn").origin["command"] == command
+    assert command in (tmp_path / "drawn" / "report.html").read_text("utf-8")
+
+
+def test_always_fault_of_batch_is_a_warning(monkeypatch, tmp_path):
+    """A fault after which cases are run one by one is among the warnings of the sweep, also of a resumed one."""
+
+    def fail(*_):
+        """Fail in place of computing cases together."""
+        raise ZeroDivisionError("a fault")
+
+    monkeypatch.setattr(lumped, "solve", fail)
+    folder = tmp_path / "swept"
+    over = {"friction.static": np.linspace(0.1, 0.3, 40)}
+    pf.sweep(RIG, over, out=folder)
+    pf.sweep(RIG, over, out=folder, resume=True)
+    warnings = store.read(folder).remarks.warnings
+    assert (
+        len(warnings) == 1
+        and "internal fault, please report it: ZeroDivisionError: a fault" in warnings[0]
+    )
 
 
 def test_refuses_invalid_sweep():

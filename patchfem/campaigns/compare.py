@@ -64,7 +64,7 @@ class SurfaceRuns(NamedTuple):
                 measures[name] = {side: _measure_to_dict(found.get(side)) for side in SIDES}
         warnings = []
         for side, result in self.results.items():
-            texts = [*result.warnings, *result.extra["notes"]]
+            texts = [*result.warnings, *result.notes]
             warnings += [f"{side}: {text}" for text in texts]
         outcomes = {side: str(one.outcome) for side, one in self.results.items()}
         return {

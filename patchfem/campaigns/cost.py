@@ -176,7 +176,7 @@ def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Res
         measures={name: one for name, one in result.measures.items() if one.value is not None},
         tolerance=setting.model.accuracy.tolerance,
         remedies=tuple(one.text for one in advice),
-        steps=result.extra.get("steps_per_cycle") or result.extra.get("steps"),
+        steps=result.settings.steps_per_cycle,
         nodes=None if result.patch is None else int(result.patch.x.size),
     )
 

@@ -1,4 +1,4 @@
-"""Exact solutions of simple contact problems: Hertz, punches, waves, wedges and layers.
+"""Exact solutions of contact at the rounded edges of punches.
 
 In: sizes in SI units, shapes as each docstring of `contact` says. Out: closed forms, or one scalar equation solved to
 round-off. Nothing here uses the rest of the package, so tests may trust it.

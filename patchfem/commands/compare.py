@@ -18,7 +18,6 @@ from .shared import (
     Sets,
     Units,
     UsageError,
-    Verbose,
     flag_option,
     load_model,
     load_scene,
@@ -69,7 +68,6 @@ def compare(
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
     output_options: OutputGroup = DEFAULT_OUTPUT,
-    verbose: Verbose = False,
 ):
     """Compare the surfaces measured in the files BEFORE and AFTER: worn depth, volume or area with intervals, a verdict
     and a page. With --pairs, each pair of a table is compared; pairs.csv and a page then have its depths and ratios with
@@ -86,7 +84,7 @@ def compare(
     # an option that the kind of comparison does not use is a mistake of the user
     if pairs is not None:
         _refuse_others({"another file": files, **given}, "a table of pairs")
-        _compare_pairs(pairs, options, output_options.make_output(pairs.stem, is_verbose=verbose))
+        _compare_pairs(pairs, options, output_options.into(pairs.stem))
         return
     if len(files) != 2:
         removed = ""
@@ -96,9 +94,7 @@ def compare(
             f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
 
-    output = output_options.make_output(
-        f"{before.resolve().stem}-{after.resolve().stem}", is_verbose=verbose
-    )
+    output = output_options.into(f"{before.resolve().stem}-{after.resolve().stem}")
     if before.is_dir() or after.is_dir():
         set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
         set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
@@ -119,7 +115,7 @@ def _refuse_others(given: dict[str, Any], subject: str) -> None:
 
 def _compare_pairs(table: Path, options, output: Output) -> None:
     """Compare all pairs in a table; the exit code is 3 if some pairs fail and 2 if all pairs fail."""
-    with Progress(output.is_quiet or output.as_json) as progress:
+    with Progress(output.quiet or output.json_) as progress:
         answer = save(lambda _: compared_pairs.answer_pairs(table, options, progress), output)
     rows = answer.details["pairs"]
     failed = [row for row in rows if row["outcome"] == "failed"]

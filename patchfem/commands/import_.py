@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..export.lab import imported
-from .shared import Json, flag_option, note, repeated_option, text_option
+from .shared import Json, flag_option, note, repeated_option, required_out_option, text_option
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,9 @@ def import_(
     file: Path,
     /,
     *,
-    out: Annotated[
-        Path,
-        Parameter(
-            name=["-o", "--out"],
-            help="file to write: table.csv (records in SI) or modes.toml (modes for a scene)",
-        ),
-    ],
+    out: required_out_option(
+        "file to write: table.csv (records in SI) or modes.toml (modes for a scene)"
+    ),
     map_: repeated_option(
         'quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
         '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; may be repeated; without this option the labels of '

@@ -90,7 +90,7 @@ def profile(
 
     options["form"] = forms.parse_form_option(form)
     paths = (file, *more)
-    output = Output(out, json_, plot=plot, is_verbose=verbose)
+    output = Output(out, plot=plot, json_=json_, verbose=verbose)
     if out is not None:
         save(lambda _: roughness.answer_files(paths, parse_units(units), **options), output)
     else:

@@ -15,7 +15,6 @@ from .shared import (
     Progress,
     Sets,
     UsageError,
-    Verbose,
     flag_option,
     load_scene,
     present,
@@ -35,7 +34,6 @@ def run(
         "compute the stiffness of the pieces again instead of taking it from the cache"
     ) = False,
     output_options: OutputGroup = DEFAULT_OUTPUT,
-    verbose: Verbose = False,
 ):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
@@ -49,14 +47,14 @@ def run(
         )
 
     # a run that is complete has no state, so that nothing is left to resume
-    output = output_options.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
-    target = output.target
+    output = output_options.into(run_plan.model.source.path.stem)
+    target = output.out
     if resume and run_folder.is_complete(run_plan, target):
         _report_complete_run(target, output)
         return
 
-    report = None if output.is_quiet else print_message
-    with Progress(output.is_quiet or output.as_json) as progress:
+    report = None if output.quiet else print_message
+    with Progress(output.quiet or output.json_) as progress:
         written = run_folder.run_into(
             run_plan,
             target,
@@ -64,29 +62,29 @@ def run(
             progress,
             fresh=fresh,
             resume=resume,
-            has_page=output.has_page,
+            has_page=not output.no_page,
         )
     present(written.answer, output)
     if written.page_fault is not None:
         _report_missing_page(written.page_fault, target)
-    if verbose:
+    if output.verbose:
         seconds = written.answer.details["seconds"]
         print_message(
             "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in seconds.items())
         )
-    _end_run(written.answer, output.is_quiet)
+    _end_run(written.answer, output.quiet)
 
 
 def _report_complete_run(target: Path, output: Output) -> None:
     """Say that a run to be resumed is already complete, and print it again as JSON if that is asked for."""
-    if not output.is_quiet:
+    if not output.quiet:
         print_message(
             f"{target}: this run is already complete; to run it again, leave out --resume"
         )
     answer = store.read(target)
-    if output.as_json:
+    if output.json_:
         print(json.dumps(store.make_summary(answer), ensure_ascii=False), flush=True)
-    _end_run(answer, output.is_quiet)
+    _end_run(answer, output.quiet)
 
 
 def _end_run(answer, is_quiet: bool) -> None:

@@ -2,9 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
+from typing import Any
 
 from ..campaigns.sweeps import parse_request
 from ..effects import law_has_trait, list_displayed_absent_effects
@@ -16,7 +14,17 @@ from ..runs import plan as plans
 from ..runs.patch import plan as patch_plan
 from ..runs.patch import result
 from ..scene.files import list_named_files
-from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
+from .shared import (
+    Json,
+    Sets,
+    UsageError,
+    flag_option,
+    load_model,
+    load_scene,
+    note,
+    print_message,
+    required_out_option,
+)
 from .sweep import CaseOptions
 
 
@@ -27,50 +35,33 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     Example: patchfem check rig.toml
     """
     notes = []
-    # The files that the scene names add their notes as they are read.
-    checked_scene = load_scene(
-        scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
-    )
-    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
 
-    cases = len(_read_sweep(scene, set_, CaseOptions())[1]) if checked_scene.sweep else None
+    def find_file_mistakes(tables, folder: Path, is_complete: bool) -> list[str]:
+        """Return the mistakes in the files that the scene names, and add notes on them; without files import nothing."""
+        if not list_named_files(tables):
+            return []
+        return model_files.find_file_faults(tables, folder, is_complete, notes)
+
+    # all mistakes are raised here
+    checked_scene = load_scene(scene, set_, find_file_mistakes)
+    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
+    content = {
+        "kind": checked_scene.kind,
+        "effects": checked_scene.effect_names(),
+        "remarks": checked_scene.remarks,
+        "notes": notes,
+    }
+    text = f"{scene}: a {checked_scene.kind} scene without mistakes"
+    if checked_scene.sweep:
+        _, cases = parse_request.read_sweep(scene, set_, CaseOptions().request())
+        content["cases"] = len(cases)
+        text += f", {len(cases)} cases"
+
     for remark in checked_scene.remarks:
         print_message(f"{scene}: {remark}")
-    for text in notes:
-        note(text)
-
-    if json_:
-        print(
-            json.dumps(
-                {
-                    "kind": checked_scene.kind,
-                    "effects": checked_scene.effect_names(),
-                    "remarks": checked_scene.remarks,
-                    "notes": notes,
-                }
-                | ({"cases": cases} if cases else {})
-            )
-        )
-    else:
-        print(
-            f"{scene}: a {checked_scene.kind} scene without mistakes"
-            + (f", {cases} cases" if cases else "")
-        )
-
-
-def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
-    """Return the data that all cases of a sweep share, and the cases."""
-    return parse_request.read_sweep(scene, sets, what.request())
-
-
-def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list[str]) -> list[str]:
-    """Return the mistakes in the files that a scene names, and append notes on the run to `notes`.
-
-    Without such files nothing is imported.
-    """
-    if not list_named_files(tables):
-        return []
-    return model_files.find_file_faults(tables, folder, is_complete, notes)
+    for remark in notes:
+        note(remark)
+    print(json.dumps(content) if json_ else text)
 
 
 def plan(
@@ -109,7 +100,7 @@ def plan(
     _print_plan(plan_data, probe or run_plan.model.has_bolted_patch, verbose)
 
 
-def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
+def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> None:
     """Print a plan: effects, measured time, sentences, stiffnesses and groups.
 
     is_solved: whether the stiffness of the pieces is that of a solved patch.
@@ -130,13 +121,13 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
     for sentence in plan_data["verdict"]:
         print(f"says     {rewrite_powers_of_ten(sentence)}")
 
-    bonded = any(
-        law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]
-    )
-    links = [
-        f"{_format_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
-        for name, link in plan_data["stiffness_chain"].items()
-    ]
+    # a link is named after bonds only for a law that has bonds
+    laws = [effect["effect"].partition("law=")[2] for effect in plan_data["effects"]]
+    word = "bonds" if any(law_has_trait(law, "bonds") for law in laws) else "friction"
+    links = []
+    for name, link in plan_data["stiffness_chain"].items():
+        text = link if isinstance(link, str) else format_quantity(link, "N m-1", 4)
+        links.append(f"{_format_size_name(name.replace('bonds', word))} {text}")
     print("chain    " + " -> ".join(links))
 
     # A patch that was not solved has an upper estimate of its shear stiffness.
@@ -151,49 +142,30 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
         )
 
     for one in plan_data.get("modes", ()):
-        stuck_text = (
-            ""
-            if one["stuck_frequency"] is None
-            else f", {'at most ' * is_upper_estimate}{one['stuck_frequency']:.5g} Hz while the contact sticks"
-        )
-        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{stuck_text}")
+        text = f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact"
+        if one["stuck_frequency"] is not None:
+            limit = "at most " * is_upper_estimate
+            text += f", {limit}{one['stuck_frequency']:.5g} Hz while the contact sticks"
+        print(text)
 
     for name, value in plan_data["groups"].items():
-        print(f"group    {_format_group(value, name)}")
+        text, unit = plans.GROUPS.get(name, (_format_size_name(name), "1"))
+        print(f"group    {format_quantity(value, unit, 4):<10} {text}")
     if verbose:
-        print(
-            f"absent   {', '.join(list_displayed_absent_effects(plan_data['not_in_scene'], plan_data['engine']))}"
-        )
-
-
-def _format_link(name: str, bonded: bool) -> str:
-    """Return the name of a spring in the chain of stiffnesses as words.
-
-    It is "bonds" only for a law that has bonds.
-    """
-    return _format_size_name(name if bonded else name.replace("bonds", "friction"))
+        absent = list_displayed_absent_effects(plan_data["not_in_scene"], plan_data["engine"])
+        print(f"absent   {', '.join(absent)}")
 
 
 def _format_size_name(name: str) -> str:
     """Return the name of a size or of a link as words, with "(about)" for predicted ones."""
-    return (
-        f"{name.removesuffix('_about')} (about)".replace("_", " ")
-        if name.endswith("_about")
-        else name.replace("_", " ")
-    )
-
-
-def _format_group(value: float, name: str) -> str:
-    """Return a dimensionless group of the plan with its value as text."""
-    text, unit = plans.GROUPS.get(name, (_format_size_name(name), "1"))
-    return f"{format_quantity(value, unit, 4):<10} {text}"
+    return name.removesuffix("_about").replace("_", " ") + " (about)" * name.endswith("_about")
 
 
 def mesh(
     scene: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],
+    out: required_out_option("mesh.msh or mesh.vtu"),
     set_: Sets = (),
 ):
     """Write the mesh of the pieces of SCENE, with its tags.

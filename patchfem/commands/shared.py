@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -60,6 +60,11 @@ def out_option(text: str) -> type:
     return path_option(text, "-o", "--out")
 
 
+def required_out_option(text: str) -> type:
+    """Return the type of the option -o of a command that cannot do without it; `text` is its help text."""
+    return Annotated[Path, Parameter(name=["-o", "--out"], help=text)]
+
+
 Sets = repeated_option(
     'change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set"
 )
@@ -72,49 +77,35 @@ Plot = path_option("write also the first picture, such as loop.png (.png, .svg o
 Verbose = flag_option("print all numbers", "-v", "--verbose")
 
 
-class Output(NamedTuple):
-    """Options of the output of a command.
-
-    target: folder of the results, or None if no files are written; as_json, is_quiet, is_verbose: what is printed;
-    has_page: whether report.html is written; plot: file of a picture, or None.
-    """
-
-    target: Path | None
-    as_json: bool = False
-    is_quiet: bool = False
-    has_page: bool = True
-    plot: Path | None = None
-    is_verbose: bool = False
-
-    @property
-    def report(self) -> Callable[[str], None] | None:
-        """Function that prints a line on the progress of the work, or None if nothing is printed."""
-        return None if self.is_quiet or self.as_json else print_message
-
-
 @dataclass(frozen=True)
-class OutputOptions:
-    """Options of all commands that write a results folder."""
+class Output:
+    """Options of all commands that write a results folder.
+
+    Without `out` no files are written.
+    """
 
     out: Out = None
     no_page: NoPage = False
     plot: Plot = None
     json_: Json = False
     quiet: Quiet = False
+    verbose: Verbose = False
 
-    def make_output(self, name: str, *, is_verbose: bool = False) -> Output:
+    def into(self, name: str) -> "Output":
         """Return the output into the folder that -o gives, or into out/NAME."""
-        target = self.out if self.out is not None else Path("out") / name
-        return Output(target, self.json_, self.quiet, not self.no_page, self.plot, is_verbose)
+        return replace(self, out=self.out or Path("out") / name)
+
+    @property
+    def report(self) -> Callable[[str], None] | None:
+        """Function that prints a line on the progress of the work, or None if nothing is printed."""
+        return None if self.quiet or self.json_ else print_message
 
 
-OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
-DEFAULT_OUTPUT = OutputOptions()
+OutputGroup = Annotated[Output, Parameter(name="*")]
+DEFAULT_OUTPUT = Output()
 
 
-def save(
-    make_answer: Callable[[Path], "Answer"], output: Output, *, resume: bool = False
-) -> "Answer":
+def save(make_answer: Callable[[Path], "Answer"], output: Output) -> "Answer":
     """Make an answer, write it with its page into its folder, print it and return it.
 
     Parameters
@@ -123,10 +114,8 @@ def save(
         Function that takes the folder, which is locked meanwhile, and returns the Answer.
     output : Output
         Where and how the answer is written and printed.
-    resume : bool
-        Whether saved states in the folder are kept.
     """
-    with folders.Folder(output.target, resume) as folder:
+    with folders.Folder(output.out) as folder:
         if folder.dropped and output.report:
             output.report(folder.dropped)
         answer = make_answer(folder.path)
@@ -134,7 +123,7 @@ def save(
         origin = versions | answer.origin | {"command": describe_command()}
         answer = replace(answer, origin=origin)
         store.write(answer, folder.path)
-        if output.has_page:
+        if not output.no_page:
             page.write_page(folder.path)
     present(answer, output)
     return answer
@@ -154,33 +143,22 @@ def describe_command() -> str:
 
 def present(answer: "Answer", output: Output) -> None:
     """Print an answer, draw its picture, and print the names of its files."""
-    if output.as_json:
+    if output.json_:
         content = store.make_summary(answer) if answer.is_run else answer.details
         if answer.kind == "pairs":
             content = answer.details["pairs"]
         print(json.dumps(content, ensure_ascii=False, allow_nan=False), flush=True)
-    elif not output.is_quiet:
-        for line in show.make_lines(answer, output.is_verbose):
-            print(line)
-        sys.stdout.flush()
-    if not output.is_quiet:
-        print_remarks(answer)
+    elif not output.quiet:
+        print(*show.make_lines(answer, output.verbose), sep="\n", flush=True)
+    if not output.quiet:
+        for text in answer.remarks.warnings:
+            _print_remark(f"warning: {text}")
+        for text in answer.remarks.notes:
+            note(text)
     if output.plot is not None:
         axes.write_plot(answer, output.plot)
-    if output.target is not None and not (output.as_json or output.is_quiet):
-        for line in show.list_files(output.target, output.has_page):
-            print(line)
-        sys.stdout.flush()
-
-
-def print_remarks(answer: "Answer") -> None:
-    """Print the warnings and notes of an answer on stderr."""
-    for text in answer.remarks.warnings:
-        # some remarks are followed by tables for the scene file
-        for line in f"warning: {text}".split("\n"):
-            print_message(make_printable(line))
-    for text in answer.remarks.notes:
-        note(text)
+    if output.out is not None and not (output.json_ or output.quiet):
+        print(*show.list_files(output.out, not output.no_page), sep="\n", flush=True)
 
 
 def refuse_existing(out: Path | None) -> None:
@@ -238,8 +216,14 @@ def print_message(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print a note on stderr, without control characters that could move the cursor."""
-    for line in f"note: {text}".split("\n"):
+    """Print a note on stderr."""
+    _print_remark(f"note: {text}")
+
+
+def _print_remark(text: str) -> None:
+    """Print a warning or a note on stderr, without control characters that could move the cursor."""
+    # some remarks are followed by tables for the scene file
+    for line in text.split("\n"):
         print_message(make_printable(line))
 
 
@@ -263,15 +247,6 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
 def load_model(path: Path, sets):
     """Build the model of the scene in a file; raise SceneError with every mistake."""
     return model.build(load_scene(path, sets))
-
-
-def load_model_without_sweep(path: Path, sets):
-    """Build the model of a scene without its [sweep] table, and print a note on this."""
-    loaded = load_scene(path, sets)
-    if loaded.sweep:
-        keys = ", ".join(axis.key for axis in loaded.sweep)
-        note(f"[sweep] is left out: {keys} as the scene gives it, or its first value in [sweep]")
-    return model.build_without_sweep(loaded)
 
 
 class Progress:

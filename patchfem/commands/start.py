@@ -14,7 +14,7 @@ from .shared import (
     Json,
     NoPage,
     Out,
-    OutputOptions,
+    Output,
     UsageError,
     flag_option,
     out_option,
@@ -112,7 +112,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     """
     scene = starting.find_shipped_scene()
     print_message(f"scene: {scene}; for another template run: patchfem new")
-    run(scene, output_options=OutputOptions(out or Path("out") / "demo", no_page))
+    run(scene, output_options=Output(out or Path("out") / "demo", no_page))
 
 
 def schema(*, out: out_option("file to write, such as scene.json; default: the screen") = None):
@@ -140,11 +140,9 @@ def doctor(*, json_: Json = False):
         print(json.dumps([finding._asdict() for finding in findings]))
         return
     width = max(len(finding.name) for finding in findings)
-    for finding in findings:
-        print(
-            f"{'ok' if finding.fine else '--'}  {finding.name:<{width}}  {finding.found}"
-            + (f"; {finding.cure}" if finding.cure else "")
-        )
+    for name, fine, found, cure in findings:
+        text = f"{'ok' if fine else '--'}  {name:<{width}}  {found}"
+        print(f"{text}; {cure}" if cure else text)
 
 
 def cite(scene: Path | None = None, /):

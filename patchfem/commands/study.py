@@ -20,8 +20,6 @@ from .shared import (
     Progress,
     Sets,
     UsageError,
-    Verbose,
-    flag_option,
     load_model,
     load_scene,
     print_message,
@@ -38,14 +36,11 @@ def cost(
     over: text_option(
         "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
     ) = "",
-    verbose: flag_option(
-        "vary also each setting alone, and print all numbers", "-v", "--verbose"
-    ) = False,
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
 ):
     """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
-    or for each value of one accuracy setting.
+    or for each value of one accuracy setting. With -v each setting is varied alone, too.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
@@ -54,13 +49,13 @@ def cost(
     if over and over not in settings:
         raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
     names = [over or cost_curves.TOLERANCE]
-    if verbose and not over:
+    if output_options.verbose and not over:
         names += numerical_settings.find_applicable_settings(scene_model)
-    output = output_options.make_output(f"{scene_model.source.path.stem}-cost", is_verbose=verbose)
+    output = output_options.into(f"{scene_model.source.path.stem}-cost")
 
     def measure_costs(_):
         """Run the scene with all settings."""
-        report = None if output.is_quiet else print_message
+        report = None if output.quiet else print_message
         curves = {
             name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
         }
@@ -97,7 +92,6 @@ def backbone(
     ) = "",
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
-    verbose: Verbose = False,
 ):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude, and the force at the output that holds
     it in phase resonance: a curve with a band of what tests measure, and which method holds where. The contact is included;
@@ -106,22 +100,18 @@ def backbone(
     Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
 
-    def build_model(tables, *, is_written: bool, sets: tuple[str, ...]):
+    def build_model(tables, sets: tuple[str, ...] | None):
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        loaded_scene = load_scene(scene, () if is_written else (*set_, *sets), prepare=tables)
+        loaded_scene = load_scene(scene, () if sets is None else (*set_, *sets), prepare=tables)
         return model.build(remember_written(loaded_scene, prepare=tables))
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
-    output = output_options.make_output(f"{scene.stem}-backbone", is_verbose=verbose)
+    output = output_options.into(f"{scene.stem}-backbone")
     report = output.report and (lambda name: print_message(f"{name} ..."))
     request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
-    def compute_curves(_):
-        """Compute the curves of all methods and values of the key."""
-        return backbones.compute_answer(build_model, request, report)
-
-    answer = save(compute_curves, output)
+    answer = save(lambda _: backbones.compute_answer(build_model, request, report), output)
     cases = answer.details.get("cases", [answer.details])
     if not all(case["curves"] for case in cases):
         raise CommandExit(NOT_CONVERGED)
@@ -158,7 +148,6 @@ def fit(
     ] = None,
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
-    verbose: Verbose = False,
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
     frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
@@ -167,12 +156,12 @@ def fit(
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     loaded_scene = remember_written(load_scene(scene, set_))
-    output = output_options.make_output(f"{scene.stem}-fit", is_verbose=verbose)
+    output = output_options.into(f"{scene.stem}-fit")
     options = fit_requests.FitOptions(hold, leave_out, starts)
-    # the fits to a loop and to a curve are too short for a progress line
-    is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
-    with Progress(output.is_quiet or output.as_json or is_short) as progress:
-        report = None if output.is_quiet else print_message
+    # the fit to a loop is too short for a progress line
+    is_short = fit_requests.choose_kind(loaded_scene, to) == "loop"
+    with Progress(output.quiet or output.json_ or is_short) as progress:
+        report = None if output.quiet else print_message
         listener = fit_requests.Listener(report, progress)
         answer = save(
             lambda folder: fits.compute_answer(loaded_scene, to, free, options, listener, folder),

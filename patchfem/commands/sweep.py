@@ -16,15 +16,14 @@ from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED,
     CommandExit,
-    Output,
     OutputGroup,
     Progress,
     Sets,
     UsageError,
-    Verbose,
     describe_command,
     flag_option,
     note,
+    path_option,
     present,
     print_message,
     repeated_option,
@@ -42,15 +41,11 @@ class CaseOptions:
         "or :9lin fixes the spacing); may be repeated",
         "--over",
     ) = ()
-    cases: Annotated[
-        Path | None,
-        Parameter(
-            name="--cases",
-            help="file of cases, such as cases.csv: one column "
-            "`table.key [unit]` for each key, one row for each "
-            "case; or the sweep.csv of another sweep",
-        ),
-    ] = None
+    cases: path_option(
+        "file of cases, such as cases.csv: one column `table.key [unit]` for each key, one row for each case; or the "
+        "sweep.csv of another sweep",
+        "--cases",
+    ) = None
     random: Annotated[
         int,
         Parameter(
@@ -132,7 +127,6 @@ def sweep(
         ),
     ] = None,
     output_options: OutputGroup = DEFAULT_OUTPUT,
-    verbose: Verbose = False,
 ):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
     sweep.nc and report.html; the default folder is out/<scene name>-sweep.
@@ -146,30 +140,34 @@ def sweep(
 
     by = by or WorkerOptions()
     part = by.part()
-    output = output_options.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
-    target = output.target
+    output = output_options.into(f"{scene.stem}-sweep")
+    target = output.out
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     cases = replace(cases, command=describe_command())
 
     # a shard has no answer, because its tables would lack the cases of the others
     if by.collect:
-        answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
+        answer = run.collect_shards(sweep_scene, cases, target, not output.no_page)
     else:
-        if not output.is_quiet:
-            _print_notes(sweep_scene, cases)
-        place = run.SweepTarget(target, resume, keep or "", part, output.has_page)
-        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.is_quiet)
-    if answer is None:
-        _print_shard(by.shard, len(cases), output)
-    else:
-        _print_sweep(answer, output)
-
-
-def _print_notes(sweep_scene, cases) -> None:
-    """Print notes on invalid cases and on a bolted joint."""
-    for text in (cases.warning, sweep_scene.note_bolted_joint()):
-        if text:
-            note(text)
+        # notes on invalid cases and on a bolted joint
+        for text in (cases.warning, sweep_scene.note_bolted_joint()):
+            if text and not output.quiet:
+                note(text)
+        place = run.SweepTarget(target, resume, keep or "", part, not output.no_page)
+        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.quiet)
+    if answer is not None:
+        present(answer, output)
+        counts = answer.details["cases"]
+        if counts["failed"] == counts["count"]:
+            raise UsageError("sweep: no case could be run")
+        if counts["failed"] or "not_converged" in counts["outcomes"]:
+            raise CommandExit(NOT_CONVERGED)
+    elif output.json_:
+        print(json.dumps({"cases": len(cases), "folder": str(target)}))
+    elif not output.quiet:
+        print(
+            f"shard {by.shard} is in {target}; when all shards are done, run the sweep with --collect"
+        )
 
 
 def _run_cases(sweep_scene, cases, place, by: WorkerOptions, *, is_quiet: bool):
@@ -192,23 +190,3 @@ def _run_cases(sweep_scene, cases, place, by: WorkerOptions, *, is_quiet: bool):
             f"{shlex.join(words)} --resume"
         )
         raise CommandExit(getattr(why, "code", 130)) from None
-
-
-def _print_shard(shard: str, count: int, output: Output) -> None:
-    """Print that a shard is done."""
-    if output.as_json:
-        print(json.dumps({"cases": count, "folder": str(output.target)}))
-    elif not output.is_quiet:
-        print(
-            f"shard {shard} is in {output.target}; when all shards are done, run the sweep with --collect"
-        )
-
-
-def _print_sweep(answer, output: Output) -> None:
-    """Print the answer of a sweep; the exit code is 2 if all cases failed and 3 if some did or did not converge."""
-    present(answer, output)
-    cases = answer.details["cases"]
-    if cases["failed"] == cases["count"]:
-        raise UsageError("sweep: no case could be run")
-    if cases["failed"] or "not_converged" in cases["outcomes"]:
-        raise CommandExit(NOT_CONVERGED)

@@ -7,7 +7,16 @@ from cyclopts import Parameter
 
 from ..export import convert, page
 from ..export.lab import structures
-from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option
+from ..model import model
+from .shared import (
+    Sets,
+    UsageError,
+    flag_option,
+    load_scene,
+    note,
+    out_option,
+    required_out_option,
+)
 
 Frame = Annotated[
     int | None,
@@ -19,14 +28,10 @@ def export(
     folder: Path,
     /,
     *,
-    out: Annotated[
-        Path,
-        Parameter(
-            name=["-o", "--out"],
-            help="file to write; fields: fields.pvd (all frames, for any version of ParaView), .vtu, .csv or .vtkhdf; "
-            "histories: histories.uff, .mat or .csv; matrices and friction elements of a scene: .mat",
-        ),
-    ],
+    out: required_out_option(
+        "file to write; fields: fields.pvd (all frames, for any version of ParaView), .vtu, .csv or .vtkhdf; "
+        "histories: histories.uff, .mat or .csv; matrices and friction elements of a scene: .mat"
+    ),
     frame: Frame = None,
     sets: Sets = (),
     histories: flag_option(
@@ -45,7 +50,11 @@ def export(
         return
     if frame is not None or histories:
         raise UsageError("--frame and --histories can be used only with a results folder")
-    print(structures.export_structure(load_model_without_sweep(folder, sets), out))
+    scene = load_scene(folder, sets)
+    if scene.sweep:
+        keys = ", ".join(axis.key for axis in scene.sweep)
+        note(f"[sweep] is left out: {keys} as the scene gives it, or its first value in [sweep]")
+    print(structures.export_structure(model.build_without_sweep(scene), out))
 
 
 def view(

@@ -66,9 +66,6 @@ PUBLIC = {
         "coupled_stiffness",
         "tangential_stiffness",
     ),
-    "strip_compliance": (
-        "StripCompliance",
-        "WarmStart",
-    ),
+    "strip_compliance": ("StripCompliance",),
     "unilateral": ("INDEFINITE_MESSAGE",),
 }

@@ -84,27 +84,6 @@ class AsperitySolution(NamedTuple):
     n_iterations: int
 
 
-class _StripResponse(NamedTuple):
-    """Linearized response of the nodes in one strip with its asperity layer.
-
-    - nodes (k,): Indices among all nodes.
-    - root (k,): D^1/2.
-    - to_motions (k, r) and to_values (k,): Columns of the response for R and for the values.
-    """
-
-    nodes: np.ndarray
-    root: np.ndarray
-    to_motions: np.ndarray
-    to_values: np.ndarray
-
-
-class _TangentSolution(NamedTuple):
-    """Linearized equations of all strips: responses of the strips, and (r, r) derivative of the resultants by the motion."""
-
-    responses: list[_StripResponse]
-    tangent: np.ndarray
-
-
 class _NewtonStep(NamedTuple):
     """Changes of forces (n,) [N], motion (r,) and separations (n,) [m] in a Newton step."""
 
@@ -113,64 +92,51 @@ class _NewtonStep(NamedTuple):
     separation: np.ndarray
 
 
-def solve_tangent(compliance, motions, slope, values) -> _TangentSolution:
-    """Factorize the linearized equations of every strip with its asperity layer.
+def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _NewtonStep:
+    """Return the Newton step of the contact equations: forces, motion and separations.
 
-    Parameters
-    ----------
-    compliance : StripCompliance
-        Compliance C of the pieces.
-    motions : (n, r) ndarray
-        Closing of the nodes per motion.
-    slope : (n,) ndarray
-        Stiffness D of the asperity layer at each node [N/m].
-    values : (n,) ndarray
-        One more right-hand side [m].
+    slope: (n,) stiffness D of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
+    [m]; imbalance: (r,) missing load and moments.
     """
-    n_nodes = len(compliance.common)
-    n_motions = motions.shape[1]
+    contact = problem.contact
+    n_nodes = len(problem.compliance.common)
     negligible = MIN_RELATIVE_SLOPE * slope.max()
-    responses = []
-    tangent = np.zeros((n_motions, n_motions))
+    columns = np.column_stack([contact.motions, mismatch])
+    forces = np.zeros(columns.shape)
+
+    # Forces D^1/2 (I + D^1/2 C D^1/2)^-1 D^1/2 of the nodes that the layer loads, for each column; the matrix of a strip is
+    # well conditioned at every slope D
     for strip, strip_slope in enumerate(slope.reshape(-1, n_nodes)):
         in_strip = np.flatnonzero(strip_slope > negligible)
         if not in_strip.size:
             continue
-
-        # I + D^1/2 C D^1/2 of the nodes that the layer loads; it is well conditioned at every slope D
         nodes = strip * n_nodes + in_strip
-        root = np.sqrt(slope[nodes])
-        matrix = root[:, None] * compliance.block(strip, in_strip) * root
+        root = np.sqrt(slope[nodes])[:, None]
+        matrix = root * problem.compliance.block(strip, in_strip) * root.T
         matrix[np.diag_indices_from(matrix)] += 1.0
-        right_sides = root[:, None] * np.column_stack([motions[nodes], values[nodes]])
-        response = cho_solve(cho_factor(matrix, lower=True, overwrite_a=True), right_sides)
-        responses.append(_StripResponse(nodes, root, response[:, :-1], response[:, -1]))
-        tangent += right_sides[:, :-1].T @ response[:, :-1]
-    return _TangentSolution(responses, tangent)
+        factor = cho_factor(matrix, lower=True, overwrite_a=True)
+        forces[nodes] = root * cho_solve(factor, root * columns[nodes])
 
-
-def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _NewtonStep:
-    """Return the Newton step of the contact equations: forces, motion and separations.
-
-    slope: (n,) stiffness of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
-    [m]; imbalance: (r,) missing load and moments.
-    """
-    contact = problem.contact
-    responses, tangent = solve_tangent(problem.compliance, contact.motions, slope, mismatch)
-    force = np.zeros(slope.size)
-    for nodes, root, _, to_values in responses:
-        force[nodes] = root * to_values
-    motion = imbalance + contact.motions.T @ force
+    # The motion balances load and moments
+    by_motions = forces[:, :-1]
+    by_mismatch = forces[:, -1]
+    motion = imbalance + contact.motions.T @ by_mismatch
     if motion.size:
-        motion = np.linalg.lstsq(tangent + np.diag(contact.springs), motion, rcond=1e-14)[0]
-    for nodes, root, to_motions, to_values in responses:
-        force[nodes] = root * (to_motions @ motion - to_values)
+        tangent = contact.motions.T @ by_motions + np.diag(contact.springs)
+        motion = np.linalg.lstsq(tangent, motion, rcond=1e-14)[0]
+    force = by_motions @ motion - by_mismatch
     displacement = problem.compliance.product(force)
     return _NewtonStep(force, motion, mismatch - contact.motions @ motion + displacement)
 
 
-def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution | None:
-    """Solve by Newton's method from initial values, or return None if it does not converge."""
+def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution:
+    """Solve by Newton's method from initial separations (n,) [m] and an initial motion (r,).
+
+    Raises
+    ------
+    NotConverged
+        After `MAX_LAYER_STEPS` steps, or if a step cannot be computed.
+    """
     contact = problem.contact
     asperities = problem.asperities
     for iteration in range(1, MAX_LAYER_STEPS + 1):
@@ -186,7 +152,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
                     problem, force * decay, mismatch, imbalance
                 )
             except (np.linalg.LinAlgError, ValueError):
-                return None
+                break
         motion = motion + motion_change
 
         # Relative changes of the pressures. That of a nearly unloaded node counts in proportion to its force.
@@ -216,84 +182,30 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         load = contact.target[0] if imbalance.size else force.sum()
         risen = asperities.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
-    return None
+    raise NotConverged(DIVERGED_MESSAGE)
 
 
-def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
-    """Guess the separations in a strip under its approach, or return None if it does not touch.
-
-    No node can carry more force than the one that flattens its overlap.
-    """
+def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
+    """Solve strips under a prescribed approach, which the gap contains; no node carries force if nothing touches."""
     asperities = problem.asperities
     gap = problem.contact.gap
-    diagonal = problem.compliance.common.diagonal()
+    no_motion = np.zeros(0)
+    if asperities.log_pressure(gap)[0].max() <= MIN_LOG_PRESSURE:
+        return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
+
+    # No node can carry more force than the one that flattens its overlap
     separation = gap
-    if asperities.log_pressure(separation)[0].max() <= MIN_LOG_PRESSURE:
-        return None
+    diagonal = problem.compliance.common.diagonal()
     if (diagonal > 0).all():
         overlap = np.maximum(-gap, np.abs(gap).max() * 1e-3)
-        separation = np.maximum(
-            separation, asperities.separation(overlap / (diagonal * problem.area))
-        )
+        max_pressure = overlap / (np.resize(diagonal, gap.size) * problem.area)
+        separation = np.maximum(gap, asperities.separation(max_pressure))
     if asperities.log_pressure(separation)[0].max() > -MIN_LOG_PRESSURE:
         raise PatchfemError(
             "contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
             "distance"
         )
-    return separation
-
-
-def _solve_strip(problem: AsperityProblem) -> AsperitySolution:
-    """Solve one strip under a prescribed approach."""
-    gap = problem.contact.gap
-    no_motion = np.zeros(0)
-    separation = _guess_separation(problem)
-    if separation is None:
-        return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
-    solution = _solve_newton(problem, separation, no_motion)
-    if solution is None:
-        raise NotConverged(DIVERGED_MESSAGE)
-    return solution
-
-
-def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution:
-    """Solve every strip separately under the prescribed motion of the holder.
-
-    Parameters
-    ----------
-    problem : AsperityProblem
-        Strips under one holder.
-    motion : (r,) ndarray
-        Approach [m] and rotations [rad] of the holder, as far as the problem has them.
-
-    Returns
-    -------
-    AsperitySolution
-
-    Raises
-    ------
-    PatchfemError
-        If a strip carries more than can be computed with.
-    NotConverged
-        If Newton's method fails.
-    """
-    n_nodes = len(problem.compliance.common)
-    every_node = np.arange(n_nodes)
-    gap = problem.contact.gap - problem.contact.motions @ motion
-    solutions = []
-    for strip, strip_gap in enumerate(gap.reshape(-1, n_nodes)):
-        block = StripCompliance(problem.compliance.block(strip, every_node))
-        prescribed = ContactProblem(strip_gap, np.zeros((n_nodes, 0)), np.zeros(0), np.zeros(0))
-        strip_problem = AsperityProblem(
-            problem.asperities, block, problem.area[:n_nodes], prescribed
-        )
-        solutions.append(_solve_strip(strip_problem))
-    return AsperitySolution(
-        np.concatenate([solution.force for solution in solutions]),
-        np.concatenate([solution.separation for solution in solutions]),
-        motion,
-        sum(solution.n_iterations for solution in solutions),
-    )
+    return _solve_newton(problem, separation, no_motion)
 
 
 def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -318,29 +230,6 @@ def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]
     on_tangent = np.where(linear.force > 0, first_touch - pressure / stiffness, outside)
     on_law = problem.asperities.separation(np.maximum(pressure, mean_pressure))
     return np.where(pressure > mean_pressure, on_law, on_tangent), linear.motion
-
-
-def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
-    """Solve strips with a smooth asperity layer under a load and the moments about released rotations.
-
-    Parameters
-    ----------
-    problem : AsperityProblem
-        Strips under one holder that a load presses.
-
-    Returns
-    -------
-    AsperitySolution
-
-    Raises
-    ------
-    NotConverged
-        If Newton's method fails.
-    """
-    solution = _solve_newton(problem, *_linearised_start(problem))
-    if solution is None:
-        raise NotConverged(DIVERGED_MESSAGE)
-    return solution
 
 
 def compute_law_residuals(
@@ -408,8 +297,7 @@ def press_with_asperities(
     area = np.tile(layout.weight, layout.offsets.size)
 
     if not problem.target.size:
-        layer = AsperityProblem(asperities, compliance, area, problem)
-        solution = solve_at_motion(layer, np.zeros(0))
+        solution = _solve_at_approach(AsperityProblem(asperities, compliance, area, problem))
     else:
         # The largest closing of a node per unit of motion becomes 1, and load and moments become comparable.
         scale = 1 / np.abs(problem.motions).max(axis=0)
@@ -418,7 +306,8 @@ def press_with_asperities(
             target=problem.target * scale,
             springs=problem.springs * scale**2,
         )
-        solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
+        layer = AsperityProblem(asperities, compliance, area, scaled)
+        solution = _solve_newton(layer, *_linearised_start(layer))
         solution = solution._replace(motion=solution.motion * scale)
 
     # The check takes the separations of the geometry, the solution has those of the law.

@@ -204,7 +204,7 @@ def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
     return StripProperties(normal, tangential, pieces.interface.weight / count)
 
 
-def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
+def press_strips(strips: StripModel, gap, holder: Holder, start=None) -> StripsState:
     """Solve the contact of strips that one holder presses.
 
     The nodal forces f >= 0 and the openings w = g - R q + C f >= 0 satisfy f . w = 0 and balance the loads of the holder.
@@ -219,6 +219,8 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
         Gap [m] with the prescribed rotation about y.
     holder : Holder
         Loads and prescribed motions.
+    start : (s, m) bool ndarray, optional
+        Nodes in contact of a similar state, from which the search for the contact set starts.
 
     Returns
     -------
@@ -262,7 +264,7 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
         else:
             if asperities is not None:
                 compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
-            solution = _press_bare(compliance, problem)
+            solution = _press_bare(compliance, problem, start)
             opening = problem.gap - problem.motions @ solution.motion
             opening = opening + compliance.product(solution.force)
             residuals = compute_residuals(compliance, problem, solution)
@@ -304,16 +306,12 @@ def _holder_problem(layout: StripLayout, gap, holder: Holder) -> ContactProblem:
     )
 
 
-def _press_bare(compliance: StripCompliance, problem: ContactProblem) -> ContactSolution:
+def _press_bare(compliance: StripCompliance, problem: ContactProblem, start) -> ContactSolution:
     """Solve strips that have no asperity layer, or a linear one that the compliance contains."""
     if not problem.target.size and problem.gap.min() >= 0:
         return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
-    warm_start = compliance.warm_start
-    start = None
-    if warm_start is not None and warm_start.contact_set is not None:
-        start = np.asarray(warm_start.contact_set).ravel()
     try:
-        solution = solve(compliance, problem, start)
+        return solve(compliance, problem, None if start is None else np.ravel(start))
     except np.linalg.LinAlgError:
         message = explain_singular_set(compliance.common, problem)
         # The column of the roll is the last one, and it is the only one that is constant along a strip.
@@ -321,9 +319,6 @@ def _press_bare(compliance: StripCompliance, problem: ContactProblem) -> Contact
         if rolls and problem.target.size > 1 and message != INDEFINITE_MESSAGE:
             message = LOOSE_ROLL_MESSAGE
         raise NotConverged(message) from None
-    if warm_start is not None:
-        warm_start.contact_set = solution.force > 0
-    return solution
 
 
 def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:

@@ -5,16 +5,11 @@ the nodes of all strips are flat, strip after strip.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..elasticity.lapack import dpotrf, dpotrs
-
-# Largest memory [bytes] of the cached Cholesky factors; 16 strips that are pressed repeatedly need
-# less
-MAX_CACHE_BYTES = 1e8
 
 
 def factorise(matrix: np.ndarray) -> np.ndarray:
@@ -28,41 +23,16 @@ def factorise(matrix: np.ndarray) -> np.ndarray:
     return lower_factor
 
 
-@dataclass(eq=False, slots=True)
-class WarmStart:
-    """Contact set and Cholesky factors of a previous solution, which are reused in the next solution.
-
-    - contact_set (s, m): Nodes in contact, from which the next pressing starts.
-    - factors: Cholesky factors by the active nodes of a strip and by the diagonal added to it, oldest first.
-    """
-
-    contact_set: np.ndarray | None = None
-    factors: dict[tuple[bytes, bytes], np.ndarray] = field(default_factory=dict)
-
-    def factor(self, key: tuple[bytes, bytes], make_matrix: Callable[[], np.ndarray]) -> np.ndarray:
-        """Return the Cholesky factor of a matrix, from the cache if it is stored there."""
-        lower_factor = self.factors.pop(key, None)
-        if lower_factor is None:
-            lower_factor = factorise(make_matrix())
-        # A factor in use moves to the end, so that the oldest one is dropped first.
-        self.factors[key] = lower_factor
-        while len(self.factors) > max(1, MAX_CACHE_BYTES // lower_factor.nbytes):
-            del self.factors[next(iter(self.factors))]
-        return lower_factor
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class StripCompliance:
     """Compliance of s strips with m nodes each; the matrix of a strip is symmetric positive definite.
 
     - common (m, m): Compliance [m/N] that all strips share.
     - added (s, m): What each strip adds to the diagonal [m/N].
-    - warm_start: Results of the previous pressing with the same compliance.
     """
 
     common: np.ndarray
     added: np.ndarray | None = None
-    warm_start: WarmStart | None = None
 
     @property
     def node_compliance(self) -> float:
@@ -124,12 +94,7 @@ class StripCompliance:
             nodes = is_active.nonzero()[0]
             if not nodes.size:
                 continue
-            if self.warm_start is None:
-                factor = factorise(self.block(strip, nodes))
-            else:
-                diagonal = b"" if self.added is None else self.added[strip].tobytes()
-                key = (is_active.tobytes(), diagonal)
-                factor = self.warm_start.factor(key, partial(self.block, strip, nodes))
+            factor = factorise(self.block(strip, nodes))
             blocks.append((slice(start, start + nodes.size), factor))
             start += nodes.size
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..core import Missing
 
-MAX_NUMBER_BYTES = 20  # number of bytes that are read of a lock file
+MAX_LOCK_BYTES = 20  # number of bytes that are read of a lock file
 
 
 class FolderLock:
@@ -66,7 +66,7 @@ class FolderLock:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            process = os.read(file, MAX_NUMBER_BYTES).decode("utf-8", "replace")
+            process = os.read(file, MAX_LOCK_BYTES).decode("utf-8", "replace")
             os.close(file)
             raise Missing(
                 f"{self.folder}: another {self.kind} (process {process}) is writing to this folder; wait until that "

@@ -45,8 +45,8 @@ PUBLIC = {
         "refine_steady_motion",
     ),
     "limit_cycles": (
-        "MAX_AMPLITUDE_RATIO",
-        "MIN_AMPLITUDE_RATIO",
+        "MAX_CYCLE_RATIO",
+        "MIN_CYCLE_RATIO",
         "MIN_SLIDING_RATIO",
         "find_balance_cycles",
         "find_relay_cycles",

@@ -33,9 +33,9 @@ N_SAMPLES = 4096
 N_AMPLITUDES = 48
 # Smallest of these amplitudes, relative to the amplitude 4 F/(pi |c|
 # omega) of den Hartog's balance.
-MIN_AMPLITUDE_RATIO = 1e-6
+MIN_CYCLE_RATIO = 1e-6
 # Largest of these amplitudes, relative to the same amplitude.
-MAX_AMPLITUDE_RATIO = 4.0
+MAX_CYCLE_RATIO = 4.0
 # Smallest relative amplitude if the free motions in micro-slip cannot be computed.
 MIN_SLIDING_RATIO = 0.02
 # Number of amplitudes if the free motions in micro-slip cannot be computed.
@@ -45,12 +45,12 @@ NOT_FOLLOWED_MESSAGE = (
     "amplitude at which friction dissipates what the mode gains"
 )
 # Relative error of an amplitude due to round-off and the tolerances of the solvers.
-AMPLITUDE_TOL = 1e-9
+LIMIT_CYCLE_TOL = 1e-9
 # Largest velocity at a reversal that counts as zero, times the half
 # period and relative to the slide.
 REST_TOL = 1e-8
-# Largest condition number of the eigenvectors of modes; round-off of a motion is then below AMPLITUDE_TOL.
-MAX_CONDITION = 1e6
+# Largest condition number of the eigenvectors of modes; round-off of a motion is then below LIMIT_CYCLE_TOL.
+MAX_MODES_CONDITION = 1e6
 CRITICAL_CHANGE = 1e-10  # relative change of the damping that separates the eigenvectors
 MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
 # Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times
@@ -175,7 +175,7 @@ def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
         matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -damping]])
         rates, vectors = np.linalg.eig(matrix)
         scaled = vectors * np.concatenate([modes.omega, np.ones(n)])[:, None]
-        if np.linalg.cond(scaled) <= MAX_CONDITION:
+        if np.linalg.cond(scaled) <= MAX_MODES_CONDITION:
             break
     parts = np.linalg.solve(vectors, rest)
     return _ForcedFlow(np.asarray(row, float), matrix, rates, vectors, parts)
@@ -255,7 +255,7 @@ def trace_relay_backbone(
                 lambda log_rate: np.log(solve_cycle(log_rate).amplitude / amplitude),
                 first,
                 x1=first + 0.01,
-                tol=AMPLITUDE_TOL,
+                tol=LIMIT_CYCLE_TOL,
                 maxiter=MAX_SECANT_STEPS,
             )
             cycle = solve_cycle(log_rate)
@@ -294,7 +294,7 @@ def _make_relay_cycle(
     face = np.concatenate([np.zeros(n), row])
     reversal_map = step - np.outer(speed, face @ step) / (face @ speed)
     is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
-    return LimitCycle(amplitude, AMPLITUDE_TOL * amplitude, np.pi / half_period, is_stable)
+    return LimitCycle(amplitude, LIMIT_CYCLE_TOL * amplitude, np.pi / half_period, is_stable)
 
 
 def _find_largest(times, motion, speeds) -> float:
@@ -356,9 +356,9 @@ def _find_mode_cycles(
 
     # The path begins with the sticking contact, or with the sliding one if that fails.
     paths = (
-        (np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES), stuck_mode, 0.0),
+        (np.geomspace(MIN_CYCLE_RATIO, MAX_CYCLE_RATIO, N_AMPLITUDES), stuck_mode, 0.0),
         (
-            np.geomspace(MIN_SLIDING_RATIO, MAX_AMPLITUDE_RATIO, N_SLIDING_AMPLITUDES),
+            np.geomspace(MIN_SLIDING_RATIO, MAX_CYCLE_RATIO, N_SLIDING_AMPLITUDES),
             free_mode,
             MIN_SLIDING_RATIO * size,
         ),
@@ -383,7 +383,7 @@ def _find_mode_cycles(
         cycles = []
         for other, cycle in zip(coarse, fine):
             change = abs(other.amplitude - cycle.amplitude)
-            cycles.append(cycle._replace(error=2 * change + AMPLITUDE_TOL * cycle.amplitude))
+            cycles.append(cycle._replace(error=2 * change + LIMIT_CYCLE_TOL * cycle.amplitude))
         return cycles, min_amplitude
 
     raise NotConverged(NOT_FOLLOWED_MESSAGE)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
-from ..mesh import grid, pieces
+from ..mesh import pieces
 from ..mesh.elements import ELEMENTS, Element
 from .fronts import CellBlock, Fronts, condense
 
@@ -158,7 +158,7 @@ class Piece:
     - ``computed``: "factor" and "round_off_error" once they are computed
     """
 
-    mesh: "grid.TensorGrid | pieces.PieceMesh"
+    mesh: "pieces.Mesh"
     layers: Layers
     guided: int | None = None
     computed: dict[str, Fronts | float] = field(default_factory=dict)

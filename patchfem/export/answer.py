@@ -149,6 +149,8 @@ def to_plain(content):
     """Return content of a JSON file: arrays as lists, records as objects, and numbers that are not finite as None."""
     if isinstance(content, np.ndarray | np.generic):
         content = content.tolist()
+    elif isinstance(content, Quantity):
+        content = content.as_json()
     elif is_dataclass(content):
         content = {one.name: getattr(content, one.name) for one in fields(content)}
     elif hasattr(content, "_asdict"):

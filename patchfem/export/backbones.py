@@ -1,7 +1,6 @@
 """The answer of `backbone`: frequency, damping ratio and force of a mode against its amplitude."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +34,6 @@ BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "
 UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
 NAMES = {"frequency": "frequency", "damping": "damping ratio"}
 DIGITS = {"frequency": 5, "damping": 3}  # significant digits of a value in a sentence on its change
-# quantities of each value of a key on the page
-TABLE_COLUMNS = ("stuck_frequency", "largest_damping", "amplitude_of_largest_damping")
 # Largest relative change of a key that is said in percent.
 MAX_PERCENT_CHANGE = 0.995
 
@@ -161,26 +158,27 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
         headline = f"No method found frequency and damping of mode {backbone.mode}."
         return (headline, natural, *backbone.advice[:1])
 
-    # First and last point of the recommended curve, and the peak of the damping ratio between them.
+    # first and last point of the recommended curve, and the peak of the damping ratio between them
     peak = f"{show('largest_damping')} at {show('amplitude_of_largest_damping')}"
     has_peak = False
     changes = []
     for name, label in NAMES.items():
-        first, last = (measures[f"{name}_at_{size}_amplitude"] for size in ("smallest", "largest"))
-        texts = [show(f"{name}_at_{size}_amplitude") for size in ("smallest", "largest")]
-        higher = max(first, last, key=lambda one: one.value)
-        rise = measures["largest_damping"].value - higher.value
-        if name == "damping" and rise > (measures["largest_damping"].error or 0.0) + (
-            higher.error or 0.0
-        ):
-            has_peak = True
-            changes.append(f"{label} rises from {texts[0]} to {peak} and falls to {texts[1]}")
-        elif abs(last.value - first.value) <= (first.error or 0.0) + (last.error or 0.0):
-            changes.append(f"{label} stays at {texts[0]}")
+        places = [f"{name}_at_{size}_amplitude" for size in ("smallest", "largest")]
+        first, last = (measures[place] for place in places)
+        low, high = map(show, places)
+        top = measures["largest_damping"]
+        has_peak = name == "damping" and all(_exceeds(top, end) for end in (first, last))
+
+        # values that differ by less than their errors are equal
+        if has_peak:
+            changes.append(f"{label} rises from {low} to {peak} and falls to {high}")
+        elif _exceeds(last, first):
+            changes.append(f"{label} rises from {low} to {high}")
+        elif _exceeds(first, last):
+            changes.append(f"{label} falls from {low} to {high}")
         else:
-            verb = "rises" if last.value > first.value else "falls"
-            changes.append(f"{label} {verb} from {texts[0]} to {texts[1]}")
-    ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
+            changes.append(f"{label} stays at {low}")
+    ends = [format_quantity(curve.amplitude[k], "m", 3) for k in (0, -1)]
     span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
     sentences = [f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}.", natural]
 
@@ -192,6 +190,12 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     elif not has_peak:
         sentences.append(f"The largest damping ratio is {peak}.")
     return (*sentences, *backbone.advice[:1])
+
+
+def _exceeds(quantity: Quantity, other: Quantity) -> bool:
+    """Return whether a quantity is larger than another one by more than both errors."""
+    errors = (quantity.error or 0.0) + (other.error or 0.0)
+    return quantity.value - other.value > errors
 
 
 def _make_data(backbone: Backbone) -> Variables:
@@ -224,24 +228,22 @@ def _make_details(backbone: Backbone) -> JsonObject:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
     band = backbone.band
-
-    def list_columns(record, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Return some columns of a curve or of the band."""
-        return {name: getattr(record, name) for name in names}
-
+    curves = {}
+    for method, curve in backbone.curves.items():
+        curves[method] = {name: getattr(curve, name) for name in COLUMNS}
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
         "free_frequency_error": frequencies.free_error,
         "stuck_frequency": frequencies.stuck,
         "stuck_frequency_error": frequencies.stuck_error,
-        "curves": {name: list_columns(one, COLUMNS) for name, one in backbone.curves.items()},
+        "curves": curves,
         "missing": backbone.missing,
         "exponent": backbone.exponents,
         "flutter_amplitude": backbone.flutter,
-        "notes": list(backbone.notes),
+        "notes": backbone.notes,
         "method": band and band.method,
-        "band": band and list_columns(band, BAND_COLUMNS),
+        "band": band and {name: getattr(band, name) for name in BAND_COLUMNS},
         "advice": " ".join(backbone.advice),
     }
 
@@ -259,10 +261,12 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
         remarks=Remarks(notes=tuple(_list_notes(cases))),
         details={
             "key": axis.key,
-            "values": list(axis.texts),
+            "values": axis.texts,
             "mode": cases.backbones[0].mode,
-            "table": _list_values(cases),
-            "cases": [_make_details(one) for one in cases.backbones],
+            "cases": [
+                {"value": text, "measures": _make_quantities(one)} | _make_details(one)
+                for text, one in zip(axis.texts, cases.backbones, strict=True)
+            ],
         },
         origin=make_origin(cases.source, "backbone"),
     )
@@ -279,19 +283,6 @@ def _list_notes(cases: BackboneCases) -> list[str]:
         own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
         notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
     return notes
-
-
-def _list_values(cases: BackboneCases) -> list[dict[str, str]]:
-    """Return a row of the page for each value of the key: the value and its main quantities as text."""
-    rows = []
-    for text, backbone in zip(cases.axis.texts, cases.backbones):
-        known = _make_quantities(backbone)
-        row = {"value": text}
-        for name in TABLE_COLUMNS:
-            if name in known and known[name].value is not None:
-                row[name] = quantities.format_quantity(name, known[name])
-        rows.append(row)
-    return rows
 
 
 def _make_cases_data(cases: BackboneCases) -> Variables:
@@ -321,13 +312,6 @@ def _make_cases_data(cases: BackboneCases) -> Variables:
     return data
 
 
-class Change(NamedTuple):
-    """Change `step` (k,) of a value between two curves at common amplitudes, and the sum `error` (k,) of both errors."""
-
-    step: np.ndarray
-    error: np.ndarray
-
-
 def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     """Return the sentences on what the change of the key from its first to its last value does, and the changes.
 
@@ -345,12 +329,15 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
 
     # differences at the common amplitudes, and the largest one
     start, end = first.best.at(here), last.best.at(there)
-    changes = {name: _find_change(start, end, name) for name in VALUES}
+    changes = {}
+    for name in VALUES:
+        error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
+        changes[name] = getattr(end, name) - getattr(start, name), error
     place = _find_largest_change([changes[name] for name in NAMES])
     if place is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
-    amplitude = float(start.amplitude[place])
+    amplitude = start.amplitude[place]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
         measures[f"{name}_change"] = Quantity(step[place], UNITS[name], error[place])
@@ -364,14 +351,11 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     return (*sentences, *last.advice[:1]), measures
 
 
-def _find_change(start: Curve, end: Curve, name: str) -> Change:
-    """Return the change of a value from one curve to another at equal amplitudes."""
-    step = getattr(end, name) - getattr(start, name)
-    return Change(step, getattr(end, f"{name}_error") + getattr(start, f"{name}_error"))
+def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | None:
+    """Return the point with the largest sum of changes, each over its maximum; None if all are within their errors.
 
-
-def _find_largest_change(changes: list[Change]) -> int | None:
-    """Return the point with the largest sum of the changes, each over its maximum; None if all are within their errors."""
+    changes: arrays (k,) of the change of a value and of the sum of both errors.
+    """
     score = 0.0
     for step, error in changes:
         is_known = np.abs(step) > error

@@ -123,7 +123,7 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
         entry = {
             "worst": {"measure": worst.name, "error": worst.fraction},
             "meets_tolerance": worst.judge(run.tolerance) is Judgement.MEETS,
-            "remedies": list(run.remedies),
+            "remedies": run.remedies,
         }
         for part in ("value", "error", "floor"):
             numbers = {name: getattr(one, part) for name, one in run.measures.items()}

@@ -14,15 +14,13 @@ from .. import __version__
 from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
 from ..campaigns.fits.options import FitOptions
-from ..campaigns.fits.problem import Listener
+from ..campaigns.fits.problem import FittedKeys, Listener
 from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
 from ..campaigns.rows.fit import FittedRows
 from ..disk.atomic_write import write_text
 from ..formatting import format_number
-from ..identify.least_squares import Fit
 from ..model.model import build, write_resolved
-from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from .answer import (
     Answer,
@@ -114,18 +112,31 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     """
     parts = _DESCRIBE[type(fit)](fit)
     details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
-    details["values"] = _describe_values(fit)
-    if not isinstance(fit, FittedCoefficient):
-        details |= _describe_search(fit)
+    if isinstance(fit, FittedCoefficient):
+        details["values"] = _describe_coefficient(fit)
+    else:
+        details |= _describe_search(fit.keys)
     details |= parts.details
 
-    measures = _make_measures(details)
-    pairs = _collect_pairs(details.get("correlation", []), list(measures))
-    sentences = (parts.residual, *_describe_correlation(pairs))
+    measures = {}
+    for name, entry in details["values"].items():
+        reason = "" if entry["interval"] else "the measurement does not determine an interval"
+        low, high = entry["interval"] or (None, None)
+        entry |= {"low": low, "high": high}
+        measures[name] = Quantity(entry["value"], entry["unit"], None, low, high, reason=reason)
+
+    verdict = [_make_headline(details, measures), parts.residual]
+    pairs = _collect_pairs(details.get("correlation", ()), list(measures))
+    if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
+        names = pairs["pair"].values[0].replace(", ", " and ")
+        verdict.append(
+            f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination "
+            "of them better than each one."
+        )
     return Answer(
         kind="fit",
         title=scene.title,
-        verdict=(_make_headline(details, measures), *sentences),
+        verdict=tuple(verdict),
         quantities=measures | parts.scores,
         data=parts.data | pairs,
         remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
@@ -134,35 +145,12 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     )
 
 
-def _make_measures(details: JsonObject) -> Quantities:
-    """Return the fitted values with their intervals."""
-    measures = {}
-    for name, entry in details["values"].items():
-        reason = "" if entry["interval"] else "the measurement does not determine an interval"
-        measures[name] = Quantity(
-            entry["value"], entry["unit"], low=entry["low"], high=entry["high"], reason=reason
-        )
-    return measures
-
-
-def _describe_correlation(pairs: Variables) -> list[str]:
-    """Return a sentence on the most correlated pair of values; [] if no pair is strongly correlated."""
-    if not pairs or abs(pairs["correlation"].values[0]) < MIN_NAMED_CORRELATION:
-        return []
-    names = pairs["pair"].values[0].replace(", ", " and ")
-    return [
-        f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of them "
-        "better than each one."
-    ]
-
-
 def _make_headline(details: JsonObject, measures: Quantities) -> str:
     """Return a sentence with the first fitted values and their intervals."""
-    keys = list(details["values"])
-    named = keys[:MAX_NAMED_VALUES]
-    text = ", ".join(f"{key} = {format_quantity(key, measures[key])}" for key in named)
-    if len(keys) > len(named):
-        text += f" and {len(keys) - len(named)} more"
+    named = list(measures.items())[:MAX_NAMED_VALUES]
+    text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
+    if len(measures) > len(named):
+        text += f" and {len(measures) - len(named)} more"
     source = details["measured"]
     if source == "--to":  # a depth given with the command
         source = details["quantity"]
@@ -182,49 +170,38 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
 
 
-def _describe_values(fit: AnyFit) -> dict[str, JsonObject]:
-    """Return all fitted values by scene key, as written in fit.json."""
-    if isinstance(fit, FittedCoefficient):
-        value = {"value": fit.value, "unit": WEAR_UNIT, "low": fit.low, "high": fit.high}
-        ends = {"interval": [fit.low, fit.high], "bounds": [fit.bounds.low, fit.bounds.high]}
-        return {COEFFICIENT_KEY: value | ends}
-    return {
-        bound.key: _describe_value(bound, fit.keys.fit, k)
-        for k, bound in enumerate(fit.keys.ranges)
-    }
+def _describe_coefficient(fit: FittedCoefficient) -> dict[str, JsonObject]:
+    """Return the wear coefficient as the only fitted value of fit.json."""
+    value = {"value": fit.value, "unit": WEAR_UNIT, "interval": [fit.low, fit.high]}
+    return {COEFFICIENT_KEY: value | {"bounds": [fit.bounds.low, fit.bounds.high]}}
 
 
-def _describe_value(bound: Range, fit: Fit, k: int) -> JsonObject:
-    """Return fitted value k with its confidence interval and range, as written in fit.json."""
-    ends = fit.intervals.ends[k].tolist()
-    interval = ends if np.isfinite(ends).all() else None
-    low, high = interval or (None, None)
-    return {
-        "value": float(fit.values[k]),
-        "unit": bound.unit,
-        "low": low,
-        "high": high,
-        "interval": interval,
-        "method": fit.intervals.methods[k],
-        "bounds": [bound.low, bound.high],
-        "at_bound": fit.at_bound[k] or None,
-        "sensitivity": fit.intervals.sensitivity[k],
-    }
+def _describe_search(keys: FittedKeys) -> JsonObject:
+    """Return values with intervals, outcome and counts of a search, and what the data do not determine, for fit.json."""
+    fit = keys.fit
+    intervals = fit.intervals
+    values = {}
+    for k, bound in enumerate(keys.ranges):
+        ends = intervals.ends[k].tolist()
+        values[bound.key] = {
+            "value": fit.values[k],
+            "unit": bound.unit,
+            "interval": ends if np.isfinite(ends).all() else None,
+            "method": intervals.methods[k],
+            "bounds": [bound.low, bound.high],
+            "at_bound": fit.at_bound[k] or None,
+            "sensitivity": intervals.sensitivity[k],
+        }
 
-
-def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> JsonObject:
-    """Return outcome, warnings and counts of a search, and what the data do not determine, as written in fit.json."""
-    keys = fit.keys
-    intervals = keys.fit.intervals
-    names = [bound.key for bound in keys.ranges]
-    unknown = [dict(zip(names, row, strict=True)) for row in intervals.unknown.tolist()]
+    unknown = [dict(zip(values, row, strict=True)) for row in intervals.unknown.tolist()]
     return {
         "outcome": str(keys.outcome),
+        "values": values,
         "unknown": [{name: part for name, part in row.items() if part} for row in unknown],
         "correlation": intervals.correlation,
-        "evaluations": keys.fit.counts.evaluations,
-        "failures": keys.fit.counts.failures,
-        "descents_agreed": keys.fit.n_best,
+        "evaluations": fit.counts.evaluations,
+        "failures": fit.counts.failures,
+        "descents_agreed": fit.n_best,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
@@ -234,7 +211,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     """Return the parts of a fit to a friction loop."""
     loop = fit.loop
     unit = LOOP_UNITS[loop.quantity]
-    peak = float(np.abs(loop.reading).max())
+    peak = np.abs(loop.reading).max()
     n_rows = int((~fit.held_out).sum())
     scores = {
         "residual_rms": Quantity(fit.rms, unit),
@@ -295,7 +272,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
         value = measured.value[k]
         distance = fit.model[k] - value
-        rms[name] = float(np.sqrt(np.mean((distance / value) ** 2)))
+        rms[name] = np.sqrt(np.mean((distance / value) ** 2))
         columns |= {
             name: (value, unit),
             f"{name}_error": (errors[k], unit),
@@ -319,7 +296,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         "method": fit.method,
         "rows": n_rows,
         "rms": rms,
-        "notes": list(fit.notes),
+        "notes": fit.notes,
         "evaluations": fit.n_computed,
     }
     scores = {f"{name}_residual_rms": Quantity(value) for name, value in rms.items()}

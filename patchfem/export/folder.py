@@ -20,21 +20,11 @@ from .charts.table import CSV_FILES
 # files of all verbs; a folder that contains any other file is never replaced
 FILES = frozenset(
     {
-        store.SUMMARY,
-        store.SCENE,
-        store.PAGE,
-        store.FIELDS,
-        "result.nc",
+        *(store.SUMMARY, store.SCENE, store.PAGE, store.FIELDS, "result.nc"),
         *store.DATA_FILES.values(),
         *store.DETAIL_FILES.values(),
         *(name for files in CSV_FILES.values() for name in files),
-        "interfaces",
-        "fields.pvd",
-        "fields_frames",
-        "pairs.csv",
-        "scene.fitted.toml",
-        "starts.json",
-        "wear.npz",
+        *("interfaces", "fields.pvd", "fields_frames", "scene.fitted.toml"),
     }
 )
 LOCK = ".writer"
@@ -84,27 +74,33 @@ class Folder:
             raise PatchfemError(
                 f"{self.shown}: the working folder cannot be replaced by results; choose another -o"
             )
-        self._refuse_others()
         try:
+            self._refuse_others()
             self.target.parent.mkdir(parents=True, exist_ok=True)
-            self._claim()
+            self.claim.acquire()
+            self._prepare()
         except OSError as error:
             raise Missing(
                 f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
             ) from None
         return self
 
-    def _claim(self) -> None:
-        """Lock the folder, and make the partial folder; without saved states unless they are resumed."""
-        self.claim.acquire()
+    def _prepare(self) -> None:
+        """Make the partial folder, without saved states unless they are resumed; the lock is released at an error."""
         try:
             restore_folder(self.target)
             # another writer may have put its files there before the folder was locked
             self._refuse_others()
             if self.path.exists() and not self.resume:
-                self.dropped = self._dropped_note()
+                if list_states(self.path):
+                    self.dropped = (
+                        f"note: {self.path.name} held the state of an interrupted run, which is now discarded; "
+                        "use --resume to continue such a run"
+                    )
                 shutil.rmtree(self.path)
             self.path.mkdir(exist_ok=True)
+            # a killed writer leaves the partial file on which it worked
+            remove_partial_files(self.path)
         except BaseException:
             self.claim.release()
             raise
@@ -115,9 +111,8 @@ class Folder:
                 if kind is not None:
                     self._abandon()
                     return
-                for part in self.path.iterdir():
-                    if is_state(part.name) or part.name == LOCK:
-                        part.unlink()
+                for state in list_states(self.path):
+                    state.unlink()
                 replace_folder(self.path, self.target)
             except OSError as error:
                 raise Missing(
@@ -126,45 +121,48 @@ class Folder:
                 ) from None
             finally:
                 self.claim.release()
-                if kind is not None:
-                    self._remove_new_parents()
-
-    def _remove_new_parents(self) -> None:
-        """Remove the parents that were made for the folder, unless they contain other files."""
-        with suppress(OSError):
-            for path in self.new_parents:
-                path.rmdir()
+                # parents that were made for the folder are removed, unless they contain other files
+                with suppress(OSError):
+                    for path in self.new_parents if kind is not None else ():
+                        path.rmdir()
 
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""
         for place in (self.target, self.path, make_old_folder_path(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
-    def _dropped_note(self) -> str:
-        """Return a note that the saved states of an earlier run are deleted, or "" if there are none."""
-        if not any(is_state(part.name) for part in self.path.iterdir()):
-            return ""
-        return (
-            f"note: {self.path.name} held the state of an interrupted run, which is now discarded; use --resume to "
-            "continue such a run"
-        )
-
     def _abandon(self) -> None:
         """Remove an incomplete results folder, but keep a saved state."""
-        if not any(is_state(part.name) for part in self.path.iterdir()):
-            shutil.rmtree(self.path, ignore_errors=True)
-            return
-        RESUMABLE_FOLDERS.append(self.path)
+        states = list_states(self.path)
+        if states:
+            RESUMABLE_FOLDERS.append(self.path)
         for part in self.path.iterdir():
-            if not is_state(part.name):
-                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(
-                    missing_ok=True
-                )
+            if part not in states:
+                remove(part)
+        with suppress(OSError):  # it contains a state
+            self.path.rmdir()
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder with its content, as far as this is possible."""
+    shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
+
+
+def remove_partial_files(folder: Path) -> None:
+    """Remove the partial files in a folder and its subfolders, which only a killed writer leaves."""
+    for path in folder.rglob(".*"):
+        if is_partial_name(path.name):
+            remove(path)
 
 
 def is_state(name: str) -> bool:
     """Return whether a file with this name contains the saved state of an interrupted run."""
     return STATES.fullmatch(name) is not None
+
+
+def list_states(folder: Path) -> list[Path]:
+    """Return the files with the saved state of an interrupted run in a folder, which may not exist."""
+    return [path for path in folder.glob("*.npz") if is_state(path.name)]
 
 
 def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
@@ -177,7 +175,7 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
     user_path : Path
         The path as the user named it.
     allowed : container of str
-        Names of files that are allowed, also with .partial at the end.
+        Names of files that are allowed.
     kind : str
         What these files are, in words.
     dots : bool
@@ -192,7 +190,7 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
     others = sorted(
         path.name
         for path in folder.iterdir()
-        if path.name.removesuffix(".partial") not in allowed
+        if path.name not in allowed
         and not (is_partial_name(path.name) or is_state(path.name))
         and not (dots and path.name.startswith("."))
     )

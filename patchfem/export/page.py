@@ -1,6 +1,7 @@
 """report.html: a self-contained page, made from the files of one or several answers alone.
 
-Every page has the same template: verdict, tiles with the key numbers, charts, tables, all measures, notes and origin.
+In: results folders, as `store` wrote them. Out: HTML of the template page.html with the texts, the packed figures and the
+packed plotly.js.
 """
 
 import base64
@@ -16,7 +17,7 @@ from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
 from . import quantities, several, store
-from .answer import Answer, Answers, JsonObject, Quantity
+from .answer import Answer, Answers, Quantity
 from .charts import panels, plotly
 from .charts.table import CHARTS, TABLES, Column, parse_columns
 from .columns import Cells, list_rows, make_quantity
@@ -32,7 +33,6 @@ FILE_TEXTS = {
     ".csv": "columns of a table or of a curve (spreadsheet)",
     ".json": "all numbers of this answer, in SI units",
 }
-WIDE_STYLES = ("relative", "menu", "maps", "film")  # charts of the whole width, which are taller
 COMPRESSION = 6  # level of the compression of the figures in a page
 
 
@@ -43,14 +43,14 @@ def write_page(folder: Path) -> Path:
     ------
     PatchfemError
         If the folder has no complete result.
+    Missing
+        If the page cannot be written.
     """
-    path = Path(folder) / store.PAGE
-    write_text(path, make_page([Path(folder)]))
-    return path
+    return write_report([folder])
 
 
 def write_report(folders: list[Path], out: Path | None = None) -> Path:
-    """Write the page of one folder again, or of several folders side by side, and return its path.
+    """Write the page of one folder, or of several folders side by side, and return its path.
 
     Parameters
     ----------
@@ -82,23 +82,35 @@ def make_page(folders: list[Path]) -> str:
     PatchfemError if a folder has no complete result, or if the answers are of different kinds.
     """
     answers = _read_all(folders)
-    figures = _draw_charts(answers)
-    content = _describe_measures(answers)
+    first = next(iter(answers.values()))
+    drawn = panels.make_panels(answers, CHARTS[first.kind])
     if len(folders) == 1:
-        figures += _draw_films(folders[0])
-        _add_captions(figures, answers[""].details.get("captions", {}))
-        content |= _describe_answer(answers[""]) | {"files": _list_files(folders[0])}
+        tables = make_tables(first)
+        paths = sorted(folders[0].glob("[!.]*"))
+        texts = {
+            path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths
+        }
+        if (folders[0] / store.FIELDS).is_file():
+            drawn += make_stress_panels(folders[0] / store.FIELDS)
     else:
-        content |= _describe_several(answers)
+        tables = several.list_scene_differences(answers)
+        texts = {}
 
-    for number, figure in enumerate(figures):
-        figure["anchor"] = f"chart{number}"
-    content |= {
-        "figures": figures,
-        "data": pack_figures([_strip(figure) for figure in figures]),
-        "library": read_library() if figures else "",
-    }
-    return _template().render(content)
+    figures = [plotly.draw(panel) for panel in drawn]
+    parts = [{key: one[key] for key in one if key in plotly.PARTS} for one in figures]
+    packed = json.dumps(parts, separators=(",", ":"), allow_nan=False)
+    measures, zeros = _list_measures(answers)
+    return _template().render(
+        answers=answers,
+        first=first,
+        figures=figures,
+        tables=tables,
+        measures=measures,
+        zeros=zeros,
+        files=[(name, text) for name, text in texts.items() if text],
+        data=_encode(gzip.compress(packed.encode(), COMPRESSION, mtime=0)),
+        library=read_library() if figures else "",
+    )
 
 
 def _read_all(folders: list[Path]) -> Answers:
@@ -115,146 +127,29 @@ def _read_all(folders: list[Path]) -> Answers:
         name = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in (case or {}).items())
         name = name or folder.resolve().name
         answers[f"{name} ({len(answers) + 1})" if name in answers else name] = answer
-
     if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
         raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
     return answers
 
 
-def _draw_charts(answers: Answers) -> list[plotly.Figure]:
-    """Return the figures of all charts for which the answers have data."""
-    charts = CHARTS[next(iter(answers.values())).kind]
-    return [
-        plotly.draw(panel) | {"wide": panel.style in WIDE_STYLES}
-        for panel in panels.make_panels(answers, charts)
-    ]
+def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], list[str]]:
+    """Return name, texts in all answers and definition of each measure, and the names of those that are zero in all."""
+    rows = []
+    zeros = []
+    for name in dict.fromkeys(name for answer in answers.values() for name in answer.quantities):
+        known = [answer.quantities.get(name) for answer in answers.values()]
+        if all(one is not None and quantities.is_zero(name, one) for one in known):
+            zeros.append(name.replace("_", " "))
+            continue
 
-
-def _add_captions(figures: list[plotly.Figure], captions: dict[str, str]) -> None:
-    """Add the sentences with the numbers of an answer to the captions of its figures, which their titles name."""
-    for figure in figures:
-        if figure["title"] in captions:
-            figure["caption"] += f" {captions[figure['title']]}"
-
-
-def _describe_measures(answers: Answers) -> JsonObject:
-    """Return warnings and measures of all answers as parts of a page; measures that are zero in all of them apart."""
-    names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
-    zeros = [name for name in names if _is_zero_in_all(name, answers)]
-
-    # every answer is compared with the first one
-    first = next(iter(answers.values()))
-    measures = [
-        {
-            "name": f"measure-{name}",
-            "label": name.replace("_", " "),
-            "texts": [_format_entry(name, answer, first) for answer in answers.values()],
-            "meaning": _explain(name, answers),
-        }
-        for name in names
-        if name not in zeros
-    ]
-    return {
-        "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
-        "measures": measures,
-        "has_errors": any("±" in text for row in measures for text in row["texts"]),
-        "zeros": [name.replace("_", " ") for name in zeros],
-    }
-
-
-def _is_zero_in_all(name: str, answers: Answers) -> bool:
-    """Return whether all answers have a measure and display it as 0."""
-    known = [answer.quantities.get(name) for answer in answers.values()]
-    return all(one is not None and quantities.is_zero(name, one) for one in known)
-
-
-def _describe_several(answers: Answers) -> JsonObject:
-    """Return title, verdict and tables of a page on several answers."""
-    headlines = _label_all(answers, lambda answer: answer.verdict[:1])
-    kind = next(iter(answers.values())).kind
-    return {
-        "title": ", ".join(answers),
-        "subtitle": f"{kind} · {len(answers)} results",
-        "verdict": headlines,
-        "heading": list(answers),
-        "tables": several.list_scene_differences(answers),
-    }
-
-
-def _describe_answer(answer: Answer) -> JsonObject:
-    """Return title, verdict, tiles, tables, notes and origin of a page on one answer."""
-    origin = answer.origin
-    versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
-    # texts that a reader has to unfold
-    texts = {
-        "Scene": origin.get("scene"),
-        "Scene in SI with all defaults": origin.get("resolved"),
-        "Versions": versions,
-    }
-    return {
-        "title": answer.title or f"patchfem {answer.kind}",
-        "subtitle": _subtitle(answer),
-        "verdict": answer.verdict,
-        "tiles": make_tiles(answer),
-        "tables": make_tables(answer),
-        "notes": answer.remarks.notes,
-        "command": origin.get("command", ""),
-        "sources": "files" if answer.kind in quantities.SURFACE_KINDS else "scene",
-        "effects": answer.details.get("effects", []),
-        "texts": [(name, text) for name, text in texts.items() if text],
-    }
-
-
-def _label_all(answers: Answers, get_sentences) -> list[str]:
-    """Return the sentences of all answers, each with the name of its answer if there are several."""
-    return [
-        f"{name}: {sentence}" if name else sentence
-        for name, answer in answers.items()
-        for sentence in get_sentences(answer)
-    ]
-
-
-def _subtitle(answer: Answer) -> str:
-    """Return the line below the title: version, kind, outcome, engine and time."""
-    details = answer.details
-    engine = (details.get("numerics") or {}).get("engine", "") if answer.is_run else ""
-    seconds = (details.get("seconds") or {}).get("total") if answer.is_run else None
-    parts = (
-        f"patchfem {answer.origin.get('patchfem', '')}".strip(),
-        answer.kind,
-        answer.details.get("outcome", "") if answer.is_run else "",
-        f"engine {engine}" if engine else "",
-        f"computed in {seconds:.2f} s" if seconds is not None else "",
-    )
-    return " · ".join(part for part in parts if part)
-
-
-def make_tiles(answer: Answer) -> list[dict[str, str]]:
-    """Return the tiles of the key quantities: `label`, `text` and `meaning` of each."""
-    return [
-        {
-            "label": name.replace("_", " "),
-            "text": quantities.format_quantity(name, quantity),
-            "meaning": quantities.describe(name, answer.kind),
-        }
-        for name, quantity in quantities.choose_key(answer.quantities).items()
-    ]
-
-
-def _format_entry(name: str, answer: Answer, first: Answer) -> str:
-    """Return a measure as text with its change from the first answer; "" if it is absent."""
-    return several.format_entry(name, answer.quantities.get(name), first.quantities.get(name))
-
-
-def _explain(name: str, answers: Answers) -> str:
-    """Return the definition of a measure, and why it has no value in an answer."""
-    found = [answer.quantities[name] for answer in answers.values() if name in answer.quantities]
-    kind = next(iter(answers.values())).kind
-    reasons = dict.fromkeys(one.reason for one in found if one.value is None and one.reason)
-    return " ".join(
-        [quantities.describe(name, kind), *(f"No value: {reason}." for reason in reasons)]
-    )
+        # every answer is compared with the first one
+        texts = [several.format_entry(name, one, known[0]) for one in known]
+        reasons = dict.fromkeys(one.reason for one in known if one and one.value is None)
+        kind = next(iter(answers.values())).kind
+        missing = [f"No value: {reason}." for reason in reasons if reason]
+        rows.append((name, texts, " ".join([quantities.describe(name, kind), *missing])))
+    return rows, zeros
 
 
 def make_tables(answer: Answer) -> list[several.Table]:
@@ -264,13 +159,9 @@ def make_tables(answer: Answer) -> list[several.Table]:
         rows = list_rows(answer, table.source)
         known = {name for row in rows for name in row}
         columns = [one for one in parse_columns(table.columns) if one.name in known]
-        tables.append(
-            {
-                "title": table.title,
-                "headings": [column.heading.replace("_", " ") for column in columns],
-                "rows": [[_format_cell(row, column) for column in columns] for row in rows],
-            }
-        )
+        headings = [column.heading.replace("_", " ") for column in columns]
+        texts = [[_format_cell(row, column) for column in columns] for row in rows]
+        tables.append({"title": table.title, "headings": headings, "rows": texts})
     return [table for table in tables if table["rows"]]
 
 
@@ -291,48 +182,25 @@ def _format_cell(row: Cells, column: Column) -> str:
     return str(cell).replace("_", " ") if column.style == "name" else str(cell)
 
 
-def _draw_films(folder: Path) -> list[plotly.Figure]:
-    """Return the figure of the stress in both pieces with a slider over the frames, if the folder has the fields."""
-    path = folder / store.FIELDS
-    if not path.is_file():
-        return []
-    panel = make_stress_panel(path)
-    return [] if panel is None else [plotly.draw(panel) | {"wide": True}]
-
-
-def make_stress_panel(path: Path) -> panels.Panel | None:
-    """Return the panel of the stress in both pieces from a file of fields; None if the pieces do not touch."""
+def make_stress_panels(path: Path) -> list[panels.Panel]:
+    """Return the panel of the stress in both pieces from a file of fields; [] if the pieces do not touch."""
     from .fields.film import stress_frames
 
     frames = stress_frames(path)
     if not np.nanmax(frames["values"], initial=0.0) > 0:
-        return None
-    return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
+        return []
+    return [panels.make_film(frames, "von Mises stress in both pieces", "Pa")]
 
 
-def _list_files(folder: Path) -> list[tuple[str, str]]:
-    """Return name and description of the files beside the page of an answer."""
-    paths = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    texts = {path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths}
-    return [(name, text) for name, text in texts.items() if text]
-
-
-def _strip(figure: plotly.Figure) -> plotly.Figure:
-    """Return the entries of a figure that the script of the page reads."""
-    return {key: figure[key] for key in ("anchor", "data", "layout", "frames") if key in figure}
-
-
-def pack_figures(content: list[plotly.Figure]) -> str:
-    """Return an object as compressed JSON in base64; equal objects give equal strings."""
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
-    return base64.b64encode(gzip.compress(text.encode(), COMPRESSION, mtime=0)).decode()
+def _encode(content: bytes) -> str:
+    """Return bytes in base64."""
+    return base64.b64encode(content).decode()
 
 
 @cache
 def read_library() -> str:
     """Return the compressed bundle of plotly.js in base64."""
-    path = files(__package__) / "plotly" / "plotly-cartesian.min.js.gz"
-    return base64.b64encode(path.read_bytes()).decode()
+    return _encode((files(__package__) / "plotly" / "plotly-cartesian.min.js.gz").read_bytes())
 
 
 @cache
@@ -344,4 +212,6 @@ def _template():
     environment = Environment(autoescape=True, trim_blocks=True)
     # sentences mark keys and measures by backquotes, which a page does not show
     environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    environment.filters["words"] = lambda name: name.replace("_", " ")
+    environment.globals |= {"quantities": quantities}
     return environment.from_string(text)

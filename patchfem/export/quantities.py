@@ -230,7 +230,7 @@ def _find_digits(name: str) -> int | None:
     base_name = rows.remove_interface_number(name)
     if base_name in rows.TABLE or base_name in patch_rows.TABLE:
         return None
-    return None if surface_definitions.find(name) is None else MEASURED_DIGITS
+    return MEASURED_DIGITS if surface_definitions.find(name) else None
 
 
 def format_value(value: float | str, unit: str, digits: int = 4) -> str:

@@ -44,7 +44,6 @@ class Row(NamedTuple):
     unit: str
     text: str
     places: str
-    has_error: bool = False
 
 
 VARIABLES = {
@@ -119,7 +118,7 @@ VARIABLES = {
         "response.ledger.3 response.extra.ledger.3",
     ),
     "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
-    "period": Row("", "s", "period of the drive", "extra.period"),
+    "period": Row("", "s", "period of the drive", "motion.period"),
     "strip_offset": Row(
         "strip", "m", "position of the strip across the width", "patch.strips.offsets"
     ),
@@ -129,94 +128,86 @@ VARIABLES = {
         "normal stress of each strip, compression positive",
         "patch.strips.pressure",
     ),
-    "event_time": Row("event", "s", "time of the event", "extra.events.time"),
+    "event_time": Row("event", "s", "time of the event", "motion.events.time"),
     "event_interface": Row(
         "event",
         "1",
         "number of the interface or strip from 1; 0 for a change of the drive",
-        "extra.events.interface",
+        "motion.events.interface",
     ),
     "event_kind": Row(
-        "event", "", "kind of event; `up` means towards positive slip", "extra.events.kind"
+        "event", "", "kind of event; `up` means towards positive slip", "motion.events.kind"
     ),
-    "event_slide": Row("event", "m", "relative displacement at the event", "extra.events.slide"),
-    "curve_frequency": Row("curve_point", "Hz", "drive frequency", "extra.curve.frequency"),
+    "event_slide": Row("event", "m", "relative displacement at the event", "motion.events.slide"),
+    "curve_frequency": Row("curve_point", "Hz", "drive frequency", "motion.steady.curve.frequency"),
     "curve_level": Row(
         "curve_point",
         "m s-2",
         "drive: acceleration of the base, or force divided by the modal mass",
-        "extra.curve.level",
+        "motion.steady.curve.level",
     ),
     "curve_amplitude": Row(
         "curve_point",
         "m",
         "half the peak-to-peak motion at the output",
-        "extra.curve.amplitude",
-        has_error=True,
+        "motion.steady.curve.amplitude",
     ),
     "curve_acceleration_peak": Row(
         "curve_point",
         "m s-2",
         "largest absolute acceleration",
-        "extra.curve.acceleration_peak",
-        has_error=True,
+        "motion.steady.curve.acceleration_peak",
     ),
     "curve_acceleration_fundamental": Row(
         "curve_point",
         "m s-2",
         "first harmonic of the absolute acceleration",
-        "extra.curve.acceleration_fundamental",
-        has_error=True,
+        "motion.steady.curve.acceleration_fundamental",
     ),
     "curve_acceleration_distortion": Row(
         "curve_point",
         "1",
         "third over first harmonic of the absolute acceleration",
-        "extra.curve.acceleration_distortion",
-        has_error=True,
+        "motion.steady.curve.acceleration_distortion",
     ),
     "curve_multiplier": Row(
-        "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
+        "curve_point", "1", "largest Floquet multiplier", "motion.steady.curve.multiplier"
     ),
     "decay_time": Row(
-        "decay_time", "s", "time at the middle of the evaluated cycle", "extra.decay.time"
+        "decay_time", "s", "time at the middle of the evaluated cycle", "motion.decay.time"
     ),
     "decay_amplitude": Row(
-        "decay_time", "m", "half the peak-to-peak motion of the output", "extra.decay.amplitude"
+        "decay_time", "m", "half the peak-to-peak motion of the output", "motion.decay.amplitude"
     ),
-    "decay_frequency": Row(
-        "decay_time", "Hz", "frequency of the decay", "extra.decay.frequency", has_error=True
-    ),
-    "decay_damping": Row(
-        "decay_time", "1", "damping ratio of the decay", "extra.decay.damping", has_error=True
-    ),
-    "frequency": Row("frequency", "Hz", "frequency", "extra.spectra.frequency"),
+    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "motion.decay.frequency"),
+    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "motion.decay.damping"),
+    "frequency": Row("frequency", "Hz", "frequency", "motion.spectra.frequency"),
     "base_acceleration_spectrum": Row(
         "frequency",
         "m2 s-3",
         "one-sided spectral density of the base acceleration",
-        "extra.spectra.drive",
+        "motion.spectra.drive",
     ),
     "relative_displacement_spectrum": Row(
         "frequency",
         "m2 Hz-1",
         "one-sided spectral density of the output",
-        "extra.spectra.displacement",
+        "motion.spectra.displacement",
     ),
     "absolute_acceleration_spectrum": Row(
         "frequency",
         "m2 s-3",
         "one-sided spectral density of the acceleration at the output",
-        "extra.spectra.acceleration",
+        "motion.spectra.acceleration",
     ),
-    "coherence": Row("frequency", "1", "coherence of drive and output", "extra.spectra.coherence"),
+    "coherence": Row("frequency", "1", "coherence of drive and output", "motion.spectra.coherence"),
     "gain_peak": Row("", "Hz", "frequency of the peak of H1", "measures.response_frequency.value"),
-    "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "extra.wear.cycle"),
+    "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "wear.columns.cycle"),
     "wear_pressure_peak_at_edge": Row(
         "wear_cycle",
         "Pa",
         "excess of a pressure peak at the edge of the contact over all pressures inside; else 0",
-        "extra.wear.pressure_peak_at_edge",
+        "wear.columns.pressure_peak_at_edge",
     ),
 }
 # fields along the interface, by their names in `Result.fields`
@@ -234,18 +225,16 @@ def collect_data(result: Result) -> Variables:
     """Return all arrays of a run, in SI units."""
     data = {}
     for name, row in VARIABLES.items():
-        data |= _read_row(result, name, row)
-        if row.has_error:
-            error = Row(row.dims, row.unit, f"error of {name}", f"{row.places}_error")
-            data |= _read_row(result, f"{name}_error", error)
+        places = " ".join(f"{place}_error" for place in row.places.split())
+        error = Row(row.dims, row.unit, f"error of {name}", places)
+        data |= _read_row(result, name, row) | _read_row(result, f"{name}_error", error)
     if result.plan.kind == "linear":
         data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
     data |= _collect_motion(result) | _collect_loop(result) | _collect_patch(result)
     for face in result.faces:
         data |= _collect_face(face)
-    for key, collect in COLLECTORS.items():
-        if key in result.extra:
-            data |= collect(result)
+    data |= _collect_levels(result) | _collect_regimes(result)
+    data |= _collect_frequency_response(result) | _collect_wear(result)
     return data | _collect_readings(result) | _collect_accuracy(result)
 
 
@@ -315,7 +304,7 @@ def _collect_loop(result: Result) -> Variables:
         force = window.extra["forces"].T
 
     # the window may have several cycles
-    period = result.extra.get("period")
+    period = result.motion.period
     if period and result.plan.kind != "bench":
         keep = window.time >= window.time[-1] - period * (1 + 1e-9)
         slide = slide[..., keep]
@@ -362,10 +351,9 @@ def _collect_patch(result: Result) -> Variables:
         return {}
     fields = result.fields
     data = {}
-    if "wear" in result.extra:
-        shown = result.extra["wear_shown"]
-        count = shown["states"]
-        cycles = fields["time"][: count + 1] / shown["period"]
+    if result.wear is not None:
+        count = result.wear.n_frames
+        cycles = fields["time"][: count + 1] / result.wear.period
         data = make_columns("wear_frame", {"wear_frame": (cycles, "1", "cycles")})
         for name in ("normal_stress", "worn_depth"):
             data[f"wear_{name}"] = _make_field(name, fields[name][: count + 1], "wear_frame")
@@ -412,7 +400,9 @@ def _collect_face(face) -> Variables:
 
 def _collect_levels(result: Result) -> Variables:
     """Return the results at the end of each level of the drive."""
-    levels = result.extra["levels"]
+    levels = result.motion.levels
+    if not levels:
+        return {}
     unit = levels[0].unit
     drive_text = "force" if unit == "N" else "acceleration of the base"
     columns = {
@@ -433,7 +423,9 @@ def _collect_levels(result: Result) -> Variables:
 
 def _collect_regimes(result: Result) -> Variables:
     """Return the regimes and the folds of a curve of steady motions."""
-    curve = result.extra["curve"]
+    curve = None if result.motion.steady is None else result.motion.steady.curve
+    if curve is None:
+        return {}
     regimes = encode("curve_point", curve["regime"], "regime of the steady motion")
     folds = np.asarray(curve.get("folds", ()), float)
     unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
@@ -443,7 +435,9 @@ def _collect_regimes(result: Result) -> Variables:
 
 def _collect_frequency_response(result: Result) -> Variables:
     """Return magnitude and phase of the frequency response H1 of a random drive."""
-    gain = np.asarray(result.extra["spectra"].gain)
+    if result.motion.spectra is None:
+        return {}
+    gain = np.asarray(result.motion.spectra.gain)
     text = "of H1, displacement of the output over base acceleration"
     columns = {
         "gain": (np.abs(gain), "s2", f"magnitude {text}"),
@@ -454,21 +448,14 @@ def _collect_frequency_response(result: Result) -> Variables:
 
 def _collect_wear(result: Result) -> Variables:
     """Return the measures over the cycles of wear."""
+    if result.wear is None:
+        return {}
     columns = {
         f"wear_{name}": (values, result.measures[name].unit, result.measures[name].text)
-        for name, values in result.extra["wear"].items()
+        for name, values in result.wear.columns.items()
         if name in result.measures
     }
     return make_columns("wear_cycle", columns)
-
-
-# Functions that collect what a Result has only under these keys of `extra`.
-COLLECTORS = {
-    "levels": _collect_levels,
-    "curve": _collect_regimes,
-    "spectra": _collect_frequency_response,
-    "wear": _collect_wear,
-}
 
 
 def _collect_readings(result: Result) -> Variables:

@@ -15,7 +15,7 @@ from ..runs.run import StateFile, is_march, run
 from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
-from .folder import STATE, Folder, is_state
+from .folder import STATE, Folder, list_states
 from .runs import make_answer
 
 MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
@@ -118,8 +118,7 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
     It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
     another scene or of another version.
     """
-    state = target.parent / f"{target.name}.partial"
-    if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
+    if list_states(target.parent / f"{target.name}.partial"):
         return False
     try:
         version = store.read_summary(target).patchfem
@@ -147,7 +146,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
         Swept keys with their values as written, if the run is a case of a sweep.
     """
     start_time = perf_counter()
-    notes = result.extra.setdefault("notes", [])
+    notes = result.notes
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS)
     for face in result.faces[:MAX_INTERFACES]:
@@ -169,10 +168,10 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
         plan=replace(result.plan, model=face.model),
         patch=face.patch,
         fields=face.fields,
-        extra={"notes": []},
+        notes=[],
     )
     vtkhdf.write_fields(face_result, folder / store.FIELDS)
-    return face_result.extra["notes"]
+    return face_result.notes
 
 
 def save_run(result: Result, folder: Path) -> Answer:

@@ -30,7 +30,7 @@ CHECKS = ("energy_balance", "work_check")  # measures that only check a run
 MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
 # largest slip [m] and largest work relative to force times motion that are attributed to round-off
 SLIP_ROUND_OFF = 1e-15
-WORK_ROUND_OFF = 1e-12
+AREA_ROUND_OFF = 1e-12
 # deviation from the final position, relative to this position, at which a released output is at rest
 REST_FRACTION = 5e-3
 ZERO_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
@@ -189,10 +189,11 @@ def _describe_unknown(names: list[str]) -> str:
 def _describe_stability(result: Result) -> str:
     """Return the outcome; for a steady motion by harmonic balance with its regime and what becomes of a disturbance."""
     sentence = result.outcome.sentence
-    regime = result.extra.get("regime")
-    if regime is None:
+    steady = result.motion.steady
+    if steady is None:
         return sentence
-    multiplier = float(np.abs(np.asarray(result.extra["multipliers"])).max(initial=0.0))
+    regime = steady.regime
+    multiplier = float(np.abs(steady.multipliers).max(initial=0.0))
     if regime in ("stuck", "unbounded") or multiplier == 0:
         return f"{sentence[:-1]} (regime: {regime})."
     stability = "decays" if multiplier < 1 else "grows or persists"
@@ -241,7 +242,10 @@ def _describe_stuck_outcome(measures: Quantities) -> str:
         measures[name].value or 0.0 if name in measures else 0.0
         for name in ("friction_force_peak", "relative_displacement_amplitude")
     )
-    limits = {"loop_area": WORK_ROUND_OFF * abs(force * motion), "slip_amplitude": SLIP_ROUND_OFF}
+
+    # the largest of several interfaces is named, unless all of them are round-off
+    max_round_off = AREA_ROUND_OFF * abs(force * motion)
+    limits = {"loop_area": max_round_off, "slip_amplitude": SLIP_ROUND_OFF}
     texts = {"loop_area": "{} per cycle", "slip_amplitude": "by {}"}
     for kind, limit in limits.items():
         slipping = {
@@ -326,7 +330,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
     tolerance = result.plan.model.accuracy.tolerance
     if result.outcome is Outcome.GROWS and result.response is not None:
-        end = format_quantity(float(result.response.time[-1]), "s", 3)
+        end = format_quantity(result.response.time[-1], "s", 3)
         return f"The motion still grows after {end}: the measures are those of the last cycles, without errors."
 
     ratios = {
@@ -373,9 +377,9 @@ def describe_release(result: Result) -> tuple[str, str]:
     error = getattr(amplitude, "error", None) or 0.0
     last = getattr(amplitude, "value", None)
     motion = describe_rest(response.time, response.output, error, last)
-    start = format_length(float(response.output[0]), 3)
+    start = format_length(response.output[0], 3)
     sentence = f"Released at {start}, the output {motion}."
-    return sentence, _describe_decay(result.extra.get("decay"))
+    return sentence, _describe_decay(result.motion.decay)
 
 
 def _describe_decay(decay) -> str:
@@ -387,7 +391,7 @@ def _describe_decay(decay) -> str:
         return ""
     parts = [
         f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')} and damping ratio "
-        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
+        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(decay.amplitude[k], 'm', 3)}"
         for k in (known[1], known[-1])
     ]
     return f"It decays with {', with '.join(parts)}."
@@ -406,18 +410,18 @@ def describe_rest(time, output, error: float = 0.0, last: float | None = None) -
         Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
-    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else float(output[-1])
+    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else output[-1]
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
     amplitude = amplitude if last is None else min(last, amplitude)
     if amplitude > rest_limit:
-        end_time = format_quantity(float(time[-1]), "s", 3)
-        return f"still moves with an amplitude of {format_length(float(amplitude), 3)} after {end_time}"
+        end_time = format_quantity(time[-1], "s", 3)
+        return f"still moves with an amplitude of {format_length(amplitude, 3)} after {end_time}"
 
     # it rests from the sample after the last one that is far from the end
     far = np.flatnonzero(np.abs(output - end) > rest_limit)
     if not far.size:
         return "does not move"
-    rest = format_quantity(float(time[min(far[-1] + 1, time.size - 1)]), "s", 3)
+    rest = format_quantity(time[min(far[-1] + 1, time.size - 1)], "s", 3)
     return f"rests at {format_length(end, 3)} after {rest}"

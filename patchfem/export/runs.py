@@ -37,7 +37,7 @@ def make_answer(result: Result) -> Answer:
         verdict=make_verdict(result, measures, details),
         quantities=measures,
         data=collect_data(result),
-        remarks=Remarks(tuple(result.warnings), tuple(result.extra.get("notes", ()))),
+        remarks=Remarks(tuple(result.warnings), tuple(result.notes)),
         details=details,
         origin=make_origin(source, "run"),
     )
@@ -116,13 +116,13 @@ def make_details(result: Result) -> JsonObject:
     details = {
         "outcome": str(result.outcome),
         "effects": _list_effects(result),
-        "not_in_scene": list(result.plan.not_in_scene),
+        "not_in_scene": result.plan.not_in_scene,
         "seconds": {name: round(float(value), 6) for name, value in result.seconds.items()},
         "numerics": collect_used_settings(result) | {"measures": engine_by_measure(result)},
     }
     cycles = count_cycles(result)
     optional = {
-        "cycles": None if cycles is None else float(cycles),
+        "cycles": cycles,
         "contact": _find_contact(result),
         "run_away": _find_run_away(result),
         "loop": _find_loss_factor(result),
@@ -134,9 +134,9 @@ def make_details(result: Result) -> JsonObject:
 def count_cycles(result: Result) -> float | None:
     """Return the number of cycles of the drive or of the slide in a run, or None if it has none."""
     response = result.response
-    period = result.extra.get("period")
+    period = result.motion.period
     if response is not None and period and result.plan.kind != "bench":
-        return float(response.time[-1] - response.time[0]) / period
+        return (response.time[-1] - response.time[0]) / period
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
 
 
@@ -170,7 +170,7 @@ def _find_contact(result: Result) -> JsonObject:
         intervals = patch.points.intervals
     else:
         intervals = values.contact_intervals(patch, values.contact_ends(patch))
-    ends = {"from": float(patch.x[0]), "to": float(patch.x[-1])}
+    ends = {"from": patch.x[0], "to": patch.x[-1]}
     return ends | {"stretches": intervals.tolist()}
 
 

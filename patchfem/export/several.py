@@ -8,20 +8,12 @@ from ..formatting import format_number
 from .answer import Answers, Quantity
 from .quantities import format_quantity
 
-MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
 # table of a page: `title`, `headings`, and `rows` of strings
 Table = dict[str, str | list[str] | list[list[str]]]
 MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
-
-
-def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
-    """Return whether a quantity differs from that of the first answer by more than both errors."""
-    if quantity is None or first is None or None in (quantity.value, first.value):
-        return False
-    limit = _find_uncertainty(quantity) + _find_uncertainty(first)
-    return quantity.unit == first.unit and abs(quantity.value - first.value) > limit
 
 
 def _find_uncertainty(quantity: Quantity) -> float:
@@ -46,10 +38,14 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     if quantity is None:
         return ""
     text = format_quantity(name, quantity)
-    if not differs(quantity, first) or abs(first.value) <= _find_uncertainty(first):
+    if first is None or None in (quantity.value, first.value) or quantity.unit != first.unit:
+        return text
+    uncertainty = _find_uncertainty(first)
+    limit = uncertainty + _find_uncertainty(quantity)
+    if abs(quantity.value - first.value) <= limit or abs(first.value) <= uncertainty:
         return text
     factor = quantity.value / first.value
-    if abs(factor) >= MIN_FACTOR:
+    if abs(factor) >= MIN_RATIO_AS_FACTOR:
         return f"{text} (x {format_number(factor, 2)})"
     change = (quantity.value - first.value) / abs(first.value)
     return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
@@ -66,9 +62,8 @@ def list_scene_differences(answers: Answers) -> list[Table]:
         texts = [str(scene.get(key, "-")) for scene in scenes.values()]
         if len(set(texts)) > 1:
             rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
-    if not rows:
-        return []
-    return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
+    table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
+    return [table] if rows else []
 
 
 def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:

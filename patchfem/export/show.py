@@ -20,14 +20,11 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
 
 def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
     """Return name and text of each quantity, with the reason for a missing value or error."""
-    return [
-        (
-            name,
-            quantities.format_quantity(name, quantity)
-            + (f" ({quantity.reason})" if quantity.reason else ""),
-        )
-        for name, quantity in shown.items()
-    ]
+    rows = []
+    for name, quantity in shown.items():
+        reason = f" ({quantity.reason})" if quantity.reason else ""
+        rows.append((name, quantities.format_quantity(name, quantity) + reason))
+    return rows
 
 
 def format_quantities(shown: Quantities) -> list[str]:

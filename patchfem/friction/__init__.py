@@ -43,13 +43,10 @@ PUBLIC = {
         "growth_path_ratio",
     ),
     "bonds.point_kernels": (
-        "MAX_SHORT_PATH",
         "bond_mean",
         "bond_step",
         "grow",
         "press_point",
-        "short_bond_mean",
-        "short_bond_step",
     ),
     "bonds.spread": ("carried_fraction",),
     "grooves": ("Grooves",),

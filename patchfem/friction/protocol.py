@@ -25,7 +25,6 @@ class Element(NamedTuple):
     - numbers, memory: parameters (k,), of which the first is reserved for the engines, and initial memory (l,)
     - limit: largest force [N], or a typical force if there is no largest
     - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
-    - is_bounded: whether no force exceeds the limit
     - form: "rigid" for a law that sticks rigidly, "parallel" for parallel elastic-plastic elements, "points" for points
       with bonds, "speed" for a function of the velocity, "flow" for a law with one state variable
     """
@@ -35,5 +34,4 @@ class Element(NamedTuple):
     memory: np.ndarray
     limit: float
     length: float = 0.0
-    is_bounded: bool = True
     form: str = ""

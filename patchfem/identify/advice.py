@@ -6,7 +6,7 @@ import numpy as np
 
 from .least_squares import Fit
 
-MIN_GAIN = 0.1  # smallest decrease of an interval for which a further test is advised
+MIN_INTERVAL_GAIN = 0.1  # smallest decrease of an interval for which a further test is advised
 
 
 def advise_test(
@@ -40,7 +40,7 @@ def advise_test(
     widest = int(np.argmax(sizes[known]))
     ratio = np.sqrt(after[:, widest, widest])
     best = int(np.argmin(ratio))
-    if ratio[best] > 1 - MIN_GAIN:
+    if ratio[best] > 1 - MIN_INTERVAL_GAIN:
         return ""
     return (
         f"a further measurement {places[best]} would narrow the interval of {names[known[widest]]} most, by about "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-MIN_ROWS = 20  # smallest number of rows for a significant correlation
+MIN_CORRELATED_ROWS = 20  # smallest number of rows for a significant correlation
 # Largest correlation that is attributed to chance, in standard deviations 1/sqrt(rows) of independent rows.
 CHANCE_CORRELATION_FACTOR = 2.0
 # Smallest correlation between cycles at which they count as repetitions of the same error.
@@ -29,7 +29,7 @@ def estimate_effective_rows(residual) -> float:
     r = np.asarray(residual, float)
     n = r.size
     r = r - r.mean()
-    if n < MIN_ROWS or not np.ptp(r) > 0:
+    if n < MIN_CORRELATED_ROWS or not np.ptp(r) > 0:
         return float(n)
     rho = _compute_autocorrelation(r)
     if rho[1] <= CHANCE_CORRELATION_FACTOR / np.sqrt(n):

@@ -12,7 +12,7 @@ MIN_DECREASE = (
 )
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
-MIN_AMPLITUDE_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
+MIN_SINUSOID_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
 DAMPING_ROUND_OFF = 1e-10  # error of a damping ratio of a record without noise
 # Initial decay rates of a further sinusoid, times the record length.
 START_DECAY_RATES = (0.3, 3.0, 30.0)
@@ -49,7 +49,7 @@ def fit_decay(time, value) -> FittedModes:
     motions = np.einsum("nkc,nc->nk", problem.tabulate(fit.poles)[:, 0], fit.coefficients)
     energy = np.sum(motions**2, axis=1)
     is_kept = fit.damping > DAMPING_ROUND_OFF
-    is_kept &= energy > MIN_AMPLITUDE_RATIO**2 * energy.max()
+    is_kept &= energy > MIN_SINUSOID_RATIO**2 * energy.max()
     if not is_kept.any():
         largest = int(np.argmax(energy))
         error = max(float(problem.estimate_damping_errors(fit)[largest]), DAMPING_ROUND_OFF)

@@ -26,7 +26,7 @@ MIN_ZETA = 1e-6  # lower bound of the damping ratios in the search
 MAX_ZETA = 0.5  # upper bound of the damping ratios in the search
 # Ratio of the length of the record to that of the windowed segments in which a further mode is sought.
 N_SEGMENTS = 8
-MIN_SAMPLES = 64 * N_SEGMENTS  # smallest number of samples of a record
+MIN_RECORD_SAMPLES = 64 * N_SEGMENTS  # smallest number of samples of a record
 # Half-width of the main lobe of a Hann window, which hides the lines near 0, in spectral lines.
 WINDOW_WIDTH_LINES = 1.5
 # Smallest input power of an excited spectral line, relative to the largest one.
@@ -124,9 +124,9 @@ def fit_driven_modes(
     PatchfemError
         If the record is too short or has no input, or if no mode is visible in the band.
     """
-    if force.size < MIN_SAMPLES:
+    if force.size < MIN_RECORD_SAMPLES:
         raise PatchfemError(
-            f"the record has {force.size} samples; at least {MIN_SAMPLES} are needed"
+            f"the record has {force.size} samples; at least {MIN_RECORD_SAMPLES} are needed"
         )
     if not np.any(force):
         raise PatchfemError("the input is zero, so there is no response to it")

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..core import Outcome
-from .least_squares import MAX_EVALUATIONS, Fit
+from .descent import MAX_EVALUATIONS
+from .least_squares import Fit
 
 # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest sensitivity.
 MIN_SENSITIVITY = 1e-9

@@ -14,15 +14,15 @@ from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, smooth_slopes
 from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
 
-MIN_SAMPLES = 5  # smallest number of samples in a half cycle
+MIN_HALF_CYCLE_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
 # because a half cycle is not exactly a sine.
 SINE_FIT_ERROR = 3e-5
 # Largest relative standard deviation of the size of a half cycle due to noise; the decay ends where it is larger.
-MAX_NOISE_RATIO = 0.25
+MAX_HALF_CYCLE_NOISE = 0.25
 # Number of fits of all half cycles, each with half periods and decay rates from the previous fit.
 N_PASSES = 3
-MAX_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
+MAX_MIDPOINT_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
 MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
 N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
@@ -75,9 +75,9 @@ def find_half_cycles(time, value) -> HalfCycles:
     PatchfemError
         If there is no oscillation, or if fewer than three half cycles have enough samples.
     """
-    if time.size < 4 * MIN_SAMPLES:
+    if time.size < 4 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
-            f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
+            f"the free decay has {time.size} samples; at least {4 * MIN_HALF_CYCLE_SAMPLES} are needed"
         )
 
     middle, length = _find_first_half_cycle(time, value)
@@ -124,9 +124,12 @@ def _describe_missing_samples(time: np.ndarray, middle: float, length: float) ->
     """
     low, high = middle - length / 2, middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])
-    if count >= MIN_SAMPLES or high > time[-1]:
+    if count >= MIN_HALF_CYCLE_SAMPLES or high > time[-1]:
         return ""
-    return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_SAMPLES} are needed"
+    return (
+        f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_HALF_CYCLE_SAMPLES} "
+        "are needed"
+    )
 
 
 def _find_first_half_cycle(time, value) -> tuple[float, float]:
@@ -147,10 +150,10 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     # a sinusoid that is fitted to the first cycle
     is_first = time - time[0] <= 1.2 / frequency
     n_samples = round(np.count_nonzero(is_first) / 1.2)
-    if n_samples < 2 * MIN_SAMPLES:
+    if n_samples < 2 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
             f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
-            f"{2 * MIN_SAMPLES} are needed"
+            f"{2 * MIN_HALF_CYCLE_SAMPLES} are needed"
         )
     omega = 2 * np.pi * frequency
     bounds = tuple(np.array([ratio * omega, rate]) for ratio, rate in FIRST_CYCLE_BOUNDS)
@@ -175,7 +178,7 @@ def _follow_half_cycles(time, value, middle: float, length: float) -> list[_Fitt
         if sine is None or (sines and sine.size * sines[-1].size > 0):
             break
         noise = np.sqrt(sine.square / sine.n_free) * sine.size_error
-        if noise > MAX_NOISE_RATIO * abs(sine.size):
+        if noise > MAX_HALF_CYCLE_NOISE * abs(sine.size):
             break
         sines.append(sine)
         if len(sines) > 2:
@@ -214,10 +217,10 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
     period [s], `rate` the decay rate [1/s].
     """
     predicted = middle
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(MAX_MIDPOINT_ITERATIONS):
         low, high = np.searchsorted(time, (middle - length / 2, middle + length / 2))
         t = time[low:high] - middle
-        if t.size < MIN_SAMPLES:
+        if t.size < MIN_HALF_CYCLE_SAMPLES:
             return None
         angle = np.pi * t / length
         envelope = np.exp(-rate * t)

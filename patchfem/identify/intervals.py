@@ -3,7 +3,7 @@
 The profile of the sum of squares is used if the residual is not linear over the interval.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import stdtrit
 
 from .correlation import estimate_effective_rows
+from .descent import descend
 from .space import UnitCubeResidual
 
 # Smallest singular value of a determined direction, relative to the largest one of the scaled Jacobian.
@@ -59,21 +60,6 @@ class FitIntervals:
     rows: float
 
 
-def make_unknown_intervals(n: int) -> FitIntervals:
-    """Return intervals of NaN, for a fit without confidence intervals."""
-    unknown = np.full((n, n + 3), np.nan)
-    return FitIntervals(
-        ends=unknown[:, :2],
-        methods=("none",) * n,
-        open_ends=np.zeros((n, 2), bool),
-        correlation=unknown[:, 3:],
-        effects=np.zeros((0, n)),
-        sensitivity=unknown[:, 2],
-        unknown=np.zeros((0, n)),
-        rows=np.nan,
-    )
-
-
 class _Minimum(NamedTuple):
     """Minimum of a least-squares fit for which confidence intervals are computed.
 
@@ -81,14 +67,12 @@ class _Minimum(NamedTuple):
     - u: minimum (n,) in the unit cube.
     - cost: sum of squares at the minimum.
     - growth: relative growth of the sum of squares at the ends of a 95 % interval.
-    - descend: function that minimizes the residual over selected coordinates.
     """
 
     model: UnitCubeResidual
     u: np.ndarray
     cost: float
     growth: float
-    descend: Callable
 
     def is_linear(self, direction) -> bool:
         """Return whether the sum of squares grows as in a linear model up to u -+ direction (n,)."""
@@ -125,7 +109,7 @@ class _Minimum(NamedTuple):
             nonlocal nearby
             point = nearby.copy()
             point[k] = self.u[k] + sign * step
-            descent = self.descend(self.model, point, others)
+            descent = descend(self.model, point, others)
             if descent.cost < np.inf:
                 nearby = descent.u
             growth = max(descent.cost / self.cost - 1, 0.0) / self.growth
@@ -145,7 +129,7 @@ class _Minimum(NamedTuple):
 
 
 def compute_intervals(
-    model: UnitCubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
+    model: UnitCubeResidual, u: np.ndarray, cost: float, is_series: bool
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
@@ -159,8 +143,6 @@ def compute_intervals(
         Minimum in the unit cube.
     cost : float
         Sum of squares at the minimum.
-    descend : callable
-        Function that minimizes over the other parameters of a profile (`least_squares.descend`).
     is_series : bool
         Whether the rows are a time series, in which correlated rows count as fewer.
 
@@ -173,7 +155,7 @@ def compute_intervals(
     dof = max(rows - n, 1)
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     quantile = stdtrit(dof, 0.975)
-    minimum = _Minimum(model, u, cost, quantile**2 / dof, descend)
+    minimum = _Minimum(model, u, cost, quantile**2 / dof)
 
     # covariance of the free parameters, and the directions without effect
     jacobian = model.jacobian(u, range(n))

@@ -10,13 +10,12 @@ the parameter lies on a bound, the interval follows from the profile of the sum 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome
-from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
+from .descent import Descent, descend
+from .intervals import FitIntervals, compute_intervals
 from .space import (
     SearchCounts,
     UnitCubeResidual,
@@ -24,9 +23,6 @@ from .space import (
     make_space_filling_points,
 )
 
-COST_TOL = 1e-10  # relative change of the sum of squares per step at convergence
-QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
-MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 # Largest root mean square residual of an exact fit, relative to the largest residual of the search.
 EXACT_FIT_RATIO = 1e-9
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
@@ -50,28 +46,13 @@ class IntervalKind(StrEnum):
     NONE = ""
 
 
-class Descent(NamedTuple):
-    """Result of a local least-squares search (descent).
-
-    - u: final point (n,) in the unit cube.
-    - cost: final sum of squares; infinite if the evaluation at the start failed.
-    - is_converged: whether the descent converged.
-    - rows: number of rows of the residual.
-    """
-
-    u: np.ndarray
-    cost: float
-    is_converged: bool
-    rows: int
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
     """Result of a least-squares fit of n parameters.
 
     - values: fitted parameters (n,).
     - at_bound: "low", "high" or "" for each parameter.
-    - intervals: 95 % intervals, and undetermined directions.
+    - intervals: 95 % intervals, and undetermined directions; None if they were not asked for.
     - rms: root mean square of the residual.
     - counts: number of evaluations of the residual.
     - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
@@ -81,7 +62,7 @@ class Fit:
 
     values: np.ndarray
     at_bound: tuple[str, ...]
-    intervals: FitIntervals
+    intervals: FitIntervals | None
     rms: float
     counts: SearchCounts
     outcome: Outcome
@@ -224,11 +205,11 @@ def _assemble_fit(
     """Return the result of a fit from its best descent; `kind` is a value of `IntervalKind`."""
     u = best.u
     cost = best.cost
-    intervals = make_unknown_intervals(u.size)
+    intervals = None
     if kind != IntervalKind.NONE:
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
-        intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
+        intervals = compute_intervals(model, u, cost, is_series)
     rms = float(np.sqrt(cost / best.rows))
     is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
     return Fit(
@@ -240,63 +221,6 @@ def _assemble_fit(
         outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
         descent_rms=descent_rms,
     )
-
-
-def descend(model: UnitCubeResidual, u, free) -> Descent:
-    """Minimize a residual locally from a point of the unit cube (trust-region reflective method).
-
-    The final sum of squares is never larger than that at the start.
-
-    Parameters
-    ----------
-    model : UnitCubeResidual
-        Residual as a function on the unit cube.
-    u : (n,) array_like
-        Starting point.
-    free : sequence of int
-        Indices of the free coordinates.
-
-    Returns
-    -------
-    Descent
-    """
-    u = np.array(u, float)
-    free = list(free)
-    cost = model.sum_of_squares(u)
-    start = Descent(u, cost, bool(np.isfinite(cost)), model.rows)
-    if not (free and start.is_converged):
-        return start
-
-    # the point with the free coordinates v is fixed + select v
-    select = np.eye(u.size)[:, free]
-    fixed = u - select @ u[free]
-
-    # the trust-region method needs a start inside the bounds
-    for margin in (1e-3, 1e-9):
-        inner = np.clip(u[free], margin, 1 - margin)
-        residual = model(fixed + select @ inner)
-        if residual is not None:
-            break
-    else:
-        return start._replace(is_converged=False)
-    scale = max(float(np.abs(residual).max()), 1e-300)
-
-    # the residual is scaled because the method stops at an absolute gradient
-    ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
-    result = least_squares(
-        lambda part: model.with_penalty(fixed + select @ part) / scale,
-        inner,
-        jac=lambda part: model.jacobian(fixed + select @ part, free) / scale,
-        bounds=(0, 1),
-        ftol=ftol,
-        xtol=10 * ftol,
-        gtol=1e-15,
-        max_nfev=MAX_EVALUATIONS,
-    )
-    end = fixed + select @ result.x
-    cost = model.sum_of_squares(end)
-    best = start if cost > start.cost else Descent(end, cost, True, model.rows)
-    return best._replace(is_converged=result.status > 0)
 
 
 def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarray, float]:

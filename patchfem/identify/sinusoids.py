@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 # Largest condition number of the design matrix; smaller singular values are ignored.
-MAX_CONDITION = 1e12
+MAX_FIT_CONDITION = 1e12
 MAX_START_EVALUATIONS = 12  # evaluations from each initial guess; only the best is refined further
 START_TOL = 1e-3  # relative change at convergence from an initial guess
 MAX_EVALUATIONS = 100  # largest number of evaluations of a fit
@@ -152,7 +152,7 @@ class SinusoidProblem:
         design = np.column_stack([*self.fixed, own])
         norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
         basis, triangular = np.linalg.qr(design / norms)
-        scaled = np.linalg.lstsq(triangular, basis.T @ self.value, rcond=1 / MAX_CONDITION)[0]
+        scaled = np.linalg.lstsq(triangular, basis.T @ self.value, rcond=1 / MAX_FIT_CONDITION)[0]
         coefficients = (scaled / norms)[len(self.fixed) :].reshape(columns.shape[::3])
         fit = SinusoidFit(np.asarray(poles), coefficients, design / norms @ scaled - self.value)
 

@@ -8,7 +8,7 @@ Tables (.csv, .txt): `tables` reads them all, and four modules ask for the colum
 (responses of a rig). `units` lists all units.
 Files of laboratories: `records` selects and converts channels that share one time, from any file that
 `laboratory` opens: tables, universal files (`universal`) or MATLAB files (`matlab`).
-Matrices of finite-element programs: `matrices`.
+Matrices of finite-element programs: `matrices`. `packed` refuses files that are too large after they are unpacked.
 Read `tables` first.
 """
 
@@ -31,6 +31,10 @@ PUBLIC = {
     "measured": (
         "is_readable",
         "read_table",
+    ),
+    "packed": (
+        "count_zip_bytes",
+        "refuse_large_content",
     ),
     "records": (
         "parse_requests",

@@ -26,7 +26,7 @@ from .units import CHANNEL_UNITS
 EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
-MAX_COLUMNS = 1000  # largest number of columns in a table or an array
+MAX_TABLE_COLUMNS = 1000  # largest number of columns in a table or an array
 
 
 def read_records(
@@ -96,7 +96,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     table = read_text(path, "a measured table")
     names = table.names
     is_data = any(map(NUMBER_PATTERN.fullmatch, names))
-    if len(names) > MAX_COLUMNS or len(table.lines) < 2 or is_data:
+    if len(names) > MAX_TABLE_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
             f"needed, not '{table.separator.join(names)[:80]}'"
@@ -128,7 +128,7 @@ def _read_matlab(path: Path, requests: list[RequestedChannel]) -> Records:
         if 1 in values.shape:
             channels.append(Channel(name, "", "", "", values.ravel()))
         else:
-            columns = enumerate(values.T[:MAX_COLUMNS], 1)
+            columns = enumerate(values.T[:MAX_TABLE_COLUMNS], 1)
             channels += [Channel(f"{name}(:,{k})", "", "", "", column) for k, column in columns]
     requests = [request._replace(source=request.source.replace(" ", "")) for request in requests]
     return select_channels(path, channels, requests, [])

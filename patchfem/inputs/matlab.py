@@ -12,8 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from .damage import refuse_damage
+from .packed import count_matlab_bytes, refuse_large_content
 from .records import check_file
 
+REMEDY = "save only the variables that are needed"  # for a file that is too large
 MAX_NESTING = 8  # largest depth of nested structures
 # Signature at the beginning of an HDF5 file, or after the user block that MATLAB puts there.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -51,7 +53,7 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
         If there is no file, or if it is damaged, too large or no MATLAB file.
     """
     if data is None:
-        check_file(Path(path), "save only the variables that are needed")
+        check_file(Path(path), REMEDY)
         data = Path(path).read_bytes()
     is_hdf5 = data.startswith((HDF5_SIGNATURE, b"MATLAB 7.3")) or data[512:520] == HDF5_SIGNATURE
     arrays = {}
@@ -60,8 +62,12 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
             import h5py
 
             with h5py.File(io.BytesIO(data), "r") as file:
+                sizes = []
+                file.visititems(lambda _, item: sizes.append(getattr(item, "nbytes", 0)))
+                refuse_large_content(path, sum(sizes), REMEDY)
                 _add_group(arrays, file, "", 0)
         else:
+            refuse_large_content(path, count_matlab_bytes(data), REMEDY)
             _read_version_5(data, arrays)
     return arrays
 

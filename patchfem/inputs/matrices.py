@@ -16,6 +16,7 @@ from scipy import sparse
 from ..core import PatchfemError
 from . import matlab
 from .damage import refuse_damage
+from .packed import count_zip_bytes, refuse_large_content
 from .symmetric import SKEW_REFUSAL, symmetrize
 
 # Names of each matrix in a file with several matrices.
@@ -247,6 +248,7 @@ def _read_matlab(path: Path, matrix_name: str) -> Matrix:
 def _read_numpy(path: Path, matrix_name: str) -> Matrix:
     if not zipfile.is_zipfile(path):
         raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
+    refuse_large_content(path, count_zip_bytes(path), "save the matrices as sparse ones")
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
             return Matrix(sparse.csr_array(sparse.load_npz(path)))

@@ -13,6 +13,7 @@ import numpy as np
 from ..core import frozen_array
 from .elements import ELEMENTS
 from .grading import tributary_lengths
+from .grid import TensorGrid
 
 # Corner nodes of the children of a cell: numbers below n are its corners, the next n the middles of its edges, then its
 # centre
@@ -167,6 +168,9 @@ class PieceMesh:
         return freeze_piece(
             PieceMesh(points, children, np.repeat(self.is_coating, 4), interface, far)
         )
+
+
+Mesh = TensorGrid | PieceMesh  # mesh of one piece
 
 
 def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:

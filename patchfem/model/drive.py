@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from ..core import ModalBasis
 from ..effects import find_waveform, import_effect
 from ..inputs import signals
@@ -27,8 +29,8 @@ def build_signal(scene, modes: ModalBasis):
     return import_effect(f"drive.waveform={waveform}").DRIVE_BUILDERS[waveform](keys)
 
 
-def _read_recorded_drive(scene) -> tuple:
-    """Read the columns of the file drive.file."""
+def _read_recorded_drive(scene) -> tuple[np.ndarray, np.ndarray]:
+    """Read both columns (k,) of the file drive.file: time [s] and signal, or frequency [Hz] and spectral density."""
     path = scene.resolve_path(scene.drive.file)
     with name_key("drive.file"):
         if find_waveform(scene.drive).is_random:
@@ -37,7 +39,7 @@ def _read_recorded_drive(scene) -> tuple:
 
 
 @cache_by_file
-def read_drive_file(path: Path, kind: str) -> tuple:
+def read_drive_file(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Read a recorded drive signal.
 
     Parameters

@@ -4,6 +4,7 @@ import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class EarlierWear:
     depth: np.ndarray
     gap: np.ndarray
     cycles: float
-    scene: dict
-    measures: dict
+    scene: dict[str, dict[str, Any]]
+    measures: dict[str, dict[str, float | None]]
 
     @property
     def sentence(self) -> str:
@@ -192,7 +193,7 @@ def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
     return earlier
 
 
-def _describe_pieces(scene: dict) -> dict:
+def _describe_pieces(scene: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Return the scene keys, with their values, that describe the pieces that wear."""
     pieces = {
         f"contact.{key}": value

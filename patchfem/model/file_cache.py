@@ -3,19 +3,22 @@
 from collections.abc import Callable
 from functools import lru_cache, wraps
 from pathlib import Path
+from typing import TypeVar
 
 # Number of cached results of each function; results for large traces and modes take much memory.
-MAX_CACHED_RESULTS = 8
+MAX_CACHED_FILES = 8
+
+Content = TypeVar("Content")  # what a function reads from a file
 
 
-def cache_by_file(function: Callable) -> Callable:
+def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
     """Cache the results of a function whose first argument is a path or a tuple of paths.
 
     A file that has changed its size or its time of modification is read again. Further arguments must
     be hashable, and are passed by position.
     """
 
-    @lru_cache(MAX_CACHED_RESULTS)
+    @lru_cache(MAX_CACHED_FILES)
     def call_cached(paths, _versions, *arguments):
         return function(paths, *arguments)
 

@@ -6,13 +6,14 @@ the imports are half of the time of a check.
 """
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..effects import find_waveform
 from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, list_named_files
+from ..scene.keys.tables import Tables
 from ..scene.rules.structure import MATRIX_KEYS
 from . import (
     drive,
@@ -28,9 +29,16 @@ from . import (
 )
 
 
+class Fault(NamedTuple):
+    """Key of a scene, or None, and the message on the fault of its value."""
+
+    key: str | None
+    message: str
+
+
 def find_file_faults(
-    tables, folder: Path, is_valid: bool = True, notes: list | None = None
-) -> list:
+    tables, folder: Path, is_valid: bool = True, notes: list[str] | None = None
+) -> list[Fault]:
     """Check the files that a scene names, and return the faults found in them.
 
     Parameters
@@ -47,8 +55,7 @@ def find_file_faults(
 
     Returns
     -------
-    list of tuple
-        Key and message of each fault.
+    list of Fault
     """
     faults = []
     for key, file in list_named_files(tables):
@@ -60,7 +67,7 @@ def find_file_faults(
             sentences = FILE_CHECKS[checked.key](path, checked.tables, is_valid=is_valid) or ()
         except PatchfemError as error:
             fault_key = checked.prefix + (error.key or checked.key)
-            faults.append((fault_key, str(error).removeprefix(f"{checked.key}: ")))
+            faults.append(Fault(fault_key, str(error).removeprefix(f"{checked.key}: ")))
             continue
         if notes is not None:
             notes += [sentence.replace(str(path), path.name) for sentence in sentences]
@@ -79,7 +86,7 @@ class _FileKey(NamedTuple):
 
     prefix: str
     key: str
-    tables: Any
+    tables: Tables
 
 
 def _select_interface(key: str, tables) -> _FileKey:
@@ -92,7 +99,7 @@ def _select_interface(key: str, tables) -> _FileKey:
     return _FileKey(f"{prefix}.", f"contact.{name}", own_tables)
 
 
-def _check_reduction(tables, folder: Path) -> list:
+def _check_reduction(tables, folder: Path) -> list[Fault]:
     """Check that the matrices of [structure.reduced] fit together; they are not reduced."""
     table = tables.structure and tables.structure.reduced
     matrices = [file for key, file in list_named_files(tables) if "reduced" in key]
@@ -101,7 +108,7 @@ def _check_reduction(tables, folder: Path) -> list:
     try:
         structure_reduced.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
     except PatchfemError as error:
-        return [(error.key, str(error))]
+        return [Fault(error.key, str(error))]
     return []
 
 
@@ -115,7 +122,7 @@ def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
     pieces.check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
 
 
-def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
+def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     """Check that a trace covers the interface and is not too fine; return notes about it."""
     import numpy as np
 
@@ -174,7 +181,7 @@ def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
     measured.read_table(path)
 
 
-def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple:
+def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
     """Check that the pieces are those of the earlier run; return a note about the worn depth."""
     if is_valid:
         return (earlier_wear.read_earlier_wear(path, tables).sentence,)

@@ -8,16 +8,20 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..contact import gaps
 from ..effects import GAP_SHAPES
 from ..scene.keys.contact import Contact
+from ..scene.keys.types import Table
 from . import profile as profiles
 
 DEFAULT_CELLS = 200  # number of cells along the interface in a uniform mesh
+
+
+NamedShape = tuple[str, Table]  # name of a shape, and its table in the scene
 
 
 class ProfileLengths(NamedTuple):
@@ -42,8 +46,8 @@ class ShapedGap(NamedTuple):
     """
 
     heights: np.ndarray
-    notes: tuple
-    seconds: dict
+    notes: tuple[str, ...]
+    seconds: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,7 +64,7 @@ class Gap:
     - file: name of the profile in the scene.
     """
 
-    shapes: tuple
+    shapes: tuple[NamedShape, ...]
     profile: Path | None
     average: float | None
     limit: float | None
@@ -80,7 +84,7 @@ class Gap:
         return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
-    def jumps(self) -> tuple:
+    def jumps(self) -> tuple[float, ...]:
         """Coordinates [m] of the edges of steps, at which the gap jumps."""
         return tuple(x for _, (x, _) in self._values("edge"))
 
@@ -92,8 +96,8 @@ class Gap:
         """
         return min((wave for _, wave in self._values("wave")), default=inf)
 
-    def _values(self, quantity: str) -> list:
-        """Return a property of every shape that has this property, each value with the table of its shape."""
+    def _values(self, quantity: str) -> list[tuple[Table, Any]]:
+        """Return (table of the shape, value) for every shape that has a property; the value is what `gaps` returns."""
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)
@@ -170,7 +174,7 @@ def longest_loaded_cell(x, loaded_nodes) -> float:
     return float(np.diff(x)[beside].max(initial=0.0) or np.diff(x).max())
 
 
-def list_gap_shapes(contact: Contact) -> tuple:
+def list_gap_shapes(contact: Contact) -> tuple[NamedShape, ...]:
     """Return (name, table) of each shape in a table [contact] that contributes to the gap."""
     return tuple((name, keys) for name, keys in contact.shapes.items() if name in GAP_SHAPES)
 

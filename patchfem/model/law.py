@@ -99,8 +99,8 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
     return complete_bond_length(law.model_copy(update=changes), load)
 
 
-def _scale_growth_rates(law: Friction) -> tuple:
-    """Return the growth rates of bonds, at rest and during slip, at the surface temperature."""
+def _scale_growth_rates(law: Friction) -> tuple[float, float]:
+    """Return the growth of bonds at rest [m s-2] and during slip [m] at the surface temperature."""
     heat = law.temperature
     with name_key("friction.temperature"):
         return import_effect("friction.temperature").growth_at_temperature(
@@ -155,7 +155,7 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
     )
 
 
-def build_interface_laws(scene: Scene) -> tuple:
+def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
     """Build the friction laws of all interfaces of a rig.
 
     They come from [[structure.interface]], or from [friction] for the only interface.
@@ -212,7 +212,7 @@ def find_pad_width(scene: Scene) -> float | None:
     return scene.normal.width if scene.normal is not None else None
 
 
-def make_interface_names(structure) -> list:
+def make_interface_names(structure) -> list[str]:
     """Return the names of the interfaces between masses, such as "1-2", or [] if there are no masses."""
     names = ["-".join(map(str, interface.between)) for interface in structure.interface]
     return [

@@ -43,7 +43,9 @@ class PointLoad:
         )
         return np.where(load > MIN_LOAD_FRACTION * (self.load + self.amplitude), load, 0.0)
 
-    def refine_samples(self, slide: SlidePath, time, rel_disp, steps: int) -> tuple:
+    def refine_samples(
+        self, slide: SlidePath, time, rel_disp, steps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Add samples to a prescribed slide until they also resolve the oscillation of the load.
 
         The extremes of the load and the instants at which the contact is lost or made become samples.

@@ -46,7 +46,7 @@ class MeasuredFile(NamedTuple):
     """
 
     path: Path
-    gains: tuple
+    gains: tuple[float, float]
     reading: str
     cutoff: float | None
 
@@ -90,7 +90,7 @@ class Model:
     accuracy: Accuracy
     measured: MeasuredFile | None
     wear: WearModel | None
-    absent: tuple
+    absent: tuple[str, ...]
     grooves: Grooves | None = None
     motion: MotionFeatures | None = None
 
@@ -323,6 +323,6 @@ _build_bolted_model = memoize(build)
 
 
 @lru_cache(64)
-def _find_absent(effects: tuple) -> tuple:
+def _find_absent(effects: tuple[str, ...]) -> tuple[str, ...]:
     """Return the known physical effects that a scene neglects."""
     return tuple(list_absent_effects(effects))

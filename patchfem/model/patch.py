@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
 from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
+
+if TYPE_CHECKING:
+    from ..mesh.pieces import Mesh
 
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 LENGTH_TOL = 1e-9  # largest relative difference of equal lengths
@@ -75,7 +78,7 @@ class PatchPieces:
     plane: str
 
     @property
-    def both(self) -> tuple:
+    def both(self) -> tuple[PatchPiece, PatchPiece]:
         """The lower and the upper piece."""
         return self.lower, self.upper
 
@@ -106,7 +109,7 @@ class PatchPieces:
             lambda material: 2 * (1 + material.poisson) / material.young
         )
 
-    def series_compliance(self, softness: Callable) -> float:
+    def series_compliance(self, softness: Callable[[Material], float]) -> float:
         """Compliance [m/N] of all equal pairs in parallel, in which the layers of both pieces act in series.
 
         Parameters
@@ -185,7 +188,7 @@ class SharedMeshes(NamedTuple):
     - name: hash of the content.
     """
 
-    levels: tuple
+    levels: "tuple[tuple[Mesh, Mesh | None], ...]"
     name: str
 
 
@@ -303,7 +306,7 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, **changes))
 
 
-def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchModel:
+def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]) -> PatchModel:
     """Build the patch that a table [contact] describes.
 
     Parameters
@@ -356,7 +359,7 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     )
 
 
-def find_mesh_file(contact: Contact, resolve_path: Callable) -> MeshFile | None:
+def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
     """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions."""
     if contact.mesh is None:
         return None

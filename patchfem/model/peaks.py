@@ -14,7 +14,7 @@ KEY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 
 
 def complete_asperities(
-    table: Asperities, resolve_path: Callable, cutoff: float | None = None
+    table: Asperities, resolve_path: Callable[[str], Path], cutoff: float | None = None
 ) -> Asperities:
     """Add radius, density and height deviation of the asperity peaks to [contact.asperities].
 

@@ -6,6 +6,7 @@ from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
+from ..mesh import pieces as piece_meshes
 from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
@@ -24,7 +25,7 @@ class RoundedEdges(NamedTuple):
     - distance: distance [m] between the end of the flat part and the end of the contact.
     """
 
-    positions: tuple = ()
+    positions: tuple[float, ...] = ()
     distance: float | None = None
 
 
@@ -87,7 +88,7 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
 
 
-def make_piece_meshes(patch: PatchModel) -> tuple:
+def make_piece_meshes(patch: PatchModel) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
     """Return the meshes of both pieces, generated or read from the mesh file of the scene.
 
     Returns

@@ -39,19 +39,19 @@ class _LevelledProfile(NamedTuple):
     """
 
     profile: Profile
-    notes: tuple
+    notes: tuple[str, ...]
     is_straight: bool
 
 
 def compute_profile_gap(
     path: Path,
     x,
-    lengths: tuple,
+    lengths: tuple[float | None, float | None],
     cell: float,
     *,
     is_rough: bool,
     is_material: bool = False,
-) -> tuple:
+) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the gap that a measured profile adds, and notes for the user.
 
     The profile is levelled and freed of spikes. A smooth curve goes through its means over
@@ -148,7 +148,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=())
 
 
-def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
+def _describe_short_waves(trace: Profile, cutoff: float) -> tuple[str, ...]:
     """Return sentences about the waves shorter than a cut-off [m], or () if there are none."""
     fraction = wave_spectrum(trace).lost_fraction(cutoff)
     if not fraction > 0:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..structure.drive_sizes import (
 )
 from . import structure_reduced
 from .drive import build_signal
-from .law import build_interface_laws, make_interface_names
+from .law import InterfaceLaw, build_interface_laws, make_interface_names
 from .structure import (
     build_modes,
     build_own_modes,
@@ -30,6 +30,11 @@ from .structure import (
     needs_strip_displacements,
     read_file_notes,
 )
+
+if TYPE_CHECKING:
+    from ..scene.keys.tables import Friction
+    from ..structure.drives import DriveSignal
+    from .patch import PatchModel
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_TRAVEL = 1e3
@@ -58,9 +63,9 @@ class DriveLevels:
     - onset: kind of event that counts as the onset of slip, and its length [m] or None.
     """
 
-    amplitudes: tuple = ()
+    amplitudes: tuple[float, ...] = ()
     cycles: float = 0.0
-    onset: tuple = ("distortion", None)
+    onset: tuple[str, float | None] = ("distortion", None)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,7 +79,7 @@ class RigDrive:
     - force: amplitude [N] of a force drive.
     """
 
-    signal: object
+    signal: "DriveSignal"
     kind: str
     waveform: Waveform
     frequency: float | None
@@ -93,8 +98,8 @@ class RigFriction:
     - strips_slide_apart: whether a mode yaws the patch, so the strips have different displacements.
     """
 
-    interfaces: tuple
-    names: tuple
+    interfaces: tuple[InterfaceLaw, ...]
+    names: tuple[str, ...]
     load_varies: bool
     strips_slide_apart: bool
 
@@ -116,7 +121,7 @@ class RigSprings:
     """
 
     bonded: float | None
-    interlock: tuple | None
+    interlock: tuple[float, float] | None
     cubic: float | None
     travel: float
 
@@ -172,6 +177,14 @@ class FirstMode:
         return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
 
 
+class JointModel(Protocol):
+    """Model of another scene (`model.Model`), of which the solution of its joint needs the patch and the law."""
+
+    patch: "PatchModel"
+    friction: "Friction"
+    rig: "Rig"
+
+
 class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
@@ -186,8 +199,8 @@ class BoltedJoint(NamedTuple):
 
     scene: str
     stiffness: tuple[float, ...] = ()
-    build_rig: Callable | None = None
-    model: object = None
+    build_rig: "Callable[[float], Rig] | None" = None
+    model: JointModel | None = None
     stuck_stiffness: float | None = None
 
 
@@ -207,10 +220,10 @@ class RigStructure:
 
     frequencies: np.ndarray
     lists_modes: bool
-    notes: tuple
+    notes: tuple[str, ...]
     bolted: BoltedJoint | None = None
     other_rigs: tuple["Rig", ...] = ()
-    reduction_notes: tuple = ()
+    reduction_notes: tuple[str, ...] = ()
     max_modes: int = 0
 
     @property
@@ -287,7 +300,9 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     return replace(rig, structure=structure)
 
 
-def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
+def _build(
+    scene, own_modes: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
+) -> Rig:
     """Build the rig of a scene from its modes without the spring of the bonded joint."""
     modes = build_modes(scene, own_modes)
     friction = RigFriction(

@@ -41,7 +41,7 @@ class SimilarModels(Sequence):
     plain_numbers: PlainNumbers
     first: Model
     values: np.ndarray
-    sets: Callable[[int], tuple]
+    sets: Callable[[int], tuple[str, ...]]
     cases: np.ndarray
 
     def __len__(self) -> int:
@@ -83,7 +83,7 @@ def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> n
 
 
 def replace_numbers(
-    model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple = ()
+    model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple[str, ...] = ()
 ) -> Model:
     """Return a model with other values of some numeric keys.
 

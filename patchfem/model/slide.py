@@ -25,7 +25,7 @@ STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length 
 MAX_BOND_LENGTHS = 1000
 # Smallest number of steps per cycle, which resolves the loop at any tolerance.
 MIN_STEPS_PER_CYCLE = 100
-MAX_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
+MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 STEP_COUNT_TOL = 1e-12  # relative round-off of a number of steps that is exactly an integer
 
@@ -156,7 +156,7 @@ class SlidePath:
             if length:
                 bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
                 per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
-        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_STEPS_PER_CYCLE)
+        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_BENCH_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
 
@@ -189,8 +189,11 @@ def build_slide(scene) -> SlidePath:
     )
 
 
-def _list_corners(keys) -> tuple:
-    """Return time [s] and displacement [m] at the corners of a constant slide or a dwell, without legs of no duration."""
+def _list_corners(keys) -> tuple[np.ndarray, np.ndarray]:
+    """Return time (k,) [s] and displacement (k,) [m] at the corners of a constant slide or a dwell.
+
+    Legs of no duration are left out.
+    """
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold or 0.0, length[2] / keys.speed])
     is_leg = duration > 0
@@ -199,8 +202,8 @@ def _list_corners(keys) -> tuple:
 
 
 @cache_by_file
-def read_path_file(path: Path) -> tuple:
-    """Read the columns of a path file (`inputs.slides.read_slide`)."""
+def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read time (k,) [s] and displacement (k,) [m] of a path file (`inputs.slides.read_slide`)."""
     return slides.read_slide(path)
 
 

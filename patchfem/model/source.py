@@ -25,11 +25,11 @@ class Source:
     path: Path
     title: str
     text: str
-    write: Callable
-    effects: tuple
-    remarks: tuple
-    sets: tuple = ()
-    notes: tuple = ()
+    write: Callable[[], str]
+    effects: tuple[str, ...]
+    remarks: tuple[str, ...]
+    sets: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def resolved(self) -> str:

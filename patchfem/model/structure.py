@@ -125,7 +125,7 @@ def has_pressed_joint(scene) -> bool:
     return bool(contact.compliance_key or contact.load is None)
 
 
-def compute_joint_stiffnesses(scene) -> list:
+def compute_joint_stiffnesses(scene) -> list[float]:
     """Compute the stiffness [N/m] of each sticking interface from its law."""
     scene_load = find_normal_load(scene)
     stiffnesses = []
@@ -192,7 +192,7 @@ def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
     return replace(modes, faces=frozen_array(compute_strip_slides(modes, offsets)))
 
 
-def read_file_notes(scene) -> list:
+def read_file_notes(scene) -> list[str]:
     """Return sentences that tell the user what was neglected or changed in structure.file."""
     if scene.structure.file is None:
         return []

@@ -23,9 +23,9 @@ class WornFriction:
     - bond_length: factors (k,) on the bond length, or None.
     """
 
-    depth: tuple
-    coefficient: tuple | None
-    bond_length: tuple | None
+    depth: tuple[float, ...]
+    coefficient: tuple[float, ...] | None
+    bond_length: tuple[float, ...] | None
 
     def compute_worn_law(self, law: Friction, depth: float) -> Friction:
         """Return a friction law whose parameters are changed for a mean worn depth [m]."""

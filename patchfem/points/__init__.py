@@ -9,14 +9,14 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 4. `contacts`             points of a rig or a bench: elements, bonds, patches, varying loads, grooves
 5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
 6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
-7. `slide_kernels`, `slides`  points along a prescribed slide
+7. `slides`  points along a prescribed slide
 
 A law is a number in `law_rows.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "case_rows": ("SAME_CYCLE", "Cases", "Number"),
+    "case_rows": ("SAME_CASE_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
     "checkpoint": ("CheckpointFiles", "MAX_EARLY_SAMPLES", "store_checkpoints"),
     "contacts": (

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .case_rows import SAME_CYCLE, Now, Number, Seen
+from .case_rows import SAME_CASE_CYCLE, Now, Number, Seen
 from .return_maps_kernels import (
     Law,
     MeanForce,
@@ -39,7 +39,9 @@ MAX_FORCE_BEND = 0.3
 # Change of the irreversible part of the slide from step to step, relative to the phase of a whole step, above which the
 # steps of the window stay short; near events, where steps grow with their distance, it is resolved like elsewhere
 MAX_SLIP_CHANGE = 0.25
-FULL_STICK = 1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
+FULL_STICK_TOL = (
+    1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
+)
 N_READ = 2  # measured cycles of a motion that repeats
 
 
@@ -113,7 +115,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         Duration of the step [s].
     case : (12,) array
         Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -200,7 +202,7 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         Force that would keep the point at rest at the end of the step [N].
     case : (12,) array
         Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -264,7 +266,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         corner in the step.
     case : (12,) array
         Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -356,7 +358,7 @@ def find_force(wave, case, now, numbers, memory, j):
         Sine of the drive at the end of the step.
     case : (12,) array
         Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -377,6 +379,26 @@ def find_force(wave, case, now, numbers, memory, j):
 
 
 @njit(**NJIT_KERNEL)
+def find_middle(h, start, now):
+    """Return slide, velocity and force in the middle of a step.
+
+    The slide is the cubic with the velocities at both ends, the force the parabola with the time mean of the step.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (17,) array
+        State of the case, in the rows of `case_rows.Now`.
+    """
+    q = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
+    v = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
+    return q, v, 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+
+
+@njit(**NJIT_KERNEL)
 def add_energies(waves, h, case, start, now):
     """Add the energies per mass of a step; integrals of the velocity by Simpson's rule.
 
@@ -390,10 +412,10 @@ def add_energies(waves, h, case, start, now):
         Numbers of the case, in the rows of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     """
-    middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
+    middle = find_middle(h, start, now)[1]
     end = now[Now.VELOCITY]
     power = case[Number.DRIVE] * h / 6
     work = power * (waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end)
@@ -418,12 +440,12 @@ def find_turn(h, start, now):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     """
     first = start[1]
     last = now[Now.VELOCITY]
-    middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (first + last)
+    middle = find_middle(h, start, now)[1]
     slope = 4 * middle - 3 * first - last
     bend = 2 * (first + last) - 4 * middle
     # The root between the ends, without a difference of large numbers
@@ -449,9 +471,9 @@ def observe_extremes(h, law, start, now, seen, observes):
         Number of the `law_rows.Law`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     observes : bool
         Whether the cycle is measured.
@@ -539,9 +561,9 @@ def observe_acceleration(waves, h, case, start, now, seen):
         Numbers of the case, in the rows of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -555,10 +577,7 @@ def observe_acceleration(waves, h, case, start, now, seen):
         peak = max(peak, abs(before), abs(after))
     else:
         first = find_acceleration(waves[0], start[0], start[1], start[2], case)
-        q_middle = 0.5 * (start[0] + q) + h / 8 * (start[1] - v)
-        v_middle = 1.5 * (q - start[0]) / h - 0.25 * (start[1] + v)
-        # The force in the middle has the mean of the step by Simpson's rule.
-        force = 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+        q_middle, v_middle, force = find_middle(h, start, now)
         middle = find_acceleration(waves[1], q_middle, v_middle, force, case)
         peak = find_parabola_extreme(first, middle, last)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
@@ -578,9 +597,9 @@ def observe_harmonics(time, h, omega, start, now, seen):
         Circular frequency of the drive [rad/s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -623,9 +642,9 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         Whether the law sticks without a stretch.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     # Irreversible fraction of the path in the step, less one half.
@@ -667,9 +686,9 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         before = elapsed - 0.5 * h
         part = last / (last - excess)
         crossing = 2 * part * before if part < 0.5 else before + (part - 0.5) * h
-        if 0.5 - abs(last) < FULL_STICK:
+        if 0.5 - abs(last) < FULL_STICK_TOL:
             crossing = before + (0.5 - abs(excess)) * h
-        elif 0.5 - abs(excess) < FULL_STICK:
+        elif 0.5 - abs(excess) < FULL_STICK_TOL:
             crossing = 2 * before * abs(last)
         sticking = crossing if last < 0 else elapsed - crossing
         if last < 0:
@@ -679,8 +698,6 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
             seen[Seen.START_SIN] += sin(angle)
 
     seen[Seen.STUCK] += sticking
-    seen[Seen.STICK] = sticking + (seen[Seen.STICK] if last < 0 else 0.0)
-    seen[Seen.LONGEST_STICK] = max(seen[Seen.LONGEST_STICK], seen[Seen.STICK])
     seen[Seen.MIDDLE] = centre
     seen[Seen.EXCESS] = excess
 
@@ -695,7 +712,7 @@ def find_extreme_slip(h, start, now, numbers, memory, j, load):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -727,7 +744,7 @@ def find_largest_force(h, start, now, numbers, j, load):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -738,17 +755,14 @@ def find_largest_force(h, start, now, numbers, j, load):
     """
     law = numbers[0, j]
     force = now[Now.FORCE]
+    _, velocity, middle = find_middle(h, start, now)
     if law == Law.TANH:
-        middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
-        speed = find_parabola_extreme(start[1], middle, now[Now.VELOCITY])
+        speed = find_parabola_extreme(start[1], velocity, now[Now.VELOCITY])
         return numbers[1, j] * load * tanh(speed / numbers[2, j])
     if law == Law.COULOMB and start[1] == 0 and now[Now.VELOCITY] != 0:
         return numbers[1, j] * load
     if law == Law.LUGRE or (law == Law.COULOMB and start[1] == 0):
-        # The force in the middle has the mean of the step by Simpson's rule.
-        return find_parabola_extreme(
-            start[2], 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + force), force
-        )
+        return find_parabola_extreme(start[2], middle, force)
     return abs(force)
 
 
@@ -762,7 +776,7 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -772,7 +786,7 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
         Number of the point.
     load : float
         Normal load [N].
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
@@ -801,9 +815,9 @@ def end_cycle(now, seen, history):
 
     Parameters
     ----------
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor; output.
@@ -828,56 +842,8 @@ def end_cycle(now, seen, history):
 
 
 @njit(**NJIT_KERNEL)
-def repeats(omega, now):
-    """Return whether a motion is that of the cycle before, whose end is then replaced."""
-    size = SAME_CYCLE * (now[Now.MAX] - now[Now.MIN])
-    force = SAME_CYCLE * abs(now[Now.MEAN])
-    is_same = (
-        abs(now[Now.SLIDE] - now[Now.LAST_SLIDE]) <= size
-        and abs(now[Now.VELOCITY] - now[Now.LAST_VELOCITY]) <= omega * size
-        and abs(now[Now.FORCE] - now[Now.LAST_FORCE]) <= force
-    )
-    now[Now.LAST_SLIDE] = now[Now.SLIDE]
-    now[Now.LAST_VELOCITY] = now[Now.VELOCITY]
-    now[Now.LAST_FORCE] = now[Now.FORCE]
-    return is_same
-
-
-@njit(**NJIT_KERNEL)
-def rotate(waves, k, part):
-    """Return the sine of the sum of two tabulated angles.
-
-    Parameters
-    ----------
-    waves : (2, k) array
-        Sines and cosines of the drive.
-    k : int
-        Column of the first angle.
-    part : int
-        Column of the second angle.
-    """
-    return waves[0, k] * waves[1, part] + waves[1, k] * waves[0, part]
-
-
-@njit(**NJIT_KERNEL)
-def rotate_cosine(waves, k, part):
-    """Return the cosine of the sum of two tabulated angles.
-
-    Parameters
-    ----------
-    waves : (2, k) array
-        Sines and cosines of the drive.
-    k : int
-        Column of the first angle.
-    part : int
-        Column of the second angle.
-    """
-    return waves[1, k] * waves[1, part] - waves[0, k] * waves[0, part]
-
-
-@njit(**NJIT_KERNEL)
-def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen):
-    """March a case over a cycle; `waves` are those of `march_cases`.
+def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
+    """March a case over a cycle.
 
     Parameters
     ----------
@@ -885,13 +851,11 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         Steps per cycle.
     table : (LEVELS + 1, 2, 5) array
         Responses of `write_responses`.
-    waves : (2, k) array
-        Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
         Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
+    now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -899,7 +863,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
-    seen : (32,) array
+    seen : (30,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     omega = case[Number.OMEGA]
@@ -912,7 +876,8 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     change = 0.0
     level = 0
     tick = 0
-    start = (0.0, 0.0, 0.0, 0.0)
+    sine = 0.0
+    cosine = 1.0
     now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
     now[Now.COS] = now[Now.SIN] = 0.0
     # An extreme at the border of two cycles has no force of its own.
@@ -921,20 +886,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         size = TICKS >> level
         h = step / (1 << level)
         time = tick * (step / TICKS)
-        if level == 0:
-            k = 2 * (tick // TICKS)
-            drive = waves[0, k], waves[0, k + 1], waves[0, k + 2]
-            cosines = waves[1, k], waves[1, k + 2]
-        else:
-            # Rotation from the last whole step; the half steps of a step in TICKS parts are the last columns.
-            k = 2 * (tick // TICKS)
-            first = 2 * steps + 1 + 2 * (tick % TICKS)
-            drive = (
-                rotate(waves, k, first),
-                rotate(waves, k, first + size),
-                rotate(waves, k, first + 2 * size),
-            )
-            cosines = rotate_cosine(waves, k, first), rotate_cosine(waves, k, first + 2 * size)
+        drive = sine, sin(omega * (time + 0.5 * h)), sin(omega * (time + h))
         start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
         if not try_step(
             drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
@@ -944,8 +896,11 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
 
         find_force(drive[2], case, now, numbers, memory, j)
         add_energies(drive, h, case, start, now)
-        now[Now.COS] += 0.5 * h * (start[0] * cosines[0] + now[Now.SLIDE] * cosines[1])
-        now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * drive[2])
+        last_cosine = cosine
+        sine = drive[2]
+        cosine = cos(omega * (time + h))
+        now[Now.COS] += 0.5 * h * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
+        now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * sine)
         observe_extremes(h, numbers[0, j], start, now, seen, observes)
         if observes:
             observe_forces(h, start, now, numbers, memory, j, case[Number.LOAD], seen)
@@ -962,24 +917,22 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, table):
+def march_cases(steps, parameters, numbers, memory, nows, seens, histories, table):
     """March cases over their cycles.
 
     Parameters
     ----------
     steps : int
         Steps per cycle.
-    waves : (2, 2 steps + 2 TICKS + 2) array
-        Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     parameters : (c, 12) array
         Numbers of the cases, in the rows of `case_rows.Number`.
     numbers : (k, c) array
         Numbers of the laws; row 0 is the `Law`.
     memory : (l, c) array
         Memory of the laws; changed in place.
-    nows : (c, 20) array
+    nows : (c, 17) array
         States of the cases, in the rows of `case_rows.Now`; output.
-    seens : (c, 32) array
+    seens : (c, 30) array
         What was observed, in the rows of `case_rows.Seen`; output.
     histories : (c, n, 4) array
         Extremes and phasor of every cycle; output.
@@ -1012,17 +965,24 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
             observes = cycle >= first
             if cycle == first:
                 start_window(now, seen)
+            begin = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE]
             sums = now[Now.WORK_IN], now[Now.POWER], now[Now.VISCOUS], now[Now.FRICTION]
             if observes:
                 seen[Seen.LAST_MEAN] = 0.0
                 seen[Seen.MIDDLE] -= 2 * np.pi / omega if seen[Seen.N_CYCLES] > 0 else 0.0
-            march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen)
+            march_cycle(steps, table, observes, case, now, numbers, memory, j, seen)
 
             end_cycle(now, seen, histories[j, cycle])
-            is_same = repeats(omega, now)
             cycle += 1
+
+            # The cycles up to the last ones are repetitions of one that ends as it began.
+            size = SAME_CASE_CYCLE * (now[Now.MAX] - now[Now.MIN])
+            is_same = (
+                abs(now[Now.SLIDE] - begin[0]) <= size
+                and abs(now[Now.VELOCITY] - begin[1]) <= omega * size
+                and abs(now[Now.FORCE] - begin[2]) <= SAME_CASE_CYCLE * abs(now[Now.MEAN])
+            )
             if is_same and not observes and cycle < n_cycles - N_READ:
-                # The cycles up to the last ones are repetitions of this one.
                 n_skipped = n_cycles - N_READ - cycle
                 for k in range(cycle, cycle + n_skipped):
                     for column in range(4):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 # Change between two cycles relative to the range of the motion, below which it repeats
-SAME_CYCLE = 1e-8
+SAME_CASE_CYCLE = 1e-8
 
 
 class Number(IntEnum):
@@ -35,9 +35,9 @@ class Now(IntEnum):
     """Columns of the state of a case.
 
     Slide, velocity, mean force of the last step, force, irreversible slide; extremes, cosine and sine integrals of the
-    slide in the cycle; slide, velocity and force at the last cycle end; work of the drive, its magnitude, loss of the
-    damper, friction work per mass, largest energy; fraction of the last step at which a rigid point stops, turns or is
-    released, -1 without such an event; elastic energy of the law at the end; time mean of the force over the last step.
+    slide in the cycle; work of the drive, its magnitude, loss of the damper, friction work per mass, largest energy;
+    fraction of the last step at which a rigid point stops, turns or is released, -1 without such an event; elastic energy
+    of the law at the end; time mean of the force over the last step.
     """
 
     SLIDE = 0
@@ -49,28 +49,24 @@ class Now(IntEnum):
     MAX = 6
     COS = 7
     SIN = 8
-    LAST_SLIDE = 9
-    LAST_VELOCITY = 10
-    LAST_FORCE = 11
-    WORK_IN = 12
-    POWER = 13
-    VISCOUS = 14
-    FRICTION = 15
-    STORED = 16
-    EVENT = 17
-    ELASTIC = 18
-    TIME_MEAN = 19
+    WORK_IN = 9
+    POWER = 10
+    VISCOUS = 11
+    FRICTION = 12
+    STORED = 13
+    EVENT = 14
+    ELASTIC = 15
+    TIME_MEAN = 16
 
 
 class Seen(IntEnum):
     """Columns of what is observed in the window, per unit of the slide and of the force.
 
     Extremes of acceleration, force and slip; time stuck; number of slip starts with the sums of cosine and sine of
-    twice their phases; middle of the last step and its excess of slip over half of the slide; duration of the present
-    and of the longest stick; integrals of slide and force times harmonic 1; friction work by mean forces, by the
-    trapezoidal rule, and its magnitude; integral of the slide in the first and in the last cycle; sums of range and
-    secant, number of secants; forces at the extremes of the cycle; slide and velocity at the start; duration; number of
-    cycles; integrals of the force times harmonic 3.
+    twice their phases; middle of the last step and its excess of slip over half of the slide; integrals of slide and
+    force times harmonic 1; friction work by mean forces, by the trapezoidal rule, and its magnitude; integral of the
+    slide in the first and in the last cycle; sums of range and secant, number of secants; forces at the extremes of the
+    cycle; slide and velocity at the start; duration; number of cycles; integrals of the force times harmonic 3.
     """
 
     MAX_ACCELERATION = 0
@@ -83,28 +79,26 @@ class Seen(IntEnum):
     START_SIN = 7
     MIDDLE = 8
     EXCESS = 9
-    STICK = 10
-    LONGEST_STICK = 11
-    COS_1 = 12
-    SIN_1 = 13
-    FORCE_COS_1 = 14
-    FORCE_SIN_1 = 15
-    WORK = 16
-    SAMPLED = 17
-    PASSED = 18
-    FIRST_MEAN = 19
-    LAST_MEAN = 20
-    RANGE = 21
-    SECANT = 22
-    N_SECANTS = 23
-    FORCE_AT_MIN = 24
-    FORCE_AT_MAX = 25
-    START_SLIDE = 26
-    START_VELOCITY = 27
-    SPAN = 28
-    N_CYCLES = 29
-    FORCE_COS_3 = 30
-    FORCE_SIN_3 = 31
+    COS_1 = 10
+    SIN_1 = 11
+    FORCE_COS_1 = 12
+    FORCE_SIN_1 = 13
+    WORK = 14
+    SAMPLED = 15
+    PASSED = 16
+    FIRST_MEAN = 17
+    LAST_MEAN = 18
+    RANGE = 19
+    SECANT = 20
+    N_SECANTS = 21
+    FORCE_AT_MIN = 22
+    FORCE_AT_MAX = 23
+    START_SLIDE = 24
+    START_VELOCITY = 25
+    SPAN = 26
+    N_CYCLES = 27
+    FORCE_COS_3 = 28
+    FORCE_SIN_3 = 29
 
 
 class Cases(NamedTuple):

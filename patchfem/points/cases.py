@@ -7,7 +7,7 @@ import numpy as np
 from .. import compiled
 from ..core import ModalBasis, SineDrive
 from ..friction import path_work
-from .case_kernels import LEVELS, TICKS
+from .case_kernels import LEVELS
 from .case_rows import Cases, Now, Number, Seen
 
 ALWAYS_STUCK = 1e-12  # fraction of the time below which slip is round-off
@@ -20,15 +20,11 @@ class CaseMarch(NamedTuple):
 
     - values: measures (c,) by name; NaN where a case does not have the measure
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
-    - repeats (c,): whether the motion has become periodic
-    - longest_stick (c,): duration of the longest stick in the measured cycles [s]
     """
 
     values: dict[str, np.ndarray]
     extremes: np.ndarray
     phasors: np.ndarray
-    repeats: np.ndarray
-    longest_stick: np.ndarray
 
 
 def list_parameters(
@@ -77,17 +73,13 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     steps : int
         Whole steps per cycle; steps with an event are halved.
     """
-    # Half steps of the whole cycle, and of the finest level for the halving of steps.
     n = len(cases.parameters)
     columns = cases.parameters.T
-    phase = (
-        np.pi / steps * np.concatenate([np.arange(2 * steps + 1), np.arange(2 * TICKS + 1) / TICKS])
-    )
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     compiled.load("points.case_kernels").march_cases(
-        steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
+        steps, cases.parameters, cases.numbers,
         cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
 
@@ -98,8 +90,6 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
             compute_measures(cases, now, seen, history),
             np.sort(history[..., :2] * output[..., None], axis=-1),
             phasors * output,
-            seen[:, Seen.N_CYCLES] < columns[Number.WINDOW],
-            seen[:, Seen.LONGEST_STICK],
         )
 
 
@@ -110,9 +100,9 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     ----------
     cases : Cases
         The cases that were run.
-    now : (c, 20) array
+    now : (c, 17) array
         States at the end, in the rows of `case_rows.Now`.
-    seen : (c, 32) array
+    seen : (c, 30) array
         What was observed, in the rows of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.

@@ -24,7 +24,6 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
-from ..friction.bonds.point_kernels import MAX_SHORT_PATH
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
@@ -49,16 +48,14 @@ from .march_rows import (
 from .return_maps_kernels import (
     Step,
     advance,
-    advance_bonds,
     find_rest_limit,
     mean_force,
     prepare,
     press,
     read,
-    write_bond_means,
 )
 
-MAX_ITERATIONS = 200  # Newton iterations of a step
+MAX_NEWTON_ITERATIONS = 200  # Newton iterations of a step
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
@@ -67,7 +64,7 @@ STALLED = 1e3
 LISTS_STALLED = 1e5
 MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
-ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
+INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 
 
@@ -115,7 +112,7 @@ def solve_linear(matrix, vector, n):
 
 @njit(**NJIT_CALL)
 def subtract_shear(slides, shapes, increments):
-    """Subtract the displacements of the pieces from the slides (m,) of the points, four coordinates in one pass.
+    """Subtract the displacements of the pieces from the slides of the points.
 
     Parameters
     ----------
@@ -126,24 +123,11 @@ def subtract_shear(slides, shapes, increments):
     increments : (r,) array
         Shear coordinates.
     """
-    r = increments.size
-    whole = r - r % 4
-    for k in range(0, whole, 4):
-        first = increments[k]
-        second = increments[k + 1]
-        third = increments[k + 2]
-        fourth = increments[k + 3]
-        for j in range(slides.size):
-            slides[j] -= (
-                shapes[k, j] * first
-                + shapes[k + 1, j] * second
-                + shapes[k + 2, j] * third
-                + shapes[k + 3, j] * fourth
-            )
-    for k in range(whole, r):
-        part = increments[k]
-        for j in range(slides.size):
-            slides[j] -= shapes[k, j] * part
+    for j in range(slides.size):
+        total = 0.0
+        for k in range(increments.size):
+            total += shapes[k, j] * increments[k]
+        slides[j] -= total
 
 
 @njit(**NJIT_CALL)
@@ -336,8 +320,7 @@ def write_forces(system, level, h):
     if points.stiffness.size:
         subtract_shear(values[Point.SLIDE, :count], points.shapes, points.shear[Shear.TRIAL])
 
-    if not (system.options.is_plain and write_bond_forces(system)):
-        write_point_forces(system, level, h)
+    write_point_forces(system, level, h)
 
     for p in range(n_ports):
         force = 0.0
@@ -366,38 +349,6 @@ def write_forces(system, level, h):
 
 
 @njit(**NJIT_CALL)
-def write_bond_forces(system):
-    """Write the mean forces of bonds that slide a short way, in loops that vectorise; else return False."""
-    points = system.points
-    values = points.values
-    count = points.port.size
-    return write_bond_means(
-        points.numbers,
-        points.trial,
-        values[Point.LOAD, :count],
-        values[Point.SLIDE, :count],
-        values[Point.FORCE, :count],
-        values[Point.BY_SLIDE, :count],
-    )
-
-
-@njit(**NJIT_CALL)
-def advance_plain_bonds(system):
-    """Advance bonds of constant length whose slides are short; return whether they were."""
-    points = system.points
-    values = points.values
-    trial = points.trial
-    count = points.port.size
-    longest = 0.0
-    for j in range(count):
-        longest = max(longest, abs(values[Point.SLIDE, j]) - MAX_SHORT_PATH * trial[4, j])
-    if longest > 0.0:
-        return False
-    advance_bonds(trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
-    return True
-
-
-@njit(**NJIT_CALL)
 def write_point_forces(system, level, h):
     """Write the mean forces of the points of any law, and their slopes.
 
@@ -420,7 +371,7 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if rests(points, points.trial, j):
+        if system.options.is_rigid and rests(points, points.trial, j):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
@@ -494,7 +445,7 @@ def write_residual(system, level, h):
     tolerance = RESIDUAL * size
     for p in range(n_ports):
         own = ports.compliance[level, 0, p, p]
-        noise = ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
+        noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         # The normal contact loses no energy, so that its residuals would add up over the steps.
         weight = 10.0 if p >= heave >= 0 else 1.0
         if own > 0 or p != 0 or not system.structure.path.size:
@@ -667,7 +618,7 @@ def solve_forces(system, level, h):
     smallest = np.inf
     n_stalls = 0
     stalled = LISTS_STALLED if system.options.has_lists else STALLED
-    for count in range(MAX_ITERATIONS):
+    for count in range(MAX_NEWTON_ITERATIONS):
         if n_stalls >= MAX_STALLS and residual <= stalled:
             return True
         for p in range(moves.shape[1]):
@@ -715,7 +666,7 @@ def solve_forces(system, level, h):
             and system.options.has_lists
             and high < np.inf
             and size > 0
-            and change <= ROUND_OFF * size
+            and change <= INCREMENT_ROUND_OFF * size
             and system.points.stiffness.size == 0
         ):
             return True
@@ -960,16 +911,15 @@ def commit(system, h):
     flank = system.flank
     count = points.port.size
 
-    is_advanced = options.is_plain and not options.has_growth and advance_plain_bonds(system)
     for j in range(count):
         values[Point.TOTAL, j] += values[Point.SLIDE, j]
 
-    for j in range(count if options.has_loads or not is_advanced else 0):
+    for j in range(count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
-        elif not is_advanced:
+        else:
             v0 = ports.values[Port.VELOCITY, p]
             v1 = ports.values[Port.END_VELOCITY, p]
             step = Step(slide, h, v0, v1, 0.0)
@@ -1246,7 +1196,7 @@ def try_step(system, level, row, begin, end, drive):
     for k in range(points.stiffness.size):
         rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
         shear[Shear.TRIAL, k] = h * rate
-    if options.is_plain:
+    if not options.has_lists:
         for p in range(moves.shape[1]):
             force = moves[Port.FORCE, p]
             moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]

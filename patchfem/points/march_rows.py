@@ -261,7 +261,6 @@ class Options(NamedTuple):
     - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
     - is_rigid, has_lists, has_loads, has_growth: 1 if points are rigid, have lists of bonds, loads that change, or
       bonds that grow
-    - is_plain: 1 if all points are bonds on one port
     """
 
     mass: float
@@ -274,7 +273,6 @@ class Options(NamedTuple):
     has_lists: int
     has_loads: int
     has_growth: int
-    is_plain: int
 
 
 class System(NamedTuple):

@@ -34,14 +34,11 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
-    MAX_SHORT_PATH,
     bond_mean,
     bond_step,
     grow,
     press_point,
     shape_functions,
-    short_bond_mean,
-    short_bond_step,
 )
 from ..friction.laws.bouc_wen_kernels import follow_path
 from ..friction.laws.lugre_kernels import rate_equation, relaxation_length
@@ -577,58 +574,6 @@ def press(numbers, memory, j, before, after):
         )
     elif law == Law.TANH:
         memory[0, j] *= after / before if before > 0 else 0.0
-
-
-@njit(**NJIT_CALL)
-def write_bond_means(numbers, memory, loads, slides, forces, slopes):
-    """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides.
-
-    Parameters
-    ----------
-    numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    loads : (m,) array
-        Loads of the points [N].
-    slides : (m,) array
-        Slides of the points [m].
-    forces : (m,) array
-        Forces of the points [N], output.
-    slopes : (m,) array
-        Derivatives of the mean forces by the slides [N/m], output.
-    """
-    for j in range(slides.size):
-        if abs(slides[j]) > MAX_SHORT_PATH * memory[4, j]:
-            return False
-    for j in range(slides.size):
-        mean, slope = short_bond_mean(memory[1, j], memory[2, j], slides[j], loads[j], memory[4, j])
-        stiffness = numbers[1, j] / numbers[2, j]
-        forces[j] = stiffness * mean
-        slopes[j] = stiffness * slope
-    return True
-
-
-@njit(**NJIT_CALL)
-def advance_bonds(memory, loads, slides):
-    """Advance points with bonds of constant length after short slides (m,).
-
-    Parameters
-    ----------
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    loads : (m,) array
-        Loads of the points [N].
-    slides : (m,) array
-        Slides of the points [m].
-    """
-    for j in range(slides.size):
-        bonds = short_bond_step(
-            memory[1, j], memory[2, j], memory[3, j], slides[j], loads[j], memory[4, j]
-        )
-        memory[1, j] = bonds.m
-        memory[2, j] = bonds.z
-        memory[3, j] = bonds.s2
 
 
 @njit(**NJIT_KERNEL)

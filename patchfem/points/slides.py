@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import compiled
 from .contacts import Contact
 from .march_rows import N_PORT_COLUMNS, Sample, Total
 from .time_march import (
@@ -61,10 +60,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     Missing
         If lists of bonds become too long.
     """
-    if contact.has_loads or contact.bond_sum is not None or contact.reduction is not None:
-        kernels = load_kernels(contact, say)
-    else:
-        kernels = compiled.load("points.slide_kernels", say)
+    kernels = load_kernels(contact, say)
 
     # Blocks of samples with one step each; a block ends at every sample whose state is asked for.
     time = np.asarray(time, float)

@@ -7,7 +7,6 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
 from ..contact.set_arrays import hash_set, make_set_arrays
@@ -43,24 +42,22 @@ from .march_rows import (
     Total,
 )
 
-MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
-N_GAUSS = 8  # Gauss points of the integrals over that step
 RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
-MAX_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
+MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
 STRIP_BYTES = 8 * N_ROWS
 LONG_LIST_ADVICE = (
     'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 )
 MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
+TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
-TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
 WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of cycles
@@ -172,58 +169,71 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
 
-    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
-    fastest = float(modes.omega.max(initial=0.0)) * step
-    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
-    short = step / 2**n_halvings
-    nodes, weights = leggauss(N_GAUSS)
-    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
+    # Rates of loss and work as quadratic forms of the state.
     loss = np.zeros_like(matrix)
     loss[velocities, velocities] = modes.mass * modes.damping_matrix
     work = np.zeros_like(matrix)
     work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
-    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
-    forms = [
-        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
-        for form in (loss, work)
-    ]
+
+    # As steps double, an integral of x(t)^T form x(t) is the sum of both halves; the square of the exponential would double
+    # its round-off.
+    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
+    shortest = step / 2 ** (levels - 1)
+    forms = [integrate_form(matrix, form, shortest, powers) for form in (loss, work)]
     parts = []
-    for k in range(n_halvings + 1):
-        # The square of the last matrix would double its round-off.
-        whole = exponential(matrix, short * 2**k, powers)
-        if k > n_halvings - levels:
-            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
+    for level in range(levels):
+        time = shortest * 2**level
+        ratio = time ** (powers - powers[:, None])
+        whole = exponential(time * matrix / ratio) * ratio
+        parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
         forms = [form + whole.T @ form @ whole for form in forms]
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
-def exponential(matrix, time: float, powers) -> np.ndarray:
-    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
+def integrate_form(matrix, form, time: float, powers) -> np.ndarray:
+    """Return the integral of x^T form x over a time as a form (k, k) of the first state.
 
-    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
+    With the block exponential of Van Loan (1978), exp([[-A^T, Q], [0, A]]) = [[., F], [0, E]], the integral of
+    exp(A s)^T Q exp(A s) is E^T F.
 
     Parameters
     ----------
     matrix : (k, k) array
-        Matrix of the rates of the state.
+        Matrix of the rates of the state x.
+    form : (k, k) array
+        Quadratic form.
     time : float
         [s]
     powers : (k,) array
-        Powers of the unit of each state.
+        Powers of the unit of each state, [s^-powers].
     """
-    # In units of the time the entries of the exponent are of order 1.
-    units = time**-powers
-    ratio = units[:, None] / units
-    exponent = time * matrix / ratio
-    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
-    exponent = exponent / 2**n_squares
-    identity = np.eye(powers.size)
+    # In units of the time the entries of the exponent are of order 1, as those of the form over its largest one.
+    k = powers.size
+    exponent = time * matrix / time ** (powers - powers[:, None])
+    units = time ** -(powers + powers[:, None])
+    size = np.abs(form * units).max() or 1.0
+    block = np.zeros((2 * k, 2 * k))
+    block[:k, :k] = -exponent.T
+    block[k:, k:] = exponent
+    block[:k, k:] = form * units / size
+    whole = exponential(block)
+    return time * size * (whole[k:, k:].T @ whole[:k, k:]) / units
+
+
+def exponential(matrix) -> np.ndarray:
+    """Return the exponential (k, k) of a matrix by scaling and squaring of a Taylor polynomial.
+
+    The import of scipy.linalg would take longer than all exponentials of a run.
+    """
+    n_squares = max(int(np.ceil(np.log2(np.abs(matrix).sum(axis=1).max()))), 0)
+    scaled = matrix / 2**n_squares
+    identity = np.eye(len(matrix))
     result = identity
     for order in range(TAYLOR_DEGREE, 0, -1):
-        result = identity + exponent @ result / order
+        result = identity + scaled @ result / order
     for _ in range(n_squares):
         result = result @ result
-    return result * ratio
+    return result
 
 
 def make_system(
@@ -313,7 +323,6 @@ def make_system(
         int(has_lists),
         int(contact.has_loads),
         int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
-        int(laws == {Law.BONDS} and len(contact.point_sets) == 1),
     )
 
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
@@ -407,7 +416,7 @@ def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLi
             np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 14)), *[empty] * 3
         )
     bonds, reach, merge = contact.bond_sum
-    capacity = list_numbers.list_capacity(bonds, reach, merge)
+    capacity = list_numbers.list_capacity(reach, merge)
     if count > 1:
         step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
         capacity = min(capacity, FIRST_STRIPS + step)
@@ -781,25 +790,25 @@ def enlarge_lists(system: System, place: str) -> System:
     Raises
     ------
     Missing
-        If the lists would have more than MAX_STRIPS strips.
+        If the lists would have more than MAX_LIST_STRIPS strips.
     """
     lists = system.lists
     room = lists.bondlist.shape[1]
-    if room >= MAX_STRIPS:
+    if room >= MAX_LIST_STRIPS:
         raise Missing(
             f"the bond list grew beyond {room} entries ({room * STRIP_BYTES / 1e6:.0f} MB) {place}; "
             f"{LONG_LIST_ADVICE}",
             "",
         )
     statuses = lists.statuses.copy()
-    capacity = min(2 * room, MAX_STRIPS) // len(statuses)
+    capacity = min(2 * room, MAX_LIST_STRIPS) // len(statuses)
     bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
     return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
 
 
 def count_list_bytes(n_strips: float) -> float:
     """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
-    return 3 * STRIP_BYTES * min(n_strips, MAX_STRIPS)
+    return 3 * STRIP_BYTES * min(n_strips, MAX_LIST_STRIPS)
 
 
 def split_losses(samples, n: int, scale: float) -> np.ndarray:

@@ -36,6 +36,7 @@ class CoarserRuns(NamedTuple):
 
 
 ComparisonRuns = list[CoarserRuns]  # one for each source of error
+SourceErrors = tuple[str, Values]  # source of an error, and errors by measure name
 
 
 class StepRun(NamedTuple):
@@ -51,7 +52,9 @@ class StepRun(NamedTuple):
     values: Values
 
 
-def estimate_errors(solve: Callable, fine: Values, coarse_runs, solved_runs: dict) -> tuple:
+def estimate_errors(
+    solve, fine: Values, coarse_runs: ComparisonRuns, solved_runs
+) -> tuple[list[SourceErrors], float]:
     """Compute coarser runs, and estimate the errors of the measures by source.
 
     Parameters
@@ -60,7 +63,7 @@ def estimate_errors(solve: Callable, fine: Values, coarse_runs, solved_runs: dic
         Function of the settings that returns a run with the attribute `values`.
     fine : dict
         Measures of the fine run by name.
-    coarse_runs : sequence of CoarserRuns
+    coarse_runs : list of CoarserRuns
         Settings of the coarse runs and rule of their error, by source.
     solved_runs : dict
         Known runs by settings; new runs are added.

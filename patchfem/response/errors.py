@@ -29,6 +29,10 @@ MAX_ORDER = 2.0
 MAX_CHANGE_RATIO = 16.0
 # Lowest observed order of convergence at which an error is assumed to decrease with the step size.
 MIN_OBSERVED_ORDER = 0.5
+LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
+# Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
+INSTANT_SAMPLING_ERROR = 0.005
+MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 # Measures that are errors of the solution, so that their own error is their value.
 ERROR_MEASURES = select_names("error")
 PHASES = select_names("phase")  # Angles modulo pi.
@@ -193,6 +197,20 @@ def merged_cell_errors(fine: Values, *coarse: Values) -> Values:
                 [convergence_error(change[name], ratio=4.0, order=order) for change in changes],
                 axis=0,
             )
+    return errors
+
+
+def estimate_sampling_errors(values: Values) -> Values:
+    """Estimate the errors of measures due to sampling with 400 samples per cycle."""
+    errors = {}
+    for name, value in values.items():
+        definition = find_definition(name)
+        if definition.has("loop"):
+            errors[name] = LOOP_SAMPLING_ERROR * abs(value)
+        elif definition.sample_error:
+            errors[name] = INSTANT_SAMPLING_ERROR
+        else:
+            errors[name] = MOTION_SAMPLING_ERROR * abs(value)
     return errors
 
 

@@ -81,51 +81,70 @@ def find_missing(
     }
 
 
-def find_missing_secant(values) -> Measures:
-    """Return a secant stiffness without a value if the friction force is not unique.
+def find_invalid(
+    measures: Measures, window, drive, outcome: Outcome, *, is_rigid: bool
+) -> Measures:
+    """Return the measures whose values have no meaning in a motion, without value and with the reason, by name.
 
-    The force of rigid friction is undetermined if the interface sticks at the largest displacement.
-
-    Parameters
-    ----------
-    values : dict
-        Measure by name.
-
-    Returns
-    -------
-    dict
-        Measure by name; {} if the value remains valid.
-    """
-    secant = values.get("secant_stiffness")
-    stick_fraction = values.get("stick_fraction")
-    if secant is None or stick_fraction is None or stick_fraction.value is None:
-        return {}
-    if stick_fraction.value <= TABLE["stick_fraction"].floor + (stick_fraction.error or 0.0):
-        return {}
-    return {"secant_stiffness": _remove_value(secant, STICKS_AT_REVERSAL_REASON)}
-
-
-def find_missing_steady(values, outcome: Outcome, drive) -> Measures:
-    """Return a steady amplitude without a value if the transient cannot be extrapolated.
+    - The secant stiffness of rigid friction that sticks at the largest displacement, where its force is not unique.
+    - The drift under a drive that is not periodic: without a period, mean values differ even if there is no drift.
+    - The areas of friction loops that are not closed.
+    - The steady amplitude of a transient that cannot be extrapolated.
 
     Parameters
     ----------
-    values : dict
-        Measure by name.
-    outcome : Outcome
-        Outcome of the run.
+    measures : dict of str to Measure
+        Measures of the run by name.
+    window : Response
+        Last cycles.
     drive
         Drive of the last cycles.
-
-    Returns
-    -------
-    dict
-        Measure by name; {} if the value exists or the drive is not periodic.
+    outcome : Outcome
+        Outcome of the run.
+    is_rigid : bool
+        Whether the interface sticks without displacement.
     """
-    is_transient = outcome is Outcome.TRANSIENT and drive_sizes.is_periodic(drive)
-    if STEADY_AMPLITUDE in values or not is_transient:
-        return {}
-    return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON)}
+    reasons = {}
+    stick = measures.get("stick_fraction")
+    if is_rigid and stick is not None and stick.value is not None:
+        if stick.value > TABLE["stick_fraction"].floor + (stick.error or 0.0):
+            reasons["secant_stiffness"] = STICKS_AT_REVERSAL_REASON
+    is_periodic = drive_sizes.is_periodic(drive)
+    if not is_periodic:
+        reasons["drift_per_cycle"] = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
+        reasons |= dict.fromkeys(_list_open_loops(measures, window, drive), OPEN_LOOP_REASON)
+
+    invalid = {}
+    for name, reason in reasons.items():
+        if name in measures:
+            invalid[name] = replace(measures[name], value=None, error=None, reason=reason)
+    if outcome is Outcome.TRANSIENT and is_periodic and STEADY_AMPLITUDE not in measures:
+        invalid[STEADY_AMPLITUDE] = _make_missing_measure(
+            STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON
+        )
+    return invalid
+
+
+def _list_open_loops(measures: Measures, window, drive) -> list[str]:
+    """Return the names of the areas of friction loops that are not closed.
+
+    The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
+    release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no
+    meaning. For several interfaces, only the sum of the energies is known: a loop does not close if its
+    interface returns more energy than it takes although no energy is created.
+    """
+    ledger = window.extra.get("ledger")
+    loop = measures.get("loop_area")
+    if ledger is None or loop is None:
+        return []
+    _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
+    areas = {name: one for name, one in measures.items() if name.startswith("loop_area")}
+    if len(areas) == 1:
+        cycles = (window.time[-1] - window.time[0]) / drive.period
+        return list(areas) if stored > max(dissipated, loop.floor * cycles) else []
+    if created > 1e-9 * (stored + dissipated):
+        return []
+    return [name for name, one in areas.items() if one.value < -max(one.error or 0.0, one.floor)]
 
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
@@ -134,78 +153,14 @@ def _make_missing_measure(name: str, reason: str) -> Measure:
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
-def _remove_value(measure: Measure, reason: str) -> Measure:
-    """Return a measure with a reason in place of its value."""
-    return replace(measure, value=None, error=None, reason=reason)
-
-
-def find_missing_drift(values, drive) -> Measures:
-    """Return a drift without a value if the drive is not periodic.
-
-    Without a period, mean values differ even if there is no drift.
-
-    Parameters
-    ----------
-    values : dict
-        Measure by name.
-    drive
-        Drive of the last cycles.
-
-    Returns
-    -------
-    dict
-        Measure by name; {} if the value remains valid.
-    """
-    drift = values.get("drift_per_cycle")
-    if drift is None or drive_sizes.is_periodic(drive):
-        return {}
-    reason = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
-    return {"drift_per_cycle": _remove_value(drift, reason)}
-
-
 def find_missing_unbounded(values) -> Measures:
     """Return all measures except the load without values, for an unbounded motion."""
-    out = {name: _remove_value(measure, UNBOUNDED_REASON) for name, measure in values.items()}
+    out = {}
+    for name, measure in values.items():
+        out[name] = replace(measure, value=None, error=None, reason=UNBOUNDED_REASON)
     if "normal_load" in values:
         out["normal_load"] = replace(values["normal_load"], error=None)
     return out
-
-
-def find_missing_loops(values, window, drive) -> Measures:
-    """Return the areas of the friction loops without values if the loops are not closed.
-
-    The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
-    release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no
-    meaning. For several interfaces, only the sum of the energies is known: a loop does not close if its
-    interface returns more energy than it takes although no energy is created. If all loops close, the
-    result is {}.
-
-    Parameters
-    ----------
-    values : dict
-        Measure by name.
-    window : Response
-        Last cycles.
-    drive
-        Drive of the last cycles.
-    """
-    ledger = window.extra.get("ledger")
-    loop = values.get("loop_area")
-    if ledger is None or loop is None or drive_sizes.is_periodic(drive):
-        return {}
-    _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
-    names = [name for name in values if name.startswith("loop_area")]
-    open_names = []
-    if len(names) == 1:
-        cycles = (window.time[-1] - window.time[0]) / drive.period
-        if stored > max(dissipated, loop.floor * cycles):
-            open_names = names
-    elif created <= 1e-9 * (stored + dissipated):
-        for name in names:
-            area = values[name]
-            if area.value < -max(area.error or 0.0, area.floor):
-                open_names.append(name)
-    return {name: _remove_value(values[name], OPEN_LOOP_REASON) for name in open_names}
 
 
 def _reason_for_missing_phase(values, drive) -> str:

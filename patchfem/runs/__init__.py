@@ -5,12 +5,12 @@ what would run, `run` runs it. A module imports only its own entry of this list 
 it:
 
 1.  `results`  what every run returns, with its notes
-2.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
-3.  `bench`  a patch or a point under a prescribed displacement
-4.  `joint`  removal of a joint from modes that were measured with it
-5.  `rig`  a driven structure with friction
-6.  `wear`  wear of a patch in a bench or a rig over many cycles
-7.  `refine`  repetition of a run with finer meshes or more steps until it meets the tolerance
+2.  `refine`  the loop that repeats a run with a finer resolution until it meets the tolerance
+3.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
+4.  `bench`  a patch or a point under a prescribed displacement
+5.  `joint`  removal of a joint from modes that were measured with it
+6.  `rig`  a driven structure with friction
+7.  `wear`  wear of a patch in a bench or a rig over many cycles
 8.  `findings`  measures that miss the tolerance, and the advice that reduces their errors
 9.  `accuracy_curve`  accuracy of a motion against its computing time
 10. `plan`  what would run: engine, unknowns, stiffnesses

@@ -1,6 +1,6 @@
 """Accuracy of a motion against its computing time, from the runs of its error estimate.
 
-In: a Result whose `extra["step_runs"]` has the run and its runs with fewer steps. Out: `StepSetting`s; no further run
+In: a Result whose `motion.step_runs` has the run and its runs with fewer steps. Out: `StepSetting`s; no further run
 is needed. In contrast, `campaigns.cost` measures whole runs.
 """
 
@@ -10,7 +10,7 @@ from ..response.errors import ERROR_MEASURES, absolute_change
 from .refine import is_main
 from .results.patch_rows import Measures, Values
 
-ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
+SUM_ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
 NO_EFFECT_RATIO = 0.9
 
@@ -36,14 +36,14 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     Parameters
     ----------
     result : Result
-        Result of the motion, with `extra["step_runs"]`.
+        Result of the motion, with `motion.step_runs`.
 
     Returns
     -------
     list of StepSetting
         [] if there is no run with fewer steps, if no error exceeds round-off, or if the steps do not limit the accuracy.
     """
-    step_runs = result.extra.get("step_runs", ())
+    step_runs = result.motion.step_runs
     measures = _select_measures(result.measures, step_runs)
     if len(step_runs) < 2 or not measures:
         return []
@@ -71,7 +71,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))
     has_effect = settings[0].error * NO_EFFECT_RATIO >= present
-    return settings if has_effect and present >= ROUND_OFF else []
+    return settings if has_effect and present >= SUM_ROUND_OFF else []
 
 
 def _select_measures(measures: Measures, step_runs) -> Measures:

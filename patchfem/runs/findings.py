@@ -8,9 +8,9 @@ the allowed one therefore needs a resolution that is finer by the factor `excess
 
 from collections.abc import Callable, Mapping
 from math import ceil, floor, log2, log10, pi
-from types import MappingProxyType
 from typing import NamedTuple
 
+from ..core import Measure
 from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
@@ -20,18 +20,18 @@ from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
 from .results.interfaces import Face, merge_findings
-from .results.result import Advice, Finding
+from .results.result import Advice, Finding, Result
 from .rig import costs, engines
 
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
 PROPOSED_TOLERANCE_RATIO = 0.1
 # Largest number of halvings of the time step to which the observed order is extrapolated.
-MAX_HALVINGS = 4
+MAX_EXTRAPOLATED_HALVINGS = 4
 # Fraction of the allowed error that the time steps may have if the other causes alone exceed it.
 MIN_STEP_ERROR_FRACTION = 0.2
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
-MAX_STRIPS = 64
+MAX_PROPOSED_STRIPS = 64
 # Measures whose error is of first order in the width of the strips: the pressure peak of the outermost strip is
 # computed at its centre.
 FIRST_ORDER_MEASURES = (
@@ -56,25 +56,26 @@ class Missed(NamedTuple):
 
     Attributes
     ----------
-    model : Model
-    measures : Mapping
-        All measures of the run or of the interface by name.
+    result : Result
+        Result of the run.
     faces : tuple of Face
         Pressed interfaces of the run, or the one to which the measures belong.
-    extra : Mapping
-        As in `Result.extra`.
     next_seconds : float
         CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    model : Model
+        Model of the run or of the interface.
+    measures : Mapping
+        All measures of the run or of the interface by name.
     excess : Mapping
         Ratio of error to allowed error [1] of each measure that misses the tolerance.
     """
 
+    result: Result
+    faces: tuple[Face, ...]
+    next_seconds: float
     model: Model
-    measures: Mapping
-    faces: tuple
-    extra: Mapping = MappingProxyType({})
-    next_seconds: float = 0.0
-    excess: Mapping = MappingProxyType({})
+    measures: Mapping[str, Measure]
+    excess: Mapping[str, float]
 
     def find_names(self) -> list[str]:
         """Return the measures that a warning names.
@@ -105,38 +106,42 @@ class Missed(NamedTuple):
         return Finding(words, advice)
 
 
-def find_missed_measures(run: Missed) -> list[Finding]:
+def find_missed_measures(
+    result: Result, faces: tuple[Face, ...], next_seconds: float = 0.0
+) -> list[Finding]:
     """Return a finding on the static measures of each interface that miss the tolerance, and one on those of the motion.
 
     Parameters
     ----------
-    run : Missed
-        The run, without `excess`.
+    result : Result
+        Result of the run.
+    faces : tuple of Face
+        Pressed interfaces of the run.
+    next_seconds : float
+        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     """
+    model = result.plan.model
+    measures = result.measures
     excess = {}
-    for name, measure in run.measures.items():
-        # `notes.warn_of_work_check` warns of a larger work check, with its remedy.
+    for name, measure in measures.items():
+        # `notes.LAW_WARNINGS` has a larger work check, with its remedy.
         is_warned_of = name == "work_check" and (measure.value or 0.0) > notes.MAX_WORK_CHECK
-        ratio = min(measure.error_ratio(run.model.accuracy.tolerance), refine.MAX_EXCESS)
+        ratio = min(measure.error_ratio(model.accuracy.tolerance), refine.MAX_ERROR_EXCESS)
         if ratio > 1 and not is_warned_of:
             excess[name] = ratio
 
     def find_on_face(face: Face) -> list[Finding]:
         """Return the findings on one interface, whose measures have no number there."""
-        own = {}
-        missed = {}
-        for name in patch_rows.TABLE:
-            numbered = face.name_measure(name)
-            own[name] = run.measures.get(numbered)
-            if numbered in excess:
-                missed[name] = excess.pop(numbered)
-        own = {name: measure for name, measure in own.items() if measure is not None}
-        on_face = run._replace(model=face.model, measures=own, faces=(face,), excess=missed)
-        return _find_static(on_face) if missed else []
+        numbered = {name: face.name_measure(name) for name in patch_rows.TABLE}
+        own = {name: measures[full] for name, full in numbered.items() if full in measures}
+        missed = {name: excess.pop(full) for name, full in numbered.items() if full in excess}
+        if not missed:
+            return []
+        return _find_static(Missed(result, (face,), next_seconds, face.model, own, missed))
 
-    findings = merge_findings(run.model, run.faces, find_on_face)
+    findings = merge_findings(model, faces, find_on_face)
     if excess:
-        motion = run._replace(excess=excess)
+        motion = Missed(result, faces, next_seconds, model, measures, excess)
         findings.append(motion.make_finding(_advise_on_motion(motion)))
     return findings
 
@@ -171,7 +176,9 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     is_wear_unbounded = "worn_depth_max" in missed.find_names() and peak is not None
     is_wear_unbounded = is_wear_unbounded and peak.value is None
     # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
-    is_zero = max(missed.excess.values()) >= refine.MAX_EXCESS and patch_model.mesh.is_automatic
+    is_zero = (
+        max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic
+    )
     if is_wear_unbounded or is_zero:
         return NO_ADVICE
     if patch_model.mesh.file is None and strips is not None and strips.count > 1:
@@ -193,7 +200,7 @@ def _advise_strips(patch_model, excess: Mapping) -> Advice:
     orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
     ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
     count = ceil(patch_model.interface.strips.count * ratio)
-    if count > MAX_STRIPS:
+    if count > MAX_PROPOSED_STRIPS:
         return NO_ADVICE
     also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
     return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
@@ -259,21 +266,15 @@ def _advise_on_motion(missed: Missed) -> Advice:
     if name == rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
-    harmonics = missed.extra.get("harmonics")
+    harmonics = missed.result.settings.harmonics
     if harmonics is None or name.startswith(SAMPLED_MEASURES):
         return NO_ADVICE
     return notes.advise_harmonics(harmonics, _count_friction_harmonics(missed))
 
 
-def _count_steps(missed: Missed) -> int | None:
-    """Return the number of steps per cycle of a run; None for an engine without steps."""
-    steps = missed.extra.get("steps_per_cycle") or missed.extra.get("steps")
-    return None if steps is None else int(steps)
-
-
 def _advise_steps(missed: Missed) -> Advice | None:
     """Return the advice to use as many steps per cycle as the order of convergence requires."""
-    steps = _count_steps(missed)
+    steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
     model = missed.model
@@ -299,7 +300,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
         allowed = total / missed.excess[name]
         target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
         halvings = max(1, ceil(log2(parts["steps"] / target) / order))
-        if halvings <= MAX_HALVINGS or not can_choose:
+        if halvings <= MAX_EXTRAPOLATED_HALVINGS or not can_choose:
             proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
             return Advice.set_key(STEPS_KEY, proposed)
 
@@ -332,7 +333,7 @@ def _advise_reduced_modes(missed: Missed) -> Advice:
 
 def _advise_shear_modes(missed: Missed) -> Advice | None:
     """Return the advice to use more shear modes of the pieces; None if there are no more."""
-    n_modes = missed.extra["shear_modes"]
+    n_modes = missed.result.settings.shear_modes
     n_nodes = missed.faces[0].patch.x.size
     if n_modes >= n_nodes:
         return None
@@ -369,4 +370,4 @@ def _count_friction_harmonics(missed: Missed) -> float:
     slip = missed.measures.get("slip_amplitude")
     if law is None or slip is None or not law_has_trait(law.law, "creeps"):
         return 0.0
-    return 2 * pi / missed.extra["period"] * slip.value / law.reference_speed
+    return 2 * pi / missed.result.motion.period * slip.value / law.reference_speed

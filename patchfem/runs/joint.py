@@ -27,6 +27,7 @@ from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
 from .patch import mesh_levels, store
 from .patch.jenkins_elements import elements, strip_elements
+from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
 MAX_LOG_FACTOR = 5.0
@@ -74,7 +75,7 @@ def solve_without_joint(model: Model) -> FreeRig:
     return remove_joint(model, solve_patch(model))
 
 
-def solve_patch(model: Model) -> tuple:
+def solve_patch(model: Model) -> Patches:
     """Return the patch of a model on its meshes, from fine to coarse.
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
@@ -215,7 +216,9 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     return total
 
 
-def _match_stiffness(patches: Sequence, stiffness: StickStiffness | None, n_errors: float) -> list:
+def _match_stiffness(
+    patches: Sequence, stiffness: StickStiffness | None, n_errors: float
+) -> list[Patch | None]:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:
         return list(patches)

@@ -1,7 +1,7 @@
 """Memory of a run, the memory that this process may use, and the refusal of runs that need more.
 
 In: a Plan. Out: the contributions to its memory, the free memory, and the reason for a refusal with the scene key to
-change. Small contributions (modes, shear modes, drive) are left out.
+change.
 """
 
 import os
@@ -17,7 +17,10 @@ FIXED_BYTES = 160e6  # packages and compiled code [bytes]
 # Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
 NODE_BYTES = {True: 4.6e3, False: 8.1e3}
 STRIP_NODE_BYTES = 3e3  # per strip and interface node [bytes]
+SHEAR_NODE_BYTES = 24.0  # per shear mode and interface node [bytes]
 SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
+MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
+DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
 HARMONIC_PAIR_BYTES = 94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
 HYBRID_SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
@@ -62,21 +65,34 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     model = plan.model
     points = plan.unknowns.get("interface_points", 0)
     nodes = plan.unknowns.get("elastic_unknowns_about", 0) / 2
+
+    # Pressed are the contact of the scene, and the interfaces of a rig.
+    interfaces = () if model.rig is None else model.rig.friction.interfaces
+    patches = [model.patch, *(interface.patch for interface in interfaces)]
+    patches = [patch for patch in patches if patch is not None]
+    remedy = "make contact.element_size larger"
+    if any(patch.mesh.file for patch in patches):
+        remedy = "give contact.mesh fewer nodes on the interface"
+
     size = NODE_BYTES[model.kind == "patch"] * nodes
     parts = [
         MemoryPart(FIXED_BYTES, "packages and compiled code"),
-        MemoryPart(size, f"{points} nodes of the interface", "make contact.element_size larger"),
+        MemoryPart(size, f"{points} nodes of the interface", remedy),
     ]
-    layers = None if model.patch is None else model.patch.interface.strips
-    if layers is not None:
-        size = STRIP_NODE_BYTES * layers.count * points
-        remedy = "lower contact.strips.count"
-        parts.append(MemoryPart(size, f"{layers.count} strips of them", remedy))
+    layers = [patch.interface.strips for patch in patches]
+    if strips := max((layer.count for layer in layers if layer is not None), default=0):
+        size = STRIP_NODE_BYTES * strips * points
+        parts.append(MemoryPart(size, f"{strips} strips of them", "lower contact.strips.count"))
+    if n_shear := plan.unknowns.get("shear_modes"):
+        size = SHEAR_NODE_BYTES * n_shear * points
+        parts.append(MemoryPart(size, f"{n_shear} shear modes", "lower accuracy.shear_modes"))
 
     # The histories of a motion count by its stored samples, which the scene may set by the steps.
     has_steps = model.accuracy.steps_per_cycle is not None
     if model.slide is not None:
         remedy = f"lower {'accuracy.steps_per_cycle' if has_steps else 'slide.cycles'}"
+        if model.slide.kind == "file":
+            remedy = "give fewer rows in slide.file"
         size = SLIDE_SAMPLE_BYTES * plan.samples
         parts.append(MemoryPart(size, f"{plan.samples} samples of the slide", remedy))
     elif model.rig is not None:
@@ -85,25 +101,36 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
 
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
-    """Return the contributions of histories, bonds and harmonic balance of a rig, whose scene may set the steps."""
+    """Return the contributions of modes, drive, histories, bonds and harmonic balance of a rig.
+
+    has_steps: whether the scene sets the steps per cycle.
+    """
     model = plan.model
     drive = model.rig.drive
     n_interfaces = len(model.rig.friction.interfaces)
+    n_modes = plan.unknowns["modes"]
+    # A drive of segments has breaks too, but no rows of a file.
+    n_rows = 0 if drive.signal.segments else len(getattr(drive.signal, "breaks", ()))
+    shorter = "give fewer rows in drive.file, or lower drive.duration"
+    parts = [
+        MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "give fewer modes"),
+        MemoryPart(DRIVE_ROW_BYTES * n_rows, f"{n_rows} rows of the drive", shorter),
+    ]
     if engines.ENGINES[plan.engine].finds_periodic_motion:
         harmonics = model.accuracy.harmonics or 0
         size = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, n_interfaces)) ** 2
-        return [MemoryPart(size, f"{harmonics} harmonics", "lower accuracy.harmonics")]
+        return [*parts, MemoryPart(size, f"{harmonics} harmonics", "lower accuracy.harmonics")]
 
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = numerics.choose_numerics(model)
     history = HISTORY_BYTES[plan.engine]
     steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_CYCLE
     samples = max(2, settings.window) * steps
-    width = 2.0 * plan.unknowns["modes"] + 12 + 6 * n_interfaces
+    width = 2.0 * n_modes + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
 
-    parts = [
+    parts += [
         MemoryPart(
             history.sample * width * samples,
             f"{samples} samples of the last cycles",
@@ -124,22 +151,46 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
 def free_bytes(process: Path = Path("/proc"), group: Path = Path("/sys/fs/cgroup")) -> float:
     """Return the total memory [bytes] that this process may use; inf if none is known.
 
-    It is the available memory of the system, at most that of the control group (version 2), and what the process uses.
+    It is the available memory of the system, at most that of the control groups (version 2) that contain the process,
+    and what the process uses.
 
     Parameters
     ----------
     process : Path
         Folder with the state of the system and of its processes.
     group : Path
-        Folder of the control group.
+        Folder of the outermost control group.
     """
     free = 1024 * _read_number(process / "meminfo", "MemAvailable:")
     used = _read_number(process / "self/statm", place=1) * os.sysconf("SC_PAGE_SIZE")
-    cached = _read_number(group / "memory.stat", "inactive_file")
-    allowed = _read_number(group / "memory.max") - _read_number(group / "memory.current") + cached
+    allowed = [_read_allowed(folder) for folder in _list_groups(process, group)]
     # An unknown number is not finite.
-    known = [total for total in (free, allowed) if total < float("inf")]
+    known = [total for total in (free, *allowed) if total < float("inf")]
     return min(known, default=float("inf")) + (used if used < float("inf") else 0.0)
+
+
+def _list_groups(process: Path, group: Path) -> list[Path]:
+    """Return the folders of the outermost control group and of those within it that contain the process.
+
+    The limit of each of them holds for all that it contains.
+    """
+    try:
+        lines = (process / "self/cgroup").read_text("utf-8").splitlines()
+    except (OSError, ValueError):
+        lines = []
+    folders = [group]
+    for line in lines:
+        # A line of version 2 is 0::/PATH.
+        if line.startswith("0::/"):
+            for name in line.removeprefix("0::/").split("/"):
+                folders.append(folders[-1] / name)
+    return folders
+
+
+def _read_allowed(group: Path) -> float:
+    """Return the memory [bytes] that a control group has left, with the cache of files; inf or nan if there is no limit."""
+    cached = _read_number(group / "memory.stat", "inactive_file")
+    return _read_number(group / "memory.max") - _read_number(group / "memory.current") + cached
 
 
 def _read_number(path: Path, name: str = "", place: int = 0) -> float:

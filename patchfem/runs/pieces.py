@@ -11,7 +11,7 @@ import numpy as np
 from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
-from .patch.strength import YIELDING_NEGLECTED, min_von_mises_ratio, yield_strength
+from .patch.strength import YIELDING_NEGLECTED, Strength, min_von_mises_ratio, yield_strength
 from .results.patch_rows import Arrays
 from .results.result import patch_surface
 
@@ -204,12 +204,12 @@ def add_yielding_notes(result, pieces: Pieces) -> None:
     min_peak = peak.value - (peak.error or 0.0) if has_peak else 0.0
     faces = result.yielding_faces
     yielding = faces | find_yielding(result.plan.model.patch, pieces, min_peak)
-    notes = result.extra.setdefault("notes", [])
+    notes = result.notes
     notes[:] = [text for text in notes if text not in faces.values()]
     notes += [text for text in yielding.values() if text not in notes]
 
 
-def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
+def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[Strength, str]:
     """Find the materials whose von Mises stress exceeds their yield strength in any frame.
 
     Parameters
@@ -253,8 +253,10 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
     return {strength: _describe_yielding(strength, places[strength]) for strength in places}
 
 
-def _describe_yielding(strength, places: list) -> str:
-    """Return the note on a material that yields, with its largest stress and the position."""
+def _describe_yielding(
+    strength: Strength, places: list[tuple[float, str, tuple[float, float]]]
+) -> str:
+    """Return the note on a material that yields, from (stress [Pa], side, x and y [m]) of each piece."""
     stress, side, (x, y) = max(places, key=lambda place: place[0])
     both = "; the other piece exceeds its yield strength too" * (len(places) > 1)
     return (

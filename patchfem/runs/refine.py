@@ -1,99 +1,207 @@
-"""Refinement of a run until its main measures meet the tolerance.
+"""Refinement of a run until its measures meet the tolerance.
 
-In: the result of a pass of a run. Out: the model of the next pass, or the time that it would need. A pass is repeated
-with twice the resolution along the axis with the largest share of the error of the worst main measure: the meshes of
-the patches, or the steps of a bench. The steps of a rig are refined within a pass (`rig.run_refined`). A run that would
-not meet its tolerance within accuracy.max_seconds is not repeated.
+In: a function that solves a problem with a resolution, and one that judges the solution. `refine` is the only loop: each
+pass has twice the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the
+patches or the steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its
+tolerance within accuracy.max_seconds is not repeated.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import ceil, log
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ..core import Outcome
+from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..model.model import Model
 from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import TABLE as PATCH_TABLE
-from .results.patch_rows import Measures
+from .results.patch_rows import Measures, Values
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
-MIN_GAIN = 1.5
-MAX_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
+MIN_ERROR_GAIN = 1.5
+MIN_SHARE = 0.5  # Smallest share of an axis in an error that its refinement reduces noticeably.
+MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
 MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.
 FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
+Resolution = TypeVar("Resolution")
+Solution = TypeVar("Solution")
 
 
-class Pass(NamedTuple):
-    """Pass of a run, and what the next one would be.
+class Verdict(NamedTuple):
+    """Whether a solution is refined.
 
-    - excess: largest ratio of error to allowed error of the main measures.
-    - model: model of the next pass, or None.
+    - excess: largest ratio of error to allowed error of the measures that a finer resolution improves.
+    - finer: next resolution, or None.
     - seconds: CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     - reason: why another pass follows, and its resolution; "" without one.
     """
 
     excess: float
-    model: Model | None = None
+    finer: object = None
     seconds: float = 0.0
     reason: str = ""
 
 
-def judge_pass(
-    given: Model, result, seconds: float, total_seconds: float, before: Pass | None
-) -> Pass:
-    """Decide whether a run needs another pass.
+class WorstMeasure(NamedTuple):
+    """Measure that misses its tolerance most, of those that a finer resolution improves.
+
+    - excess: ratio of error to allowed error; 0 if there is no such measure.
+    - name: name of the measure.
+    - axis: axis to refine.
+    """
+
+    excess: float = 0.0
+    name: str = ""
+    axis: str = ""
+
+
+def refine(
+    solve: Callable[[Resolution, Solution | None], Solution | None],
+    resolution: Resolution,
+    judge: Callable[[Solution, list[float]], Verdict],
+) -> Solution:
+    """Solve a problem with finer and finer resolutions, and return the last solution.
+
+    Parameters
+    ----------
+    solve : callable
+        Function of a resolution and of the solution before, None for the first one. It returns None if it has no better
+        solution.
+    resolution : object
+        First resolution.
+    judge : callable
+        Function of a solution and of the excesses of all solutions before.
+    """
+    solution = None
+    excesses: list[float] = []
+    while resolution is not None:
+        finer = solve(resolution, solution)
+        if finer is None:
+            break
+        solution = finer
+        verdict = judge(solution, excesses)
+        excesses.append(verdict.excess)
+        resolution = verdict.finer
+    return solution
+
+
+def split_error(measure: Measure, name: str) -> Values:
+    """Return the contributions to the error of a measure by axis; that of a static measure is the mesh."""
+    if name in PATCH_TABLE:
+        return {"mesh": measure.error or 0.0}
+    return {} if measure.causes is None else measure.causes.parts
+
+
+def find_axis(measure: Measure, name: str) -> str:
+    """Return the axis with the largest share of the error of a measure, such as "mesh"; "own" if none is known."""
+    parts = split_error(measure, name)
+    axis = max(parts, key=parts.get, default="own")
+    return axis if parts.get(axis, 0.0) > 0 else "own"
+
+
+def find_refinable_axis(measure: Measure, name: str, tolerance: float, axes: Iterable[str]) -> str:
+    """Return the axis along which a finer resolution improves a measure that misses its tolerance; "" if there is none.
+
+    It has most of the error, or the other contributions alone are within the tolerance.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure with an error.
+    name : str
+        Its name.
+    tolerance : float
+        Relative tolerance.
+    axes : iterable of str
+        Axes that can be refined.
+    """
+    parts = split_error(measure, name)
+    allowed = measure.error / measure.error_ratio(tolerance)
+    for axis in sorted(axes, key=lambda axis: -parts.get(axis, 0.0)):
+        part = parts.get(axis, 0.0)
+        if part > MIN_SHARE * measure.error or (part > 0 and measure.error - part <= allowed):
+            return axis
+    return ""
+
+
+def find_worst_measure(measures: Measures, tolerance: float, axes: Iterable[str]) -> WorstMeasure:
+    """Return the measure that misses its tolerance most, of those that a finer resolution along some axes improves.
+
+    Parameters
+    ----------
+    measures : dict of str to Measure
+        Measures by name that count.
+    tolerance : float
+        Relative tolerance.
+    axes : iterable of str
+        Axes that can be refined.
+    """
+    worst = WorstMeasure()
+    for name, measure in measures.items():
+        excess = min(measure.error_ratio(tolerance), MAX_ERROR_EXCESS)
+        if excess > max(worst.excess, 1.0):
+            axis = find_refinable_axis(measure, name, tolerance, axes)
+            if axis:
+                worst = WorstMeasure(excess, name, axis)
+    return worst
+
+
+def judge_pass(given: Model, done, total_seconds: float, excesses: list[float]) -> Verdict:
+    """Decide whether a run needs another pass with finer meshes or more steps.
 
     Parameters
     ----------
     given : Model
         Model of the first pass, with the settings that the scene fixes.
-    result : Result
-        Result of this pass, with errors.
-    seconds, total_seconds : float
-        CPU times [s] of this pass and of all passes.
-    before : Pass or None
-        Pass before this one.
+    done : run.FinishedPass
+        The last pass.
+    total_seconds : float
+        CPU time [s] of all passes.
+    excesses : list of float
+        Excesses of the passes before.
     """
-    model = given if before is None else before.model
-    name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
-    if excess <= 1 or result.outcome in FAILED_OUTCOMES:
-        return Pass(excess)
-    if before is not None and excess * MIN_GAIN > before.excess:
-        return Pass(excess)
-
-    # A pass is repeated only along the axis whose error is largest, and only if the run chose it.
-    axis = find_axis(result.measures[name], name)
-    finer = None
-    if axis in list_repeated_axes(
+    model = done.model
+    result = done.result
+    if result.outcome in FAILED_OUTCOMES:
+        return Verdict(0.0)
+    axes = list_repeated_axes(
         model.kind,
         has_wear=model.wear is not None,
-        has_automatic_mesh=not _is_on_points(result, name),
+        has_automatic_mesh=refine_meshes(model) is not None,
         has_fixed_steps=given.accuracy.steps_per_cycle is not None,
-    ):
-        finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
+    )
+    main = {name: one for name, one in result.measures.items() if is_main(name)}
+    if result.patch is not None and result.patch.points is not None:
+        # The mesh has no effect on static measures at the points of a profile.
+        main = {name: one for name, one in main.items() if name not in PATCH_TABLE}
+    excess, name, axis = find_worst_measure(main, model.accuracy.tolerance, axes)
+    if not axis or (excesses and excess * MIN_ERROR_GAIN > excesses[-1]):
+        return Verdict(excess)
 
     # Each further pass divides the error by ERROR_RATIO and multiplies the time by COST_RATIO.
-    n_passes = ceil(log(excess) / log(ERROR_RATIO))
-    expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
+    finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     if finer is None:
-        return Pass(excess)
+        return Verdict(excess)
+    n_passes = ceil(log(excess) / log(ERROR_RATIO))
+    growth = sum(COST_RATIO**k for k in range(1, n_passes + 1))
+    expected = total_seconds + done.seconds * growth
     if expected > (model.accuracy.max_seconds or MAX_SECONDS):
-        return Pass(excess, None, expected)
+        return Verdict(excess, seconds=expected)
 
     resolution = "half the element size" if axis == "mesh" else "twice the steps"
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
     )
-    return Pass(excess, finer, reason=reason)
+    return Verdict(excess, finer, reason=reason)
 
 
 def bound_errors(measures: Measures, before: Measures) -> Measures:
@@ -112,15 +220,14 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
         earlier = before.get(name)
         if measure.error is None or earlier is None or earlier.error is None:
             continue
-        error = max(measure.error, earlier.error / ERROR_RATIO)
+        error = earlier.error / ERROR_RATIO
         if error > measure.error and np.isfinite(error):
-            bounded[name] = replace(measure, error=error)
+            causes = measure.causes
+            if earlier.causes is not None:
+                parts = {axis: one / ERROR_RATIO for axis, one in earlier.causes.parts.items()}
+                causes = causes._replace(parts=parts)
+            bounded[name] = replace(measure, error=error, causes=causes)
     return bounded
-
-
-def _is_on_points(result, name: str) -> bool:
-    """Return whether a static measure is computed at the points of a profile, so that the mesh has no effect on it."""
-    return name in PATCH_TABLE and result.patch is not None and result.patch.points is not None
 
 
 def is_main(name: str) -> bool:
@@ -129,28 +236,9 @@ def is_main(name: str) -> bool:
     return row is not None and row.has("main")
 
 
-def find_worst_measure(measures: Measures, tolerance: float) -> tuple[str, float]:
-    """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
-    found = filter(is_main, measures)
-    ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
-    worst = max(ratios, key=ratios.get, default="")
-    return worst, ratios.get(worst, 0.0)
-
-
-def find_axis(measure, name: str) -> str:
-    """Return the axis with the largest share of the error of a measure, such as "mesh"; "own" if none is known."""
-    if name in PATCH_TABLE:
-        return "mesh"
-    if measure.causes is None:
-        return "own"
-    parts = measure.causes.parts
-    axis = max(parts, key=parts.get, default="own")
-    return axis if parts.get(axis, 0.0) > 0 else "own"
-
-
 def _refine_steps(model: Model, result) -> Model | None:
     """Return the model of a bench with twice the steps per cycle of a result; None if there are too many."""
-    steps = result.extra["steps"]
+    steps = result.settings.steps_per_cycle
     if 2 * steps > MAX_BENCH_STEPS:
         return None
     accuracy = model.accuracy.model_copy(update={"steps_per_cycle": 2 * steps})

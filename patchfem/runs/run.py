@@ -7,7 +7,6 @@ import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from itertools import count
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import NamedTuple
@@ -21,7 +20,7 @@ from ..points import checkpoint
 from . import joint, memory, refine
 from .balances import mark_unbalanced
 from .bench import result as bench_result
-from .findings import Missed, find_missed_measures
+from .findings import find_missed_measures
 from .patch import faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
@@ -32,7 +31,7 @@ from .rig import engines, rig
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
-NO_MOTION = "no friction acts and no motion was computed"
+NO_FRICTION_MESSAGE = "no friction acts and no motion was computed"
 NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed patch at rest"
 
 
@@ -47,6 +46,21 @@ class StateFile(NamedTuple):
     path: Path
     version: str
     resume: bool
+
+
+class FinishedPass(NamedTuple):
+    """Result of a pass of a run with one resolution, and what its warnings and the next pass need.
+
+    - model: Model whose meshes and steps are those of the pass.
+    - result: Result.
+    - pressed: pressed interfaces.
+    - seconds: CPU time of the pass [s].
+    """
+
+    model: Model
+    result: Result
+    pressed: tuple[Face, ...]
+    seconds: float
 
 
 def run(
@@ -90,140 +104,195 @@ def run(
         memory.refuse_insufficient_memory(runnable)
         if fresh:
             store.clear_cache()
+
+        start = perf_counter()
+        passes = _Passes(runnable, say, progress, state_file, estimate=estimate)
+        done = refine.refine(passes.solve, runnable.model, passes.judge)
+        done.result.seconds["total"] = perf_counter() - start
+        return _complete_result(done, passes.next_seconds)
+
+
+class _Passes:
+    """Passes of a run, each with finer meshes or more steps than the one before.
+
+    Parameters
+    ----------
+    run_plan : Plan
+        Plan of the first pass.
+    say, progress, state_file, estimate
+        Options of `run`.
+
+    Attributes
+    ----------
+    next_seconds : float
+        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    """
+
+    def __init__(self, run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate):
+        self.plan = run_plan
+        self.say = say
+        self.progress = progress
+        self.state_file = state_file
+        self.estimate = estimate
+        self.next_seconds = 0.0
+        self._count = 0
+        self._begin = process_time()
+
+    def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
+        """Run a model after an earlier pass, None for the first one; return None if it cannot improve the earlier pass."""
         begin = process_time()
+        seconds = {}
+        try:
+            result, pressed = self._run_model(model, seconds)
+        except (NotConverged, Missing):
+            if earlier is None:
+                raise
+            return None
 
-        # Each pass refines the model by the errors of the pass before, until it meets the tolerance
-        # or cannot improve.
-        earlier = passed = None
-        next_plan = runnable
-        for n_before in count():
-            begin_pass = process_time()
-            try:
-                done = _run_pass(next_plan, say, progress, state_file, n_before, estimate=estimate)
-            except (NotConverged, Missing):
-                if earlier is None:
-                    raise
-                return _complete_result(earlier, passed)
+        if earlier is not None:
+            if result.outcome is Outcome.NOT_CONVERGED:
+                return None
+            bounded = refine.bound_errors(result.measures, earlier.result.measures)
+            result = replace(result, measures=bounded)
+        self._count += 1
+        return FinishedPass(model, result, pressed, process_time() - begin)
 
-            if not estimate:
-                return _complete_result(done, None)
-            if earlier is not None:
-                if done.result.outcome is Outcome.NOT_CONVERGED:
-                    return _complete_result(earlier, passed)
-                bounded = refine.bound_errors(done.result.measures, earlier.result.measures)
-                done = done._replace(result=replace(done.result, measures=bounded))
+    def judge(self, done: FinishedPass, excesses: list[float]) -> refine.Verdict:
+        """Decide whether a pass is followed by another one.
 
-            end = process_time()
-            passed = refine.judge_pass(
-                runnable.model, done.result, end - begin_pass, end - begin, passed
-            )
-            if passed.model is None:
-                return _complete_result(done, passed)
-            if say is not None:
-                say(passed.reason)
-            earlier = done
-            next_plan = replace(runnable, model=passed.model)
+        Parameters
+        ----------
+        done : FinishedPass
+            The last pass.
+        excesses : list of float
+            Ratios of error to allowed error of the passes before.
+        """
+        if not self.estimate:
+            return refine.Verdict(0.0)
+        total = process_time() - self._begin
+        verdict = refine.judge_pass(self.plan.model, done, total, excesses)
+        self.next_seconds = verdict.seconds
+        if self.say is not None and verdict.reason:
+            self.say(verdict.reason)
+        return verdict
 
+    def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[Face, ...]]:
+        """Press the interfaces of a model, wear them, and compute its motion; return the result and the interfaces.
 
-class FinishedPass(NamedTuple):
-    """Result of a pass of a run, and what its warnings need.
+        A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step.
+        """
+        start = perf_counter()
+        run_plan = replace(self.plan, model=model)
+        warnings = list(model.source.remarks)
+        notes = list(model.source.notes)
+        if model.rig is not None:
+            warnings += engines.describe_unused_settings(model, run_plan.engine)
 
-    - result: Result.
-    - notes: sentences on the scene and the patch.
-    - start: start time of the pass [s].
-    - pressed: pressed interfaces.
-    """
+        pressed = _press_interfaces(model, estimate=self.estimate)
+        if pressed:
+            seconds["contact"] = perf_counter() - start
+        stiffer = None
+        if model.has_bolted_patch:
+            # The table [contact] is the only interface then.
+            model, patches, stiffer = joint.remove_joint(model, pressed[0].patches)
+            pressed = (pressed[0]._replace(model=model, patches=tuple(patches)),)
+            run_plan = replace(run_plan, model=model)
 
-    result: Result
-    notes: list[str]
-    start: float
-    pressed: tuple[Face, ...]
-
-
-def _run_pass(
-    run_plan: Plan, say, progress, state_file: StateFile | None, n_before: int, *, estimate: bool
-) -> FinishedPass:
-    """Run a plan once, after a number of coarser passes.
-
-    The order is: pressed interfaces, wear, then the motion or the static result, and finally static measures,
-    balances and warnings. A patch without contact and a rig without load have a result at once.
-    """
-    start = perf_counter()
-    model = run_plan.model
-    seconds = {}
-    warnings = list(model.source.remarks)
-    notes = list(model.source.notes)
-    if model.rig is not None:
-        warnings += engines.describe_unused_settings(model, run_plan.engine)
-
-    pressed = _press_interfaces(model, estimate=estimate)
-    if pressed:
-        seconds["contact"] = perf_counter() - start
-    # The table [contact] is the only interface then.
-    contact = pressed[0] if model.patch is not None else None
-    stiffer = None
-    if contact is not None and model.has_bolted_patch:
-        model, patches, stiffer = joint.remove_joint(model, contact.patches)
-        contact = contact._replace(model=model, patches=tuple(patches))
-        pressed = (contact,)
-        run_plan = replace(run_plan, model=model)
-
-    # Sentences on the static contact; those of several interfaces are merged.
-    warnings += merge_sentences(model, pressed, partial(_warn_of_pressed_patch, estimate=estimate))
-    if pressed:
+        # Sentences on the static contact; those of several interfaces are merged.
+        warn = partial(_warn_of_pressed_patch, estimate=self.estimate)
+        warnings += merge_sentences(model, pressed, warn)
         notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
-    notes += model.describe_removed_joint()
-    patch, *coarse = (None, None, None) if contact is None else contact.patches
-    inputs = RunInputs(
-        run_plan, patch, tuple(coarse), seconds, warnings, say, progress, estimate, stiffer, pressed
-    )
+        notes += model.describe_removed_joint()
+        inputs = RunInputs(
+            run_plan,
+            pressed,
+            seconds,
+            warnings,
+            notes,
+            self.say,
+            self.progress,
+            self.estimate,
+            stiffer,
+        )
 
-    if _is_open(patch) and model.kind != "patch":
-        result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))
-    elif _has_no_load(model):
-        result = _make_result_without_load(inputs)
-    else:
+        if _is_open(inputs.patch) and model.kind != "patch":
+            warnings.append(NO_FRICTION_MESSAGE)
+            result = patch_result.make_static_result(inputs)
+        elif _has_no_load(model):
+            result = _make_result_without_load(inputs)
+        else:
+            result, pressed = self._move(inputs)
+        return mark_unbalanced(result), pressed
+
+    def _move(self, inputs: RunInputs) -> tuple[Result, tuple[Face, ...]]:
+        """Wear the patch of a run and compute its motion; return the result and the worn interfaces."""
+        run_plan = inputs.plan
         worn_patch = None
-        if model.wear is not None and patch is not None:
-            worn_patch = _wear_patch(inputs, state_file)
-            worn = (worn_patch.patch, *worn_patch.coarse)
-            pressed = (contact._replace(patches=worn, unworn=contact.patches),)
-            inputs = _make_worn_inputs(replace(inputs, faces=pressed), worn_patch)
+        moved = inputs
+        if run_plan.model.wear is not None and inputs.patch is not None:
+            worn_patch = self._wear_patch(inputs)
+            moved = _make_worn_inputs(inputs, worn_patch)
 
         # A long run saves its state, so that it can be resumed.
         try:
-            with _saving_context(state_file, run_plan, inputs.patch, n_before):
+            with self._saving_context(run_plan, moved.patch):
                 if run_plan.kind == "patch":
-                    result = patch_result.make_static_result(inputs)
+                    result = patch_result.make_static_result(moved)
                 elif run_plan.kind == "bench":
-                    result = bench_result.run_prescribed(inputs)
+                    result = bench_result.run_prescribed(moved)
                 else:
-                    result = rig.run_rig(inputs)
+                    result = rig.run_rig(moved)
         except NotConverged as error:
-            if contact is not None and run_plan.kind != "patch":
-                at_rest = patch_result.make_static_result(
-                    replace(inputs, plan=run_plan, warnings=[*warnings, NO_MOTION_FOUND])
-                )
-                at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
-                unmoved = (pressed[0]._replace(static=(), unworn=()),)
-                error.partial_result = _complete_result(
-                    FinishedPass(at_rest, notes, start, unmoved), None
-                )
+            if moved.patch is not None and run_plan.kind != "patch":
+                error.partial_result = _make_result_at_rest(moved, run_plan)
             raise
 
-        # Static measures come first, and fields of the interfaces and wear follow the motion.
-        if pressed and model.kind != "patch":
-            static = _collect_static_measures(pressed)
-            motion = {name: m for name, m in result.measures.items() if name not in static}
-            result = replace(result, measures=static | motion)
-        if model.has_interface_patches:
-            frames = faces.add_slip_fields(model, pressed, result.extra.get("shots", ()))
-            result = replace(result, faces=frames)
-        if model.wear is not None:
+        # Static measures come first, and those of wear last.
+        if run_plan.kind != "patch":
+            result = _add_static_measures(result, moved.faces)
+        if run_plan.model.wear is not None:
             result = measures.add_wear_measures(
-                replace(result, plan=run_plan), worn_patch, estimate
+                replace(result, plan=run_plan), worn_patch, self.estimate
             )
-    return FinishedPass(mark_unbalanced(result), notes, start, pressed)
+        return result, moved.faces
+
+    def _wear_patch(self, inputs: RunInputs) -> evolve.WornPatch:
+        """Compute the wear of a patch, continuing from a saved state if there is one."""
+        model = inputs.plan.model
+        file = self.state_file
+        key = file and hash_run(model, inputs.patch, file.version)
+        return evolve.compute_and_save_wear(
+            file, key, model, inputs.patch, inputs.coarse[:2], inputs.progress
+        )
+
+    def _saving_context(self, run_plan: Plan, patch):
+        """Return a context in which marches save their states; one that does nothing without them.
+
+        Raises
+        ------
+        PatchfemError
+            If the run should continue from a state that does not exist.
+        """
+        file = self.state_file
+        if file is None or not is_march(run_plan):
+            return nullcontext()
+
+        # The states of earlier passes remain.
+        stem = f"march_{self._count + 1}" if self._count else "march"
+
+        def march_state_path(number: int) -> Path:
+            """Return the path of the state file of one march."""
+            return file.path.parent / f"{stem}_{number}.npz"
+
+        model = run_plan.model
+        is_missing = not self._count and model.wear is None and not march_state_path(1).is_file()
+        if file.resume and is_missing:
+            raise evolve.make_missing_state_error(file.path)
+        return checkpoint.store_checkpoints(
+            checkpoint.CheckpointFiles(
+                march_state_path, hash_run(model, patch, file.version), file.resume
+            )
+        )
 
 
 def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
@@ -241,14 +310,15 @@ def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     return (Face(0, "", model, patches, static=static),)
 
 
-def _collect_static_measures(pressed: tuple[Face, ...]) -> Measures:
-    """Return the static measures of interfaces by name, with error estimates."""
-    measures = {}
+def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
+    """Return a Result with the static measures of interfaces before those of the motion."""
+    static: Measures = {}
     for face in pressed:
         patch, *coarse = face.static or face.patches
         for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
-            measures[face.name_measure(name)] = measure
-    return measures
+            static[face.name_measure(name)] = measure
+    motion = {name: m for name, m in result.measures.items() if name not in static}
+    return replace(result, measures=static | motion)
 
 
 def _is_open(patch) -> bool:
@@ -264,31 +334,29 @@ def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
 
 def _make_result_without_load(inputs: RunInputs) -> Result:
     """Return the Result of a rig whose interfaces carry no load."""
-    return Result(
-        plan=inputs.plan,
-        outcome=Outcome.NO_CONTACT,
-        measures={"normal_load": Measure(0.0, "N", 0.0)},
-        response=None,
-        window=None,
-        patch=None,
-        fields={},
-        seconds=inputs.seconds,
-        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_MOTION],
-        extra={},
+    result = Result(
+        inputs.plan,
+        Outcome.NO_CONTACT,
+        {"normal_load": Measure(0.0, "N", 0.0)},
+        inputs.seconds,
+        [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
+        inputs.notes,
+        faces=faces.add_slip_fields(inputs.plan.model, inputs.faces, ()),
     )
+    return _add_static_measures(result, inputs.faces)
 
 
-def _wear_patch(inputs: RunInputs, state_file: StateFile | None):
-    """Compute the wear of a patch, continuing from a saved state if there is one."""
-    model = inputs.plan.model
-    patch = inputs.patch
-    key = state_file and hash_run(model, patch, state_file.version)
-    return evolve.compute_and_save_wear(
-        state_file, key, model, patch, inputs.coarse[:2], inputs.progress
-    )
+def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
+    """Return the Result of a pressed patch whose motion was not found."""
+    warnings = [*inputs.warnings, NO_MOTION_FOUND]
+    result = patch_result.make_static_result(replace(inputs, plan=run_plan, warnings=warnings))
+    result = replace(result, outcome=Outcome.NOT_CONVERGED)
+    inputs.seconds["total"] = sum(inputs.seconds.values())
+    unmoved = (inputs.faces[0]._replace(static=(), unworn=()),)
+    return _complete_result(FinishedPass(run_plan.model, result, unmoved, 0.0))
 
 
-def _make_worn_inputs(inputs: RunInputs, worn_patch) -> RunInputs:
+def _make_worn_inputs(inputs: RunInputs, worn_patch: evolve.WornPatch) -> RunInputs:
     """Return the inputs of a run with worn surfaces."""
 
     def wear_model(model: Model) -> Model:
@@ -301,43 +369,40 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch) -> RunInputs:
     if stiffer is not None:
         # The comparison run differs only in the joint that was subtracted from its modes.
         stiffer = stiffer._replace(model=wear_model(stiffer.model), patches=[worn_patch.patch])
+    (face,) = inputs.faces
+    worn = (worn_patch.patch, *worn_patch.coarse)
     return replace(
         inputs,
         plan=replace(inputs.plan, model=wear_model(inputs.plan.model)),
-        patch=worn_patch.patch,
-        coarse=tuple(worn_patch.coarse),
+        faces=(face._replace(patches=worn, unworn=face.patches),),
         progress=None,
         stiffer=stiffer,
     )
 
 
-def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
-    """Add CPU time, notes, accuracy warnings and definitions of the measures to a Result.
+def _complete_result(done: FinishedPass, next_seconds: float = 0.0) -> Result:
+    """Add accuracy warnings, notes on yielding, and definitions of the measures to a Result.
 
     Parameters
     ----------
     done : FinishedPass
-        Result of the last pass that counts, and its notes.
-    passed : refine.Pass or None
-        Why no further pass follows; None for a run without errors.
+        The last pass that counts.
+    next_seconds : float
+        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     """
-    result, notes, start, pressed = done
+    result = done.result
     model = result.plan.model
-    result.seconds["total"] = perf_counter() - start
 
     # What misses the tolerance, with advice by cause.
-    next_seconds = 0.0 if passed is None else passed.seconds
-    missed = Missed(model, result.measures, pressed, result.extra, next_seconds)
-    findings = tuple(find_missed_measures(missed))
+    findings = tuple(find_missed_measures(result, done.pressed, next_seconds))
     warnings = [*result.warnings, *(finding.sentence for finding in findings)]
-    notes = [*notes, *result.extra.get("notes", [])]
 
-    yielding_faces = _note_on_yielding_faces(result)
     outcome = result.outcome
     if outcome is Outcome.DONE and find_unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
     path = model.source.path
-    notes = [*shorten_file_names(notes, path), *yielding_faces.values()]
+    yielding_faces = _note_on_yielding_faces(result)
+    notes = [*shorten_file_names(result.notes, path), *yielding_faces.values()]
 
     patch = result.patch
     if patch is not None:
@@ -354,48 +419,19 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
         patch=patch,
         measures=described,
         warnings=shorten_file_names(warnings, path),
-        extra=result.extra | {"notes": notes},
+        notes=notes,
         findings=findings,
         yielding_faces=yielding_faces,
     )
 
 
-def _note_on_yielding_faces(result: Result) -> dict:
+def _note_on_yielding_faces(result: Result) -> "dict[strength.Strength, str]":
     """Return notes on surfaces that yield at the pressure peak minus its error."""
     peak = result.measures.get("pressure_peak")
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:
         return {}
     return strength.note_on_yielding_faces(patch_model, peak.value - (peak.error or 0.0))
-
-
-def _saving_context(state_file: StateFile | None, run_plan: Plan, patch, n_before: int):
-    """Return a context in which marches save their states; one that does nothing without them.
-
-    `n_before` is the number of earlier passes, whose states remain.
-
-    Raises
-    ------
-    PatchfemError
-        If the run should continue from a state that does not exist.
-    """
-    model = run_plan.model
-    if state_file is None or not is_march(run_plan):
-        return nullcontext()
-
-    def march_state_path(number: int) -> Path:
-        """Return the path of the state file of one march."""
-        name = f"march_{number}.npz" if n_before == 0 else f"march_{n_before + 1}_{number}.npz"
-        return state_file.path.parent / name
-
-    is_missing = n_before == 0 and model.wear is None and not march_state_path(1).is_file()
-    if state_file.resume and is_missing:
-        raise evolve.make_missing_state_error(state_file.path)
-    return checkpoint.store_checkpoints(
-        checkpoint.CheckpointFiles(
-            march_state_path, hash_run(model, patch, state_file.version), state_file.resume
-        )
-    )
 
 
 def hash_run(model, patch, version: str) -> str:
@@ -431,7 +467,7 @@ def is_march(run_plan: Plan) -> bool:
     if run_plan.model.rig is None:
         return False
 
-    return engines.ENGINES[run_plan.engine].saves_state
+    return engines.ENGINES[run_plan.engine].has_steps
 
 
 def _has_no_load(model: Model) -> bool:

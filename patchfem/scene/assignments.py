@@ -13,13 +13,14 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, NamedTuple, get_origin
+from typing import NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
 from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
 from .keys.removed import describe_removed
 from .keys.types import Key, list_keys, list_required_keys
+from .keys.values import TomlTable, TomlValue
 from .lines import split_assignment, split_key
 from .reader import is_toml, read_set_value
 from .suggestions import require_key
@@ -172,7 +173,7 @@ def read_assignments(
     return given, mistakes
 
 
-def read_table(table: Any) -> tuple[list[Axis], list[tuple[str, str]]]:
+def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:
     """Return the axes of a table [sweep] read from TOML, and (key, sentence) for each of its mistakes."""
     if not isinstance(table, dict) or not table:
         example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
@@ -276,7 +277,11 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
 
 
 def _append_values(
-    given: list, mistakes: list[str], name: str, assignment: tuple[str, str], form: Form
+    given: list[Axis | Range],
+    mistakes: list[str],
+    name: str,
+    assignment: tuple[str, str],
+    form: Form,
 ) -> None:
     """Read the values of a key, and append them to `given`, or the mistake in them after `name` to `mistakes`."""
     try:
@@ -410,7 +415,7 @@ def _is_log(low: float, high: float, spacing: str | None) -> bool:
     return spacing == "log"
 
 
-def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
+def _flatten_table(table: TomlTable, table_key: str = "") -> list[tuple[str, TomlValue]]:
     """Return (dotted key, value) for a table whose keys may be dotted or quoted."""
     pairs = []
     for key, value in table.items():

@@ -7,10 +7,11 @@ of a scene, adds the [drive] that a rig must have, and writes given or assumed m
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..exceptions import PatchfemError
 from .keys.quantities import format_si, parse_quantity, read_percentage
+from .keys.values import TomlTable
 
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
@@ -87,7 +88,7 @@ def _parse_ratio(value) -> float:
         raise ValueError(f"{value!r} is neither a number nor a percentage such as '1 %'") from None
 
 
-def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:
+def _write_mode(number: int, mode: GivenMode) -> TomlTable:
     """Return the table [[structure.mode]] of a mode; `number` counts from 0."""
     name = MODE_NAMES[number] if number < len(MODE_NAMES) else f"mode-{number + 1}"
     return {
@@ -129,7 +130,7 @@ class BackboneTables:
         self.assumes_mass = False
         self.ignored: list[str] = []
 
-    def __call__(self, raw: dict[str, Any]) -> None:
+    def __call__(self, raw: TomlTable) -> None:
         """Change the raw values of a scene."""
         self.ignored = [name for name in ("slide", "drive") if name in raw]
         raw.pop("slide", None)
@@ -143,7 +144,7 @@ class BackboneTables:
         if "structure" in raw:
             raw["drive"] = dict(UNUSED_DRIVE)
 
-    def _write_modes(self, raw: dict[str, Any]) -> None:
+    def _write_modes(self, raw: TomlTable) -> None:
         """Write the modes into [structure]."""
         structure = raw.setdefault("structure", {})
         if not isinstance(structure, dict) or (STRUCTURES - {"mode"}) & structure.keys():

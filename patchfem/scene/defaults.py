@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from .keys import tables
 from .keys.choices import find_choices
 from .keys.contact import Contact
 from .keys.memoize import memoize
-from .keys.types import Table, list_keys
+from .keys.types import KeyValue, Table, list_keys
 from .rules.accuracy import find_unused_settings
 from .rules.friction import find_unused_law_keys
 from .rules.methods import list_unused_methods
@@ -42,7 +40,7 @@ def complete_table(table: Table) -> Table:
     return table.model_copy(update=changed) if changed else table
 
 
-def _complete_inner_tables(table: Table) -> dict[str, Any]:
+def _complete_inner_tables(table: Table) -> dict[str, KeyValue]:
     """Return the tables inside a table that differ after their completion, by attribute."""
     changed = {}
     for key in list_keys(type(table)).values():
@@ -58,7 +56,7 @@ def _complete_inner_tables(table: Table) -> dict[str, Any]:
     return changed
 
 
-def _list_defaults(table: Table) -> dict[str, Any]:
+def _list_defaults(table: Table) -> dict[str, KeyValue]:
     """Return the default values of a table that follow from its other keys."""
     if isinstance(table, tables.Friction):
         return {"kinetic": table.static}
@@ -89,7 +87,7 @@ def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
     return mode.model_copy(update=missing)
 
 
-def _find_default_values(table: Table, keys: list[str]) -> dict[str, Any]:
+def _find_default_values(table: Table, keys: list[str]) -> dict[str, KeyValue]:
     """Return the default values of the given keys, by attribute."""
     known = [list_keys(type(table))[key] for key in keys]
     return {key.attribute: key.field.default for key in known}

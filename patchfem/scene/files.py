@@ -1,7 +1,5 @@
 """The files that a scene names."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -6,7 +6,9 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+
+from .keys.types import KeyValue
+from .keys.values import TomlTable, TomlValue
 
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
 _ITEM_IN_MESSAGE_PATTERN = re.compile(
@@ -43,12 +45,12 @@ def split_assignment(text: str) -> tuple[str, str]:
     return key.strip(), values.strip()
 
 
-def list_item_names(items: Sequence[Any]) -> list[Any]:
+def list_item_names(items: Sequence[KeyValue | TomlValue]) -> list[str | None]:
     """Return the name of each table of an array, read or not, or None for an item without it."""
     return [find_part(item, "name") for item in items]
 
 
-def find_item(items: Sequence[Any], piece: str) -> int | None:
+def find_item(items: Sequence[KeyValue | TomlValue], piece: str) -> int | None:
     """Return the index of the item with a name, or with a number counted from 0; None if there is none."""
     names = list_item_names(items)
     if piece in names:
@@ -56,12 +58,12 @@ def find_item(items: Sequence[Any], piece: str) -> int | None:
     return int(piece) if piece.isdecimal() and int(piece) < len(names) else None
 
 
-def find_part(holder: Any, name: str) -> Any:
+def find_part(holder: KeyValue | TomlValue, name: str) -> KeyValue | TomlValue:
     """Return the value of a key of a table, read or not, or None if there is none."""
     return holder.get(name) if isinstance(holder, dict) else getattr(holder, name, None)
 
 
-def find_scene_value(scene: Any, key: str) -> tuple[str, Any]:
+def find_scene_value(scene: KeyValue | TomlTable, key: str) -> tuple[str, KeyValue | TomlValue]:
     """Find the value of a dotted key in a scene or in its plain values.
 
     Returns the key with items by number, and the value or None.

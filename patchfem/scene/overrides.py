@@ -8,13 +8,13 @@ from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_SMALL_ANGLE
+from .keys.types import KeyValue, Table
 from .lines import find_key_lines, find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
@@ -76,7 +76,7 @@ class BaseScene:
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         # Valid tables by name and plain values; equal tables of several scenes are the same object.
-        self._tables: dict[tuple[str, str], Any] = {}
+        self._tables: dict[tuple[str, str], KeyValue] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
         """Return a copy of the scene with further assignments `table.key=value`.
@@ -153,7 +153,7 @@ class PlainNumbers:
         numbers = dict(zip(self.limits, values))
         if "friction.static" in numbers and self.scene.friction.kinetic is not None:
             numbers["friction.kinetic"] = numbers["friction.static"]
-        tables: dict[str, Any] = {}
+        tables: dict[str, Table] = {}
         for key, value in numbers.items():
             name, *pieces = key.split(".")
             table = tables.get(name) or getattr(self.scene, name)
@@ -166,7 +166,9 @@ class PlainNumbers:
         return {key.partition(".")[0] for key in self.limits}
 
 
-def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
+def _replace_number(
+    holder: Table | tuple[Table, ...], pieces: list[str], value: float
+) -> Table | tuple[Table, ...]:
     """Return a copy of a table, or of an array of tables, with another number at the pieces of a dotted key."""
     name, *inner = pieces
     if isinstance(holder, tuple):

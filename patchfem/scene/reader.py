@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from typing import Any
 
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
@@ -15,7 +14,16 @@ from .keys.lookup import (
     validate_values,
 )
 from .keys.tables import Tables
-from .keys.types import Key, Table, advise_on_name, build_table, list_keys, list_required_keys
+from .keys.types import (
+    Key,
+    KeyValue,
+    Table,
+    advise_on_name,
+    build_table,
+    list_keys,
+    list_required_keys,
+)
+from .keys.values import TomlTable, TomlValue
 from .lines import (
     find_item,
     list_item_names,
@@ -37,7 +45,7 @@ def read_tables(draft: SceneDraft) -> None:
     draft.tables = _read_table(draft, Tables, draft.raw, "")
 
 
-def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], table_key: str) -> Any:
+def _read_table(draft: SceneDraft, model: type[Table], raw: TomlTable, table_key: str) -> Table:
     """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)]
@@ -66,7 +74,9 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
     return build_table(model, unknown | valid)
 
 
-def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
+def _read_inner(
+    draft: SceneDraft, key: Key, value: TomlValue, path: str
+) -> Table | tuple[Table, ...] | None:
     """Read a table or an array of tables inside a table."""
     if not key.is_array and isinstance(value, dict):
         return _read_table(draft, key.inner, value, path)
@@ -85,8 +95,8 @@ def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
 
 
 def _validate_values(
-    draft: SceneDraft, model: type[Table], values: dict[str, Any], table_key: str
-) -> dict[str, Any]:
+    draft: SceneDraft, model: type[Table], values: TomlTable, table_key: str
+) -> dict[str, KeyValue]:
     """Return the valid values by attribute; report the first mistake of every other key."""
     valid, errors = validate_values(model, values)
     reported = set()
@@ -108,7 +118,7 @@ def _validate_values(
 
 
 def _report_unknown(
-    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
+    draft: SceneDraft, model: type[Table], raw: TomlTable, key: str, table_key: str
 ) -> None:
     """Report an unknown key with the most similar known key."""
     path = f"{table_key}.{key}" if table_key else key
@@ -137,7 +147,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
         return
 
     # Walk to the table of the key, and make the tables that are not there.
-    holder: Any = draft.raw
+    holder: TomlTable | list[TomlValue] = draft.raw
     for depth, piece in enumerate(pieces):
         path = ".".join(pieces[: depth + 1])
         if isinstance(holder, list):
@@ -178,7 +188,7 @@ def _is_array_of_tables(key: str) -> bool:
     return known is not None and known.is_array and known.inner is not None
 
 
-def _find_item(draft: SceneDraft, items: list[Any], path: str) -> int | None:
+def _find_item(draft: SceneDraft, items: list[TomlValue], path: str) -> int | None:
     """Return the index of the item that a key of --set names; report a missing item and return None.
 
     Parameters
@@ -204,7 +214,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str) -> int | None:
     return None
 
 
-def read_set_value(key: str, text: str) -> Any:
+def read_set_value(key: str, text: str) -> TomlValue:
     """Parse the value of a --set option as TOML; return it as a string if it is not valid TOML."""
     known = find_key(key)
     is_text_key = known is not None and str in known.types

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
 
 from . import assignments
 from .defaults import complete_tables
 from .files import list_absent_files, make_relative_file_sets, require_files
 from .keys import tables
+from .keys.values import TomlValue
 from .lines import find_scene_value, locate_key, split_assignment
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
@@ -73,7 +73,7 @@ class Scene:
     measured: tables.Measured | None
     remarks: list[str]
     sets: tuple[str, ...] = ()
-    sweep: tuple = ()
+    sweep: tuple[assignments.Axis, ...] = ()
     notes: tuple[str, ...] = ()
     written: Scene | None = None
 
@@ -81,7 +81,7 @@ class Scene:
         words = ", ".join((*self.effect_names(), *self.sets))
         return f"Scene of {self.path.name}: {self.kind}; {shorten(words, MAX_LISTED_CHARACTERS)}"
 
-    def with_(self, **sets: Any) -> Scene:
+    def with_(self, **sets: TomlValue) -> Scene:
         """Return a copy of the scene with the values of the given keys replaced.
 
         Texts are written as in a scene, numbers are in SI. Raises SceneError as in `load`, and for a length without a unit
@@ -284,7 +284,7 @@ def move_scene(scene: Scene, path: Path) -> Scene:
     return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
 
 
-def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:
+def read_sweep_axes(text: str, path: str | Path) -> tuple[list[assignments.Axis], list[str]]:
     """Return the axes of the table [sweep] in a text, and one line for each mistake in it."""
     raw, lines = parse_text(text, path)
     draft = SceneDraft(str(path), lines, raw)
@@ -292,7 +292,7 @@ def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:
     return swept, draft.mistake_lines()
 
 
-def _read_axes(draft: SceneDraft, table: Any) -> list:
+def _read_axes(draft: SceneDraft, table: TomlValue) -> list[assignments.Axis]:
     """Return the axes of a table [sweep]; mistakes are added to the draft."""
     swept, mistakes = assignments.read_table(table)
     for key, message in mistakes:

@@ -5,6 +5,7 @@ A schema cannot express which keys go together and which files exist; `patchfem 
 
 import json
 import re
+from typing import Any
 
 from .keys.choices import find_selectors, format_keys, split_keys
 from .keys.contact import Material
@@ -26,7 +27,7 @@ NUMBER_WORDS = ("type", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maxi
 UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 
-def make_schema() -> dict:
+def make_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
     tables = sorted(set(list_inner_tables(Tables).values()), key=lambda model: model.__name__)
     definitions = {model.__name__: _describe_table(model) for model in tables}
@@ -39,7 +40,7 @@ def make_schema() -> dict:
     return json.loads(text)
 
 
-def _describe_table(model: type[Table]) -> dict:
+def _describe_table(model: type[Table]) -> dict[str, Any]:
     """Return the schema of a table: the meaning and default of each key; null is not allowed."""
     raw = model.model_json_schema(by_alias=True)
     properties = raw.get("properties", {})
@@ -54,7 +55,7 @@ def _describe_table(model: type[Table]) -> dict:
     return schema | ({"required": raw["required"]} if raw.get("required") else {})
 
 
-def _describe_key(key: Key, raw: dict) -> dict:
+def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a key, based on the one that pydantic makes."""
     schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
     types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
@@ -96,7 +97,7 @@ def _describe_selection(model: type[Table], key: str) -> str:
     return "; ".join(clauses)
 
 
-def _add_units(schema: dict, kind: str) -> None:
+def _add_units(schema: dict[str, Any], kind: str) -> None:
     """Add the pattern of quantities with units to a schema."""
     if isinstance(schema.get("default"), int | float):
         schema["default"] = f"{schema['default']:g} {find_si_unit(kind)}"
@@ -117,7 +118,7 @@ def _make_unit_pattern(unit: str) -> str:
     return "".join(UNIT_SPELLINGS.get(part, re.escape(part)) for part in parts)
 
 
-def _describe_material(table: dict) -> dict:
+def _describe_material(table: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a material, which is a name or a table."""
     return {
         "description": "the name of a listed material, or elastic constants and density",
@@ -145,7 +146,7 @@ def _make_letter_pattern(letter: str) -> str:
     return f"[{letter}{letter.upper()}]" if letter.isalpha() else re.escape(letter)
 
 
-def _describe_sweep() -> dict:
+def _describe_sweep() -> dict[str, Any]:
     """Return the schema of the table [sweep], whose keys are those of a scene."""
     values = {
         "anyOf": [{"type": "string"}, {"type": "array", "minItems": 1}, {"type": "object"}],

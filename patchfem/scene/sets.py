@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeAlias
 
 from .keys.lookup import find_key
 from .keys.quantities import format_si
+from .keys.values import TomlValue
 from .rules.scene_draft import SceneError
 
+# Value of TOML, a number of another class, or a NumPy scalar or array, as a user of Python writes it.
+PythonValue: TypeAlias = "TomlValue | Real | Iterable[PythonValue]"
 MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a radius can be larger
 
 
-def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
+def format_assignments(sets: dict[str, PythonValue]) -> tuple[str, ...]:
     """Return ``table.key=value`` for each key; raise SceneError for a value that no scene can contain.
 
     A text stands as in a scene without quotes. A number is in SI and gets the unit of its key. Booleans, lists, dicts
@@ -26,7 +29,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def format_scene(tables: dict[str, Any]) -> str:
+def format_scene(tables: dict[str, PythonValue]) -> str:
     """Return a dict of tables as the text of a scene; raise SceneError for a value that it cannot contain.
 
     Texts are as in a scene, numbers are in SI.
@@ -34,7 +37,7 @@ def format_scene(tables: dict[str, Any]) -> str:
     return "".join(f"{name} = {write_value(str(name), table)}\n" for name, table in tables.items())
 
 
-def format_values(key: str, values: Any, separator: str = ",") -> str:
+def format_values(key: str, values: PythonValue, separator: str = ",") -> str:
     """Format the values of one key as --over and, with ".." as separator, --free write them.
 
     Parameters
@@ -54,7 +57,7 @@ def format_values(key: str, values: Any, separator: str = ",") -> str:
     return separator.join(_format_value(key, item) for item in items)
 
 
-def require_units(scene: Any, values: dict[str, Any]) -> Any:
+def require_units(scene: Any, values: dict[str, PythonValue]) -> Any:
     """Return a scene; raise SceneError if lengths were given as numbers without unit that cannot be metres.
 
     Parameters
@@ -71,7 +74,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
 
 
 def find_oversized_lengths(
-    values: dict[str, Any], patch_length: float | None = None, key_prefix: str = ""
+    values: dict[str, PythonValue], patch_length: float | None = None, key_prefix: str = ""
 ) -> list[str]:
     """Return a sentence on each number without unit that would be an implausibly large length.
 
@@ -109,13 +112,13 @@ def find_oversized_lengths(
     return mistakes
 
 
-def _is_length(key: str, value: Any) -> bool:
+def _is_length(key: str, value: PythonValue) -> bool:
     """Return whether a key is a length whose value is a number without unit."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     return is_number and _find_kind(key) == "length" and not key.endswith("radius")
 
 
-def _to_plain_value(value: Any) -> Any:
+def _to_plain_value(value: PythonValue) -> TomlValue | tuple[TomlValue, ...]:
     """Convert a NumPy array or scalar to Python values; return any other value unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
@@ -126,7 +129,7 @@ def _find_kind(key: str) -> str | None:
     return known.kind if known is not None else None
 
 
-def _format_value(key: str, value: Any) -> str:
+def _format_value(key: str, value: PythonValue) -> str:
     """Return one value as a string in the form of --over."""
     if isinstance(value, str):
         is_toml = value.startswith(("[", "{", '"', "'"))
@@ -137,7 +140,7 @@ def _format_value(key: str, value: Any) -> str:
     return text[1:-1] if text.startswith('"') else text
 
 
-def write_value(key: str, value: Any, kind: str | None = None) -> str:
+def write_value(key: str, value: PythonValue, kind: str | None = None) -> str:
     """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI.
 
     Parameters

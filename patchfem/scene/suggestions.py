@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from difflib import get_close_matches
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
@@ -18,6 +18,7 @@ from .keys.types import (
     list_keys,
     list_required_keys,
 )
+from .keys.values import TomlTable, TomlValue
 from .lines import split_key
 
 # Rating of a table of a similar name, of which 1 is that of a table that knows all keys inside.
@@ -33,7 +34,7 @@ class UnknownKey(NamedTuple):
     suggestion: str
 
 
-def require_key(key: str, value: Any = "") -> Key:
+def require_key(key: str, value: TomlValue = "") -> Key:
     """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it.
 
     Parameters
@@ -62,7 +63,7 @@ def require_key(key: str, value: Any = "") -> Key:
 
 
 def describe_unknown_key(
-    model: type[Table], raw: dict[str, Any], table_key: str, key: str, sets: Collection[str]
+    model: type[Table], raw: TomlTable, table_key: str, key: str, sets: Collection[str]
 ) -> UnknownKey:
     """Return what a message says about an unknown key, with the most similar known key.
 
@@ -110,7 +111,7 @@ def describe_unknown_key(
     return UnknownKey("; ".join(filter(None, (subject, wrong_table, advice))), "")
 
 
-def _is_table(value: Any) -> bool:
+def _is_table(value: TomlValue) -> bool:
     """Return whether a value read from TOML is a table or an array of tables."""
     if isinstance(value, list) and value:
         return isinstance(value[0], dict)
@@ -137,7 +138,7 @@ def _list_tables_with_key(key: str, table_key: str = "") -> list[str]:
 
 
 def _suggest_name(
-    model: type[Table], raw: dict[str, Any], table_key: str, key: str, sets: Collection[str]
+    model: type[Table], raw: TomlTable, table_key: str, key: str, sets: Collection[str]
 ) -> str:
     """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
     if _is_table(raw[key]):
@@ -174,7 +175,7 @@ def _suggest_name(
     )
 
 
-def _suggest_table(model: type[Table], key: str, value: Any) -> str:
+def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
     """Return the table of the same or a similar name, or one that knows most of the keys inside; "" for none."""
     inside = set(value[0] if isinstance(value, list) else value)
     inner = list_inner_tables(model)
@@ -206,12 +207,12 @@ def _name_item(table_key: str) -> str:
     return f"{table_key}.NAME" if find_key(table_key).is_array else table_key
 
 
-def _accepts_value(model: type[Table], key: str, value: object) -> bool:
+def _accepts_value(model: type[Table], key: str, value: TomlValue) -> bool:
     """Return whether a key accepts a value."""
     return list_keys(model)[key].attribute in validate_values(model, {key: value})[0]
 
 
-def _list_needed_keys(model: type[Table], raw: dict[str, Any]) -> list[str]:
+def _list_needed_keys(model: type[Table], raw: TomlTable) -> list[str]:
     """Return the keys that a table needs always or by one of its selectors."""
     needed = list(list_required_keys(model))
     for selector in find_selectors(model):

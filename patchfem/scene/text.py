@@ -10,7 +10,7 @@ from .keys.choices import find_choices, iterate_tables
 from .keys.contact import Material
 from .keys.memoize import memoize
 from .keys.tables import Accuracy, Drive, Measured, Tables
-from .keys.types import Table, list_keys
+from .keys.types import KeyValue, Table, list_keys
 from .sets import write_value
 
 _INTERFACE_PATCH_PATTERN = re.compile(r"structure\.interface\.\d+\.contact\b")
@@ -34,7 +34,7 @@ def list_named_effects(tables: Any) -> list[str]:
 
 
 @memoize
-def _list_table_effects(table: Any, table_key: str) -> tuple[str, ...]:
+def _list_table_effects(table: Table, table_key: str) -> tuple[str, ...]:
     """Return the effects of a table and of the tables inside it; those of patches of interfaces come last."""
     named: dict[str, None] = {}
     of_patches: dict[str, None] = {}
@@ -44,7 +44,7 @@ def _list_table_effects(table: Any, table_key: str) -> tuple[str, ...]:
     return tuple(named | of_patches)
 
 
-def _name_effects(key: str, table: Any) -> list[str]:
+def _name_effects(key: str, table: Table) -> list[str]:
     """Return the names of the effects that a table contains, without those of the tables inside it.
 
     The patch of an interface has the effects of [contact], and the item of an array only those of its selectors.
@@ -93,7 +93,7 @@ def _format_lines(table: Table, table_key: str) -> Iterator[str]:
         yield from _format_lines(item, path)
 
 
-def _list_values(table: Table) -> dict[str, Any]:
+def _list_values(table: Table) -> dict[str, KeyValue]:
     """Return the values of a table by the names of their keys, without missing ones."""
     values = {name: getattr(table, key.attribute) for name, key in list_keys(type(table)).items()}
     return {name: value for name, value in values.items() if value is not None}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
+from .keys.values import TomlTable
 from .lines import find_key_lines
 from .rules.scene_draft import SceneError
 
@@ -29,7 +30,7 @@ _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of 
 class ParsedText(NamedTuple):
     """Values of a TOML text, with the line of every key."""
 
-    values: dict[str, Any]
+    values: TomlTable
     lines: dict[str, int]
 
 

@@ -86,7 +86,7 @@ def bond_shear_modes(patch, law: Bonds, count: int | None, tolerance: float, *, 
     count : int or None
         Number of modes; None to determine it from the tolerance.
     tolerance : float
-        Largest error of the backbone / friction limit.
+        Largest error of the friction force on first loading / friction limit.
     sigma : (m,) ndarray, optional
         Pressure [Pa] that replaces that of the patch.
 

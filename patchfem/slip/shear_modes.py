@@ -31,20 +31,6 @@ MAX_SORTING_PASSES = 2
 # Number of modes with which a reduction starts; without an asperity layer its error is 1e-6 of the
 # friction limit
 N_SHEAR_MODES = 4
-# Largest backward motion of a node in a Newton step, in bond lengths; the law there is exp(2) times
-# as steep as at rest
-MAX_BACKWARD_LENGTHS = 2.0
-N_BACKBONE_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
-# Largest relative displacement of a compared backbone in bond lengths, in addition to twice the
-# displacement of the pieces; the force there is within exp(-6) of its limit
-MAX_BACKBONE_LENGTHS = 6
-# Smallest number of modes for which the backbone error of a reduction is computed
-N_ERROR_MODES = 64
-MAX_BACKBONE_STEPS = 400  # largest number of Newton iterations for a backbone
-# Relative step at which Newton's method has converged; because of its quadratic convergence, the
-# next step is round-off
-BACKBONE_TOL = 1e-11
-MAX_DECAY_EXPONENT = 700.0  # largest exponent in the law, which keeps the exponential finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,101 +81,26 @@ class JenkinsSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
-    """Modes of D^1/2 C D^1/2, most compliant first, and the backbone for any number of modes.
-
-    A backbone is the friction force on first loading as a function of the relative displacement.
+class ShearModes:
+    """Modes of D^1/2 C D^1/2, the most compliant first, for nodes with the friction limits D.
 
     - points (a,): nodes of the contact set
     - limit (a,): friction limits D [N]
-    - shape (a, n): relative displacement of a node per unit of a modal coordinate
-    - compliance (n,): compliance [m/N] of the coordinates
-    - length: bond length [m]
+    - shape (a, r): relative displacement of a node per unit of a modal coordinate
+    - stiffness (r,): stiffness [N/m] of the coordinates
     """
 
     points: np.ndarray
     limit: np.ndarray
     shape: np.ndarray
-    compliance: np.ndarray
-    length: float
-
-    @cached_property
-    def displacements(self) -> np.ndarray:
-        """Relative displacements [m] at which backbones are compared; small values are spaced more densely."""
-        displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
-        largest = MAX_BACKBONE_LENGTHS * self.length + 2 * np.abs(displacement).max()
-        return (
-            largest * (np.arange(1, N_BACKBONE_DISPLACEMENTS + 1) / N_BACKBONE_DISPLACEMENTS) ** 2
-        )
-
-    def modes(self, count: int) -> "ShearModes":
-        """Return the first `count` modes."""
-        return ShearModes(
-            self.points,
-            frozen_array(self.shape[:, :count]),
-            frozen_array(1 / self.compliance[:count]),
-            self,
-        )
-
-    @cached_property
-    def cache(self) -> "dict[int, _Backbone]":
-        """Backbones that have been computed, by number of modes."""
-        return {}
-
-    def backbone(self, count: int) -> np.ndarray:
-        """Compute the friction force [N] of the first `count` modes at `displacements`.
-
-        Newton's method starts from the cached backbone with the largest number of modes up to `count`.
-        """
-        count = min(count, self.compliance.size)
-        if count in self.cache:
-            return self.cache[count].force
-        n_cached = max((number for number in self.cache if number <= count), default=0)
-        start = np.zeros((self.displacements.size, count))
-        if n_cached:
-            start[:, :n_cached] = self.cache[n_cached].coordinates
-        shape = self.shape[:, :count]
-        with use_one_blas_thread(), np.errstate(over="ignore", invalid="ignore"):
-            backbone = _solve_backbone(
-                self.limit, shape, self.compliance[:count], self.length, self.displacements, start
-            )
-        if np.isfinite(backbone.force).all():
-            self.cache[count] = backbone
-        return backbone.force
-
-    def relative_difference(self, backbone, other) -> float:
-        """Return the largest difference between two backbones, divided by the friction limit.
-
-        It is infinite if the bonds are too short for Newton's method to converge.
-        """
-        error = float(np.abs(backbone - other).max() / self.limit.sum())
-        return error if np.isfinite(error) else np.inf
-
-
-@dataclass(frozen=True, eq=False)
-class ShearModes:
-    """Most compliant shear modes of the pieces.
-
-    - points (a,): nodes of the contact set
-    - shape (a, r): relative displacement of a node per unit of a modal coordinate
-    - stiffness (r,): stiffness [N/m] of the coordinates
-    - spectrum: modes of which these are the first
-    """
-
-    points: np.ndarray
-    shape: np.ndarray
     stiffness: np.ndarray
-    spectrum: Spectrum
 
-    @cached_property
-    def backbone_error(self) -> float:
-        """Largest error of the backbone, divided by the friction limit.
-
-        The reference has four times as many modes, and at least N_ERROR_MODES.
-        """
-        count = self.stiffness.size
-        return self.spectrum.relative_difference(
-            self.spectrum.backbone(max(N_ERROR_MODES, 4 * count)), self.spectrum.backbone(count)
+    def select(self, count: int) -> "ShearModes":
+        """Return the first `count` modes."""
+        return replace(
+            self,
+            shape=frozen_array(self.shape[:, :count]),
+            stiffness=frozen_array(self.stiffness[:count]),
         )
 
 
@@ -409,31 +320,67 @@ def shear_modes(
     PatchfemError
         If a weakening contact could jump without a change of the displacement: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
-    return _make_spectrum(tangential, limit, bond_length, weakening).modes(count)
+    return _compute_all_modes(tangential, limit, bond_length, weakening).select(count)
 
 
-def _make_spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectrum:
-    """Return the Spectrum of the nodes that carry load, with the parameters of `shear_modes` but the number of modes."""
+def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) -> ShearModes:
+    """Return all modes of the nodes that carry load, with the parameters of `shear_modes` but the number of modes."""
     points = frozen_array(np.flatnonzero(limit > 0), np.int64)
     limit = limit[points]
+    # Rigid pieces in series with one spring have only one mode.
     if np.ptp(tangential) == 0:
-        # Rigid pieces in series with one spring have only one mode.
-        spectrum = Spectrum(
-            points, limit, np.ones((points.size, 1)), tangential[:1, 0], bond_length
-        )
+        shape = np.ones((points.size, 1))
+        compliance = tangential[:1, 0]
     else:
         root = np.sqrt(limit)[:, None]
         with use_one_blas_thread():
             values, vectors = np.linalg.eigh(root * tangential[np.ix_(points, points)] * root.T)
-        spectrum = Spectrum(points, limit, vectors[:, ::-1] / root, values[::-1], bond_length)
-    stability = spectrum.compliance[0] / bond_length * (weakening - 1)
+        shape = vectors[:, ::-1] / root
+        compliance = values[::-1]
+
+    stability = compliance[0] / bond_length * (weakening - 1)
     if stability >= 1:
         raise PatchfemError(
             "contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
             f"change of the force on it (the stability number is {stability:.3g}, but must be below 1); "
             "raise friction.bond_length or friction.kinetic"
         )
-    return spectrum
+    return ShearModes(points, limit, shape, 1 / compliance)
+
+
+def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:
+    """Estimate the error of the friction force on first loading if only the first modes are kept.
+
+    A node with the local displacement xi carries D (1 - e) with e = exp(-xi/length). A mode of compliance c and shape
+    phi that is left out moves it by phi c (phi . D (1 - e)), which changes the sum of all forces by
+    c (phi . D e)(phi . D (1 - e))/length at first order. Two states are examined: e = 1/2 everywhere, where the law alone
+    determines the forces, and the forces of linear springs D/length in series with the pieces, where the edges slip first.
+
+    Parameters
+    ----------
+    modes : ShearModes
+        All n modes.
+    bond_length : float
+        Bond length [m].
+
+    Returns
+    -------
+    (n + 1,) ndarray
+        Error over the friction limit [1] if the first 0, 1, ..., n modes are kept.
+    """
+    compliance = 1 / modes.stiffness
+    total = modes.limit.sum()
+    # Forces of the springs over the friction limits, for a mean of one half
+    springs = modes.shape @ ((modes.shape.T @ modes.limit) / (compliance + bond_length))
+    springs = np.clip(springs * (total / 2 / (modes.limit @ springs)), 0.0, 1.0)
+
+    errors = np.zeros(compliance.size + 1)
+    for force_fraction in (np.full(modes.limit.size, 0.5), springs):
+        carried = modes.shape.T @ (modes.limit * force_fraction)
+        remaining = modes.shape.T @ (modes.limit * (1 - force_fraction))
+        terms = compliance * np.abs(carried * remaining) / (bond_length * total)
+        errors[:-1] = np.maximum(errors[:-1], np.cumsum(terms[::-1])[::-1])
+    return errors
 
 
 def find_sufficient_modes(
@@ -445,7 +392,7 @@ def find_sufficient_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return as many of the most compliant modes as the backbone needs to meet a tolerance.
+    """Return as many of the most compliant modes as the friction force needs to meet a tolerance.
 
     The number of modes is doubled until it suffices. The pieces alone need four modes, a soft layer of asperities many.
     A run does not rely on this choice: a comparison run with another number of modes gives the part "modes" of the error
@@ -464,18 +411,17 @@ def find_sufficient_modes(
     count, max_modes : int
         First and largest number of modes.
     tolerance : float
-        Largest error of the backbone / friction limit.
+        Largest error of the friction force on first loading / friction limit.
 
     Returns
     -------
     ShearModes
     """
-    spectrum = _make_spectrum(tangential, limit, bond_length, weakening)
-    modes = spectrum.modes(count)
-    while modes.stiffness.size == count and count < max_modes and modes.backbone_error > tolerance:
+    modes = _compute_all_modes(tangential, limit, bond_length, weakening)
+    errors = estimate_force_errors(modes, bond_length)
+    while count < min(max_modes, modes.stiffness.size) and errors[count] > tolerance:
         count = min(2 * count, max_modes)
-        modes = spectrum.modes(count)
-    return modes
+    return modes.select(count)
 
 
 def comparison_mode_count(count: int) -> int:
@@ -484,58 +430,3 @@ def comparison_mode_count(count: int) -> int:
     It is half as many. Of two or three modes of a symmetric patch only the first acts, so it is then four times as many.
     """
     return count // 2 if count >= N_SHEAR_MODES else 4 * count
-
-
-class _Backbone(NamedTuple):
-    """Friction force (k,) [N] at k displacements (NaN if not converged), and modal coordinates (k, r)."""
-
-    force: np.ndarray
-    coordinates: np.ndarray
-
-
-def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _Backbone:
-    """Solve for the friction force on first loading at relative displacements (k,) by Newton's method.
-
-    A node with the local displacement xi carries D (1 - exp(-xi/length)). The modal coordinates `start` (k, r) are the
-    initial guess and are overwritten. No step moves a node back by more than MAX_BACKWARD_LENGTHS lengths, because the
-    law is so steep there that Newton's method does not return.
-    """
-    # The Newton matrix is symmetric, so each product of two modes is formed once
-    coordinates = start
-    pending = np.arange(displacements.size)
-    n_modes = compliance.size
-    first, second = np.tril_indices(n_modes)
-    products = (shape.T[first] * shape.T[second]).T
-    entries = np.empty((n_modes, n_modes), np.int64)
-    entries[first, second] = entries[second, first] = np.arange(first.size)
-
-    for _ in range(MAX_BACKBONE_STEPS):
-        # Balance of every mode: its spring against the friction of the nodes
-        xi = displacements[pending, None] - coordinates[pending] @ shape.T
-        decay = np.exp(np.minimum(-xi / length, MAX_DECAY_EXPONENT))
-        residual = coordinates[pending] / compliance - (limit * (1 - decay)) @ shape
-        tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / compliance)
-        try:
-            step = np.linalg.solve(tangent, residual[:, :, None])[:, :, 0]
-        except np.linalg.LinAlgError:
-            return _Backbone(np.full(displacements.size, np.nan), coordinates)
-
-        change = step @ shape.T
-        # This is the largest fraction of the step that moves no node back by more than the limit.
-        backward = np.where(change < 0, -change, 1.0)
-        fraction = (xi + MAX_BACKWARD_LENGTHS * length) / backward
-        fraction = np.where(change < 0, fraction, 1.0).min(axis=1)
-        fraction = np.where((fraction > 0) & (fraction < 1), fraction, 1.0)
-
-        # Displacements whose full step is small are done
-        coordinates[pending] -= fraction[:, None] * step
-        size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
-        is_converged = (fraction == 1.0) & (np.abs(step).max(axis=1) <= BACKBONE_TOL * size)
-        pending = pending[~is_converged]
-        if not pending.size:
-            break
-
-    xi = displacements[:, None] - coordinates @ shape.T
-    force = -np.expm1(np.minimum(-xi / length, MAX_DECAY_EXPONENT)) @ limit
-    force[pending] = np.nan
-    return _Backbone(force, coordinates)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import InitialState, ModalBasis, SineDrive
+from ..scene.keys.tables import Drive
 
 # Number of equally spaced samples per cycle of a fully recorded release; they resolve 100 harmonics
 SAMPLES_PER_CYCLE = 200
@@ -26,10 +27,10 @@ class DriveKeys(NamedTuple):
     - read_file: function without arguments that reads the two columns of drive.file.
     """
 
-    keys: object
+    keys: Drive
     mass: float
     period: float
-    read_file: Callable
+    read_file: Callable[[], tuple[np.ndarray, np.ndarray]]
 
     @property
     def moving(self) -> bool:
@@ -37,7 +38,7 @@ class DriveKeys(NamedTuple):
         return self.keys.kind == "base"
 
     @property
-    def levels(self) -> tuple:
+    def levels(self) -> tuple[float, ...]:
         """Acceleration, or force per modal mass, of each drive level [m s-2]; () if the scene sets no levels."""
         mass = 1.0 if self.moving else self.mass
         return tuple(level / mass for level in self.keys.levels or ())

@@ -19,11 +19,23 @@ without segments also has:
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from ..core import DriveSegment
 from .drive_sizes import DriveKeys, count_cycles_per_level
+
+
+class DriveSignal(Protocol):
+    """Drive signal with the attributes that every drive has."""
+
+    period: float
+    moving: bool
+    segments: tuple[DriveSegment, ...]
+
+    def values(self, t) -> np.ndarray:
+        """Return the drive signal [m s-2] at times t (k,) [s]."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,7 +47,7 @@ class PiecewiseDrive:
       as a sine need not state it.
     """
 
-    segments: tuple
+    segments: tuple[DriveSegment, ...]
     period: float
     moving: bool = True
     is_periodic: bool = False

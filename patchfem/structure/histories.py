@@ -14,6 +14,7 @@ def find_accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
     Parameters
     ----------
     modes : ModalBasis
+        The n modes of the rig.
     push : (k,) array
         Acceleration of the drive [m s-2].
     z, rate : (k, n) array
@@ -26,23 +27,32 @@ def find_accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
 
 
 def make_response(
-    modes: ModalBasis, drive, push, motion: tuple, pull, interface: tuple, extra: dict
+    modes: ModalBasis,
+    drive,
+    push,
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+    pull,
+    interface: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    extra: dict[str, np.ndarray],
 ) -> Response:
     """Return the histories of a motion.
 
     Parameters
     ----------
     modes : ModalBasis
-    drive : object
-        With the flag `moving`, whether the base moves.
-    push, pull
-        See `find_accelerations`.
-    motion : tuple
+        The n modes of the rig.
+    drive : drives.DriveSignal
+        Its flag `moving` tells whether the base moves.
+    push : (k,) array
+        Acceleration of the drive [m s-2].
+    pull : (k, n) array
+        Forces of the contact on the coordinates [N], against their motion.
+    motion : tuple of arrays
         Times (k,) [s], modal coordinates (k, n) [m] and their rates (k, n) [m/s].
-    interface : tuple
+    interface : tuple of arrays
         Slide [m], its rate [m/s], friction force [N] and slip [m] of the first interface, (k,) each.
-    extra : dict
-        Further histories by name.
+    extra : dict of arrays
+        Further histories (k, ...) by name.
     """
     time, z, rate = motion
     slide, speed, force, slip = interface

@@ -25,7 +25,7 @@ ENTRY_TOL = 1e-12
 MIN_DAMPING_EIGENVALUE = -1e-9
 # Largest relative difference of natural frequencies that count as equal; the shapes of such modes
 # may be rotated
-EQUAL_FREQUENCY_TOL = 1e-11
+EQUAL_MODES_TOL = 1e-11
 # Smallest relative motion of the output in a mode; a smaller one is round-off, because the output
 # lies at a node of the mode
 MIN_OUTPUT_MOTION = 1e-9
@@ -127,7 +127,7 @@ def build_basis(
     )
 
 
-def split_damping(D, omega) -> tuple:
+def split_damping(D, omega) -> tuple[np.ndarray, np.ndarray | None]:
     """Split a modal damping matrix (n, n) [1/s] into damping ratios and the coupling of modes.
 
     Returns the damping ratios (n,), and D if it couples modes or damps a rigid one, else None.
@@ -138,7 +138,7 @@ def split_damping(D, omega) -> tuple:
     return zeta, D if is_coupled else None
 
 
-def decouple_modes(rows) -> tuple:
+def decouple_modes(rows) -> tuple[np.ndarray, np.ndarray]:
     """Compute the modes of the stiffness matrix rows^T rows with a unit mass matrix.
 
     The singular value decomposition gives omega to round-off of the largest omega; an eigenvalue
@@ -184,7 +184,7 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
     return np.where(np.abs(matrix) <= round_off * scale, 0.0, matrix)
 
 
-def _compute_modes(root, K) -> tuple:
+def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """Compute ascending circular frequencies (n,) [rad/s] and mode shapes (n, n) for a stiffness K."""
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
@@ -271,11 +271,14 @@ def _project_damper_rows(phi, damper_rows) -> np.ndarray:
     return trim_round_off(rates.T @ rates, size.T @ size)
 
 
-def _decouple_equal_frequencies(phi, omega, D) -> tuple:
-    """Rotate mode shapes of equal frequency so that the damping matrix D does not couple them."""
+def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
+    """Rotate mode shapes phi (n, n) of equal frequency so that the damping matrix D does not couple them.
+
+    Returns the shapes and D (n, n) in these coordinates.
+    """
     first = 0
     for last in range(1, len(omega) + 1):
-        if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:
+        if last < len(omega) and omega[last] - omega[first] <= EQUAL_MODES_TOL * omega[last]:
             continue
         block = D[first:last, first:last]
         if last - first > 1 and np.abs(block).sum() > np.abs(np.diag(block)).sum():

@@ -12,7 +12,7 @@ from ..core import ModalBasis, frozen_array
 PATCH_MOTIONS = ("normal", "pitch", "yaw")
 
 
-def make_basis(names: tuple, mass: float, **arrays: np.ndarray | None) -> ModalBasis:
+def make_basis(names: tuple[str, ...], mass: float, **arrays: np.ndarray | None) -> ModalBasis:
     """Make a modal basis whose arrays are read-only copies; a motion of the patch that no mode has is left out.
 
     Parameters

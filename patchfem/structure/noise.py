@@ -15,7 +15,7 @@ from ..core import PatchfemError
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
+NOISE_ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
 # Smallest number of spectral lines of a record; the values of a record with fewer are not Gaussian
 MIN_SPECTRAL_LINES = 8
 # Tolerance on the number of the spectral line at each end of the band, in line spacings
@@ -24,9 +24,12 @@ SPECTRAL_LINE_TOL = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RandomRecord(RecordedDrive):
-    """Sampled record of a stationary random drive signal."""
+    """Sampled record of a stationary random drive signal.
 
-    band: tuple = (0.0, 0.0)
+    - band: lowest and highest frequency [Hz].
+    """
+
+    band: tuple[float, float] = (0.0, 0.0)
 
     @property
     def max_frequency_ratio(self) -> float:
@@ -63,7 +66,7 @@ def draw_random_record(
     """
     low = float(frequency[0])
     high = float(frequency[-1])
-    n_rows = int(np.ceil(duration * ROWS_PER_PERIOD * high))
+    n_rows = int(np.ceil(duration * NOISE_ROWS_PER_PERIOD * high))
     step = duration / n_rows
     first_line = int(np.ceil(low * duration - SPECTRAL_LINE_TOL))
     lines = np.arange(first_line, int(high * duration + SPECTRAL_LINE_TOL) + 1)
@@ -102,10 +105,12 @@ def _build_random(drive: DriveKeys) -> RandomRecord:
     return draw_random_record(frequency, density, duration, keys.seed or 0, drive.period)
 
 
-def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
+def _cut_spectrum(
+    frequency, density, low: float | None, high: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Restrict a spectrum to the range between two frequencies [Hz].
 
-    Returns frequencies and densities; raises PatchfemError if an end lies outside the spectrum.
+    Returns frequencies (j,) [Hz] and densities (j,); raises PatchfemError if an end lies outside the spectrum.
     """
     low = frequency[0] if low is None else low
     high = frequency[-1] if high is None else high

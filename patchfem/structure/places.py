@@ -20,6 +20,9 @@ MAX_MASS_FRACTION = 1.05
 MIN_MASS_FRACTION = 0.8
 
 
+Motions = dict[tuple[int, int], np.ndarray]  # motions (n,) of the modes by (node, axis 0 to 5)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class MeasuredModes:
     """Natural modes from a measurement, with their shapes at nodes and directions.
@@ -32,8 +35,8 @@ class MeasuredModes:
 
     frequency: np.ndarray
     zeta: np.ndarray
-    motion: dict
-    notes: list = field(default_factory=list)
+    motion: Motions
+    notes: list[str] = field(default_factory=list)
 
     def motion_at(self, text: str, key: str) -> np.ndarray:
         """Return the displacement of each mode at a node and direction such as "12:+x".
@@ -78,7 +81,7 @@ class MeasuredModes:
         return total
 
 
-def _list_directions(motion: dict) -> str:
+def _list_directions(motion: Motions) -> str:
     """Return the first nodes and directions in a file as text for a message."""
     names = [f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)]
     text = ", ".join(names[:MAX_LISTED_NODES])
@@ -86,7 +89,9 @@ def _list_directions(motion: dict) -> str:
     return f"{text} and {n_more} more" if n_more > 0 else text
 
 
-def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: bool) -> ModalBasis:
+def build_basis(
+    shapes: MeasuredModes, mass: float, places: dict[str, str | None], *, is_forced: bool
+) -> ModalBasis:
     """Build the modal basis from measured modes.
 
     A fixed-base mode phi of a rig whose moving mass m is all in one rigid block participates in the base
@@ -148,7 +153,7 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
     )
 
 
-def note_missing_mass(basis: ModalBasis) -> list:
+def note_missing_mass(basis: ModalBasis) -> list[str]:
     """Return a note if the modes in a file represent too small a part of the moving mass."""
     mass_fraction = float(np.sum(basis.base**2))
     if mass_fraction >= MIN_MASS_FRACTION:

@@ -218,7 +218,9 @@ def _factorize(K) -> SparseFactor | None:
         ) from None
 
 
-def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) -> tuple:
+def _compute_lowest_modes(
+    K, M, count: int, factor: SparseFactor, shift: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute the lowest modes of a structure, normalized to unit modal mass.
 
     `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]
@@ -253,7 +255,9 @@ def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float =
     return np.sqrt(np.maximum(1 / inverse_squares - shift, 0.0)), shapes
 
 
-def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
+def _compute_craig_bampton_shapes(
+    K, M, boundary, count: int, load
+) -> tuple[np.ndarray, ComputedModes]:
     """Compute fixed-interface modes, constraint modes and the residual static shape for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
@@ -294,7 +298,9 @@ def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
     return np.hstack(shapes), ComputedModes(omega, participation, is_complete)
 
 
-def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
+def _compute_free_interface_shapes(
+    K, M, boundary, count: int, load
+) -> tuple[np.ndarray, ComputedModes]:
     """Compute free-interface modes, and residual attachment modes for the boundary and for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
@@ -328,7 +334,7 @@ def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
     return shapes, ComputedModes(omega, participation, is_complete)
 
 
-def _subtract_modes(static, modes, M) -> tuple:
+def _subtract_modes(static, modes, M) -> tuple[np.ndarray, np.ndarray]:
     """Make static shapes (n, a) orthogonal to modes (n, m), and normalize them.
 
     M is the mass matrix. Returns the residual shapes (n, a) and the participation (m, a) of the modes in the static shapes.
@@ -441,7 +447,7 @@ def _factor_stiffness(stiffness, mass) -> np.ndarray:
     return (np.sqrt(squares)[:, None] * shapes.T) @ mass
 
 
-def _compute_elastic_modes(stiffness, mass) -> tuple:
+def _compute_elastic_modes(stiffness, mass) -> tuple[np.ndarray, np.ndarray]:
     """Compute the elastic modes of dense matrices (c, c), normalised to unit modal mass.
 
     Returns the squares (k,) [1/s^2] of the circular frequencies, ascending, and the shapes (c, k).

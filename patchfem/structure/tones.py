@@ -2,7 +2,7 @@
 
 a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
 sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a
-lower frequency responds to them by (f h)^4, which is 6e-8 at `ROWS_PER_PERIOD` rows per period.
+lower frequency responds to them by (f h)^4, which is 6e-8 at `TONE_ROWS_PER_PERIOD` rows per period.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import numpy as np
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
+TONE_ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
 # Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
 MAX_DENOMINATOR = 10**6
 
@@ -30,7 +30,7 @@ class TonesRecord(RecordedDrive):
 
     beat: float = 1.0
     max_frequency: float = 0.0
-    tones: tuple = ()
+    tones: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def max_frequency_ratio(self) -> float:
@@ -57,7 +57,7 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
     TonesRecord
     """
     max_frequency = max(frequencies)
-    step = 1 / (ROWS_PER_PERIOD * max_frequency)
+    step = 1 / (TONE_ROWS_PER_PERIOD * max_frequency)
     time = step * np.arange(int(np.ceil(duration / step)) + 2)
     value = sum(
         a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)

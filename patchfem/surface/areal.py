@@ -10,7 +10,7 @@ from .profile import Profile, robust_deviation
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
 SPIKE_WINDOW = 5  # side of the square of the median
-RANK_TOL = (
+PLACES_RANK_TOL = (
     1e-6  # singular value of the places relative to the largest one, below which it is round-off
 )
 
@@ -76,10 +76,8 @@ def level(surface: Profile | Areal) -> Profile | Areal:
     # Positions from -1 to 1 make the rank independent of units.
     unit = [2 * (axis - axis[0]) / np.ptp(axis) - 1 for axis in axes]
     base = np.array([np.broadcast_to(part, known.shape) for part in (1.0, *unit)])
-    factors, _, rank, _ = np.linalg.lstsq(base[:, known].T, surface.z[known], rcond=RANK_TOL)
+    factors, _, rank, _ = np.linalg.lstsq(base[:, known].T, surface.z[known], rcond=PLACES_RANK_TOL)
     if rank < len(base):
-        raise PatchfemError(
-            f"{surface.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
-            "three points that do not"
-        )
+        needs = ("a line needs two", "a plane needs three that do not lie on one straight line")
+        raise PatchfemError(f"{surface.source}: {known.sum()} heights; {needs[known.ndim - 1]}")
     return replace(surface, z=frozen_array(surface.z - np.tensordot(factors, base, 1)))

@@ -7,7 +7,9 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 
-WINDOW = 7  # number of samples in the running median; groups of up to three samples can be spikes
+MEDIAN_WINDOW = (
+    7  # number of samples in the running median; groups of up to three samples can be spikes
+)
 SPECK_WINDOWS = (15, 31)  # numbers of samples in the running medians that find wider specks of dust
 # Smallest height of a spike in robust standard deviations; heights of rough surfaces stay within 6.
 SPIKE_DEVIATIONS = 8.0
@@ -17,7 +19,9 @@ FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
 CHUNK = 131_072  # number of medians that are computed at a time, which limits the memory
-MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
+MAX_TRACE_SAMPLES = (
+    2_097_152  # largest number of samples in a resampled trace, which limits the memory
+)
 EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 
@@ -66,7 +70,7 @@ def resample_evenly(profile: Profile) -> Profile:
     if np.ptp(steps) <= EVEN_TOL * steps.mean():
         return profile
     length = profile.length
-    step = max(float(np.percentile(steps, 10)), length / MAX_SAMPLES)
+    step = max(float(np.percentile(steps, 10)), length / MAX_TRACE_SAMPLES)
     x = np.linspace(profile.x[0], profile.x[-1], int(np.ceil(length / step * (1 - 1e-9))) + 1)
     note = (
         f"{profile.source}: samples lie {format_length(float(steps.min()))} to {format_length(float(steps.max()))} "
@@ -123,7 +127,7 @@ def clean(profile: Profile, max_gap: float) -> Profile:
         note = (
             f"{profile.source}: {is_spike.sum()} of {profile.x.size} heights are spikes (the first "
             f"at x = {format_length(profile.x[np.argmax(is_spike)])}), which lie more than "
-            f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {WINDOW} samples; "
+            f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {MEDIAN_WINDOW} samples; "
             "straight lines replace these heights"
         )
         profile = replace(profile, notes=(*profile.notes, note))
@@ -168,11 +172,11 @@ def find_spikes(profile: Profile) -> np.ndarray:
     """
     is_spike = np.zeros(profile.x.size, bool)
     known = np.flatnonzero(~profile.missing)
-    if known.size < WINDOW:
+    if known.size < MEDIAN_WINDOW:
         return is_spike
     z = profile.z[known]
     digit = np.diff(np.unique(z)).min(initial=np.ptp(z))
-    distance, deviation = _compare_with_neighbours(z, WINDOW, digit)
+    distance, deviation = _compare_with_neighbours(z, MEDIAN_WINDOW, digit)
     is_spike[known] = np.abs(distance) > SPIKE_DEVIATIONS * deviation
     return is_spike
 
@@ -193,7 +197,7 @@ def remove_spikes(profile: Profile) -> Profile:
 
     # A group goes with one sample on each side, which its flank may touch.
     removed = is_spike.copy()
-    for window in (WINDOW, *SPECK_WINDOWS):
+    for window in (MEDIAN_WINDOW, *SPECK_WINDOWS):
         distance, deviation = _compare_with_neighbours(z, window)
         for first, last in find_runs(np.abs(distance) > FOOT_DEVIATIONS * deviation):
             group = slice(first, last + 1)

@@ -4,6 +4,9 @@ The interval holds in 95 of 100 cases where two surfaces are compared, and in 90
 95 %, where the roughness of one is measured.
 """
 
+import tomllib
+from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 LEVEL = 0.95  # probability that the interval of a comparison contains the true value
@@ -23,3 +26,10 @@ class Quantity(NamedTuple):
     text: str
     reason: str = ""
     name: str = ""
+
+
+@cache
+def read_definitions(section: str) -> dict[str, list[str]]:
+    """Return the unit and the definition of each quantity of a section of definitions.toml, by name."""
+    text = Path(__file__).with_name("definitions.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)[section]

@@ -1,7 +1,7 @@
 """Frictionless contact of two periodic half planes, in waves along the interface: a second, independent solver.
 
 Find p >= 0 with w = g - closing + u >= 0, p . w = 0 and a given mean of p, where each wave of the pressure sinks the
-faces on its own, u_k = C(k) p_k. C is handed in, the sum over both bodies (`closed_forms.contact.layered_compliance` of
+faces on its own, u_k = C(k) p_k. C is handed in, the sum over both bodies (`contact_forms.layered_compliance` of
 coated ones). No mesh, no far face and no free edge are in it.
 
 Method: constrained conjugate gradients of Polonsky and Keer (Wear 231, 1999, 206), two pairs of transforms per

@@ -15,9 +15,9 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import contact_forms as exact
 from halfspace import press_periodic, wave_numbers
 
-from patchfem.closed_forms import contact as exact
 from patchfem.contact import (
     HertzAsperities,
     Holder,

@@ -33,10 +33,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 import asperities
+import contact_forms as exact
 import tilted
 from asperities import MEAN
 
-from patchfem.closed_forms import contact as exact
 from patchfem.contact import (
     Holder,
     LinearAsperities,

@@ -10,7 +10,7 @@ stiffnesses K_n, K_t in N/um, with a rigid fixture; every figure to 1 % or bette
   1e-2   0.0017   793   96  84     0.035   41.1   43  33     0.016    134   80  64     0.126   34.5 37.2 28.7
 
 The soft skin hardly loses stiffness to a tilt, the bare pieces nineteen parts of twenty of K_n; only the place of the
-pressure is the same in the end. Against rigid pads on the same skins (`closed_forms.contact.wedge_on_asperities`) the pieces
+pressure is the same in the end. Against rigid pads on the same skins (`contact_forms.wedge_on_asperities`) the pieces
 themselves add 4 % to the mean over peak pressure of the exponential skin at 1e-3 rad, and 30 % to the part in
 contact on the linear one at 1e-4 rad, whose stiffness is that of the pieces. Under a load line at a third of the length
 the four bear 0.445, 0.479, 0.588 and 0.686 of the patch, a rigid pad on springs 0.5.

@@ -63,9 +63,9 @@ def transmissibility(f) -> np.ndarray:
 def curve() -> Free:
     """Return the response at the frequencies that a sweep with method "harmonic" chooses."""
     found = pf.run(SCENE)
-    f = found.extra["curve"]["frequency"]
+    f = found.motion.steady.curve["frequency"]
     h = transmissibility(f)
-    k = int(np.argmax(found.extra["curve"]["amplitude"]))
+    k = int(np.argmax(found.motion.steady.curve["amplitude"]))
     return Free(f, h, (float(f[k]), float(np.abs(h[k]))))
 
 

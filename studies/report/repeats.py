@@ -131,7 +131,7 @@ def series(
         start = [f"wear.start={number}.nc"]
         area = float(found.patch.pieces.interface.weight.sum())
         before, depth = (
-            float(volume) / area for volume in found.extra["wear"]["worn_volume"][[0, -1]]
+            float(volume) / area for volume in found.wear.columns["worn_volume"][[0, -1]]
         )
         out.append(
             Reading(

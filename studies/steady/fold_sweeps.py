@@ -63,7 +63,7 @@ def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> C
     sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
     found = runner.run(
         runner.plan(scene.load(FOLDER / "stiffened.toml", sets)), estimate=False
-    ).extra["curve"]
+    ).motion.steady.curve
     return Curve(
         found["frequency"],
         found["amplitude"],

@@ -100,7 +100,7 @@ def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> R
         found.measures["pressure_peak"].error,
         onset(depth, motion, found.patch.pair),
         float(depth.max()),
-        found.extra["wear"],
+        found.wear.columns,
         found.patch.x,
         fields[[0, -1]],
     )

@@ -177,24 +177,6 @@ def test_refuses_modes_without_a_backbone(scene, message):
         compute_backbone(pf.build(scene))
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [
-        make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :],
-        make_shaken_block('law = "coulomb"').replace("100 N", "0 N"),
-    ],
-)
-def test_exact_rig_without_friction_has_constant_curves(scene):
-    """Frequency and damping of a rig without friction do not depend on the amplitude, within 1e-9."""
-    backbone = compute_backbone(pf.build(scene))
-    for method in ("balance", "quasi-static"):
-        assert backbone.curves[method].frequency == pytest.approx(100.0, rel=1e-12)
-        assert backbone.curves[method].damping == pytest.approx(0.002, rel=1e-9)
-    assert not backbone.missing
-    assert backbone.exponents.micro is None
-    assert len(backbone.notes) == ("coulomb" in scene)
-
-
 def test_exact_damper_between_masses_agrees_with_eigenvalues():
     """The curves of two masses with a damper satisfy their characteristic equations within 1e-9.
 
@@ -234,42 +216,6 @@ def test_amplitudes_stay_within_travel():
         pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"
     ):
         compute_backbone(stopped, "", [1e-4, 3e-4])
-
-
-def test_curve_continues_where_the_amplitude_of_the_mode_decreases():
-    """A curve is complete although the mode's own amplitude decreases while that of the output increases.
-
-    The friction force of the second of two masses acts on the first mode. The curve begins at the stuck frequency,
-    and the damping rises from that of the structure.
-    """
-    structure = """masses = ["0.5 kg", "0.3 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "200 kN/m"
-[[structure.spring]]
-between = [2, 1]
-stiffness = "100 kN/m"
-[[structure.interface]]
-between = [1, 0]
-law = "elastic-plastic"
-bond_length = "10 um"
-static = 0.3
-load = "100 N"
-"""
-    rig = make_shaken_block(PLASTIC)
-    amplitudes = np.array([2e-6, 9e-6, 15e-6, 20e-6, 25e-6, 30e-6, 60e-6])
-    backbone = compute_backbone(
-        pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]),
-        "",
-        amplitudes,
-        ("balance",),
-        errors=False,
-    )
-    curve = backbone.curves["balance"]
-    assert curve.amplitude == pytest.approx(amplitudes)
-    assert curve.frequency[:2] == pytest.approx(backbone.frequencies.stuck, rel=1e-6)
-    assert curve.frequency == pytest.approx(backbone.frequencies.stuck, rel=4e-3)
-    assert np.abs(curve.damping[:2]).max() < 1e-9 and (np.diff(curve.damping[1:]) > 5e-3).all()
 
 
 FOLDED = make_shaken_block('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace(
@@ -367,19 +313,6 @@ def test_always_errors_of_micro_slip_include_the_mesh():
     assert coarse.exponents.micro is None
 
 
-def test_stuck_frequency_follows_from_tangential_stiffness():
-    """The stuck frequency agrees with the tangential stiffness of a run within their errors."""
-    backbone = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
-    stiffness = pf.run(
-        CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
-        'frequency = "1 Hz"\n'
-    ).measures["tangential_stiffness"]
-    stuck = np.sqrt(OMEGA**2 + stiffness.value / 0.5) / (2 * np.pi)
-    error = backbone.frequencies.stuck_error + stuck * stiffness.error / stiffness.value / 2
-    assert abs(backbone.frequencies.stuck - stuck) <= error < 1e-3 * stuck
-    assert backbone.exponents.micro is None
-
-
 @pytest.mark.parametrize("slide", [1.0, 0.01])
 def test_default_amplitudes_end_where_mode_is_nearly_free(slide):
     """The default amplitudes end where the frequency is within 5 % of the free one.
@@ -420,19 +353,3 @@ def test_quasi_static_curve_ends_at_maximum_force():
     assert backbone.curves["quasi-static"].amplitude.size == 3
     assert "curve does not reach these" in backbone.notes[0]
     assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
-
-
-def test_python_interface_returns_dataset():
-    """The Python interface returns a dataset with sorted amplitudes and units, and refuses invalid arguments."""
-    backbone = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
-    notes = backbone.attrs["notes"]
-    assert isinstance(notes, list) and notes[0].startswith("[drive] is ignored")
-    assert backbone["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
-    assert (
-        backbone["quasi_static_frequency"].attrs["units"] == "Hz"
-        and backbone.attrs["mode"] == "axial"
-    )
-    with pytest.raises(pf.PatchfemError, match="one of balance"):
-        pf.backbone(make_shaken_block(IWAN), method="static")
-    with pytest.raises(pf.PatchfemError, match="above 0"):
-        pf.backbone(make_shaken_block(IWAN), amplitudes=[0.0])

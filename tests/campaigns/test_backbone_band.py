@@ -1,14 +1,9 @@
 """Recommended curve of a backbone, its band and the advice, for scenes of a joint."""
 
-import json
-
 import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.__main__ import main
-from patchfem.campaigns.backbone import words
-from patchfem.campaigns.backbone.records import Backbone, make_band, make_curve
 
 LAW = '[normal]\nload = "100 N"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "60 um"\n'
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\n'
@@ -85,55 +80,6 @@ def test_band_is_errors_and_difference_of_methods(both_curves):
         assert backbone[f"band_{name}_high"].values == pytest.approx(ends[1], rel=1e-12)
 
 
-def test_band_of_one_method_is_its_error():
-    """The band of a single curve is its numerical error."""
-    backbone = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES[::6], method="balance")
-    assert "it is widest at" in backbone.attrs["advice"]
-    width = backbone.band_damping_high.values - backbone.band_damping_low.values
-    assert width == pytest.approx(2 * backbone.balance_damping_error.values, rel=1e-6, abs=1e-15)
-
-
-@pytest.mark.parametrize("method", ["decay", "all"])
-def test_refuses_removed_method(method):
-    """A method that was removed is refused with what to use instead."""
-    with pytest.raises(pf.PatchfemError, match=f"'{method}' was removed in patchfem 1.3; "):
-        pf.backbone(LAW + SLIDE, modes=MODES, method=method)
-
-
-def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
-    """The scene of `new joint` with two given modes has a backbone with a band and advice."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "joint.toml").write_text(pf.new("joint"), "utf-8")
-    options = ("--modes", "120 Hz:0.01, 170 Hz:0.02", "--amplitudes", "9 um..1 mm:3")
-    with pytest.raises(SystemExit) as ended:
-        main(["backbone", "joint.toml", "--json", "--no-page", *options])
-    assert not ended.value.code
-    answer = json.loads(capsys.readouterr().out)
-    assert set(answer["band"]) == {
-        "amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high"
-    }  # fmt: skip
-    assert answer["stuck_frequency"] == pytest.approx(120, rel=1e-4)
-    assert set(answer["curves"]) == {"balance", "quasi-static"}
-    assert answer["advice"].startswith("Use the curve of method balance")
-    # A patch in partial slip dissipates energy at each amplitude.
-    assert "dissipates nothing" not in answer["advice"]
-    for text in ("[slide] is ignored", "`slide` is assumed such", "assumed `slide` is positive"):
-        assert any(text in note for note in answer["notes"])
-
-
-def test_exact_drive_of_scene_is_ignored():
-    """A scene whose [drive] is incomplete, or absent, gives the curve of the same scene with a drive."""
-    text, _, drive = (LAW + STRUCTURE).partition("[drive]")
-    curves = [
-        pf.backbone(text + tail, amplitudes=[2e-5], method="quasi-static")
-        for tail in ("[drive]" + drive, '[drive]\nkind = "free"\n', "")
-    ]
-    for name in ("quasi_static_frequency", "quasi_static_damping"):
-        assert len({curve[name].item() for curve in curves}) == 1
-    for curve, is_noted in zip(curves, (True, True, False)):
-        assert any("[drive] is ignored" in note for note in curve.attrs["notes"]) == is_noted
-
-
 @pytest.mark.parametrize(
     "scene, modes, message",
     [
@@ -152,18 +98,3 @@ def test_refuses_invalid_modes(scene, modes, message):
     """Modes with invalid text, units, slide or beside a structure of masses are refused."""
     with pytest.raises(pf.PatchfemError, match=f"(?s){message}"):
         pf.backbone(scene, modes=modes)
-
-
-def test_exact_band_holds_the_other_curve_at_common_amplitudes_only():
-    """The band is the numerical error where only one method has a value, and holds the other curve where both have one."""
-    values = np.ones((4, 2))
-    curves = {
-        "balance": make_curve(np.array([1e-6, 2e-6]), values, 1e-3 * values),
-        "quasi-static": make_curve(np.array([2e-6, 4e-6]), 1.1 * values, 1e-3 * values),
-    }
-    backbone = Backbone("a", None, curves, {}, None, None, (), make_band(curves))
-    assert backbone.band.damping_high == pytest.approx([1.001, 1.101])
-    assert backbone.band.damping_low == pytest.approx([0.999, 0.999])
-    sentence = words.describe_band_width(backbone)
-    assert "widest at 2 um, where the damping ratio is 0.999 to 1.101 beside 1" in sentence
-    assert sentence.endswith("and the frequency is within 10 % everywhere.")

@@ -2,11 +2,9 @@
 
 import csv
 import json
-import re
 
 import numpy as np
 import pytest
-from command_line import run_cli
 from scipy.optimize import brentq
 
 import patchfem as pf
@@ -66,24 +64,6 @@ def test_force_holds_the_amplitude_in_a_run(scene):
     assert (shift < 1e-3).all() if scene is JOINT else (shift > 1e-3).all()
 
 
-def test_note_on_other_modes_states_the_shift_of_the_phase_resonance():
-    """The note names the amplitude of the largest shift in half-widths; far modes are weak, and one mode has no note."""
-    amplitudes = [2e-4, 5e-4]
-    curve = pf.backbone(TWO_MODES, amplitudes=amplitudes, method="balance")
-    forced = curve.balance_force_frequency.values
-    shift = np.abs(forced / curve.balance_frequency.values - 1)
-    k = int(np.argmax(shift / curve.balance_damping.values))
-    assert (
-        f"at {1e6 * amplitudes[k]:.0f} um its phase resonance has {forced[k]:.5g} Hz, {100 * shift[k]:.2g} % beside"
-        in str(curve.attrs["advice"])
-    )
-    weak = "The coupling with the other modes is weak."
-    far = TWO_MODES.replace("170 Hz", "20 kHz")
-    for scene, is_noted in ((far, True), (JOINT, False)):
-        curve = pf.backbone(scene, amplitudes=amplitudes, method="balance")
-        assert (weak in str(curve.attrs["advice"])) == is_noted
-
-
 @pytest.mark.parametrize(
     "slide, second, amplitudes, is_known",
     [
@@ -107,18 +87,6 @@ def test_force_of_another_mode_or_an_antiresonance_is_unknown(slide, second, amp
     assert np.isfinite(curve.balance_force.values).tolist() == is_known
     note = f"no force in phase resonance was found at {is_known.count(False)} of 2 amplitudes"
     assert note in " ".join(curve.attrs["notes"])
-
-
-def test_rigid_friction_of_several_modes_has_no_force():
-    """With rigid friction and two modes there is no force, and a note says which law has one; with one mode it is known."""
-    for scene, is_known in ((JOINT, True), (TWO_MODES, False)):
-        text = scene.replace('law = "elastic-plastic"', 'law = "coulomb"').replace(
-            'bond_length = "60 um"\n', ""
-        )
-        curve = pf.backbone(text, amplitudes=[2e-4, 5e-4], method="balance")
-        assert np.isfinite(curve.balance_force.values).all() == is_known
-        notes = " ".join(curve.attrs["notes"])
-        assert ('law = "elastic-plastic"' in notes) != is_known
 
 
 def test_exact_quasi_static_force_replaces_the_energy_of_a_cycle():
@@ -239,18 +207,6 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
     assert (tmp_path / "curves.png").stat().st_size > 1000
 
 
-def test_over_in_python_has_the_dimension_case():
-    """`pf.backbone` with `over` returns variables over case and amplitude; single backbones agree within 1e-9."""
-    given = {"amplitudes": [2e-4, 5e-4], "method": "balance"}
-    both = pf.backbone(JOINT, over={"friction.static": [0.2, 0.3]}, **given)
-    assert both.balance_frequency.dims == ("case", "balance_amplitude")
-    for case, static in enumerate((0.2, 0.3)):
-        alone = pf.backbone(JOINT, **given, **{"friction.static": static})
-        for name in ("frequency", "damping", "force"):
-            found = both[f"balance_{name}"].values[case]
-            assert found == pytest.approx(alone[f"balance_{name}"].values, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     "options, message",
     [
@@ -273,15 +229,3 @@ def test_force_that_no_amplitude_has_is_refused():
     with pytest.raises(pf.PatchfemError, match=r"needs a force of 100 N .* the forces there are"):
         pf.backbone(scene, forces=[100.0])
     assert pf.backbone(scene, forces=[5.0]).balance_amplitude.values < 0.2e-3
-
-
-@pytest.mark.parametrize("key", ["friction.static", "structure.mode[1].damping"])
-def test_refuses_wrong_values_of_over_without_naming_set(key, tmp_path):
-    """A wrong value of a key is refused as one of --over; mistakes of --set keep their name."""
-    scene = tmp_path / "joint.toml"
-    scene.write_text(JOINT, "utf-8")
-    leaf = key.rpartition(".")[2]
-    answer = run_cli("backbone", scene, "--over", f"{key}=0.3,-7")
-    assert answer.code == 2 and re.search(rf"^--over: [\w.]+{leaf}: must be", answer.err, re.M)
-    answer = run_cli("backbone", scene, "--over", f"{key}=0.3,0.4", "--set", "normal.load=-5 N")
-    assert answer.code == 2 and "--set: normal.load: must be" in answer.err

@@ -12,8 +12,7 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.model import build
-from patchfem.scene import BaseScene, loads, remember_written
+from patchfem.scene import loads, remember_written
 
 MASS = 1.3  # modal mass [kg]
 SLIDE = 0.0169  # motion of the contact per motion of the output
@@ -74,31 +73,6 @@ def stuck_frequency(joint_stiffness: float, bolted_stiffness: float) -> float:
     return float(np.sqrt(square) / (2 * np.pi))
 
 
-def write_free_scene(contact: str, joint_stiffness: float) -> str:
-    """Return the same rig with the frequency and damping of the mode without the joint."""
-    frequency = free_frequency(joint_stiffness)
-    damping = 0.002 * 212.0 / frequency
-    free = MODE.replace('measured = "stuck"\n', "").replace("212 Hz", f"{frequency!r} Hz")
-    return contact + free.replace("0.002", repr(damping)) + DRIVE
-
-
-def test_exact_sweep_over_load_of_patch_equals_single_runs():
-    """A case of a sweep of a patch equals, to round-off, the run of a model with the same joint subtracted,
-    and its measures are those of the structure given by its free modes within their errors."""
-    others = (LOADS[0], LOADS[2])
-    swept = pf.sweep(ROUGH + MODE + DRIVE, {"contact.load": list(others)})
-    scene = loads(ROUGH + MODE + DRIVE, "rough.toml")
-    base = BaseScene(remember_written(scene))
-    bolted = pf.run(ROUGH + MODE + DRIVE).measures["tangential_stiffness"].value
-    case = pf.run(build(base.override([f"contact.load={others[1]}"])))
-    single = pf.run(write_free_scene(ROUGH, bolted), **{"contact.load": others[1]})
-    for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
-        assert swept[name].values[1] == pytest.approx(case.measures[name].value, rel=1e-9)
-        error = case.measures[name].error + single.measures[name].error
-        assert abs(single.measures[name].value - case.measures[name].value) <= error
-    assert any("the scene as written" in note for note in case.notes)
-
-
 @pytest.mark.parametrize("contact, key", [(POINT, "normal.load"), (ROUGH, "contact.load")])
 def test_exact_backbone_over_load_has_stuck_frequency_of_each_load(contact, key):
     """The stuck frequency rises with the load as the stiffness of the joint does, and the free one stays."""
@@ -133,6 +107,7 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
     assert free[1] == pytest.approx(free[0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):
     """A fit of a joint that was bolted in the modal test finds the bond length of synthetic data with
     measured_joint = "case"; with the joint of the scene as written it warns."""

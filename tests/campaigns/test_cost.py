@@ -1,7 +1,5 @@
 """Curves of error against computing time: values, tables and summaries."""
 
-import csv
-import json
 from dataclasses import replace
 
 import pytest
@@ -12,16 +10,13 @@ from patchfem import build
 from patchfem.campaigns import (
     Cost,
     compute_setting_costs,
-    cost,
     describe_best_setting,
     numerical_settings,
 )
-from patchfem.campaigns.cost import find_best_run
-from patchfem.core import Measure, NotConverged
+from patchfem.core import Measure
 from patchfem.export.costs import make_answer
 from patchfem.runs.run import run
 
-LENGTH = 12.7e-3
 TEXT = (
     PIECE
     + """\
@@ -32,28 +27,6 @@ substrate = "steel"
 angle = "5e-5 rad"
 [accuracy]
 tolerance = {tolerance}
-"""
-)
-
-WORN = (
-    PIECE
-    + """\
-load = "2000 N"
-element_size = "0.5 mm"
-substrate = "steel"
-[contact.crown]
-radius = "1 m"
-[friction]
-law = "coulomb"
-static = 0.3
-[slide]
-kind = "sine"
-amplitude = "20 um"
-frequency = "10 Hz"
-[wear]
-coefficient = "1e-14 m^2/N"
-cycles = 100000
-jumps = 1
 """
 )
 
@@ -92,50 +65,6 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
         assert row.measures[name].error == pytest.approx(measure.error, rel=1e-9)
 
 
-def test_exact_automatic_mesh_averages_profile_as_run(tmp_path):
-    """Under a trace on pieces of unequal length, the row of the automatic mesh averages it as the run does.
-
-    Once it resolved the finest waves, which cannot be solved apart there.
-    """
-    heights = "".join(f"{1e-5 * k},{1e-7 * (k % 3)}\n" for k in range(1271))
-    (tmp_path / "trace.csv").write_text(f"x [m],height [m]\n{heights}", "utf-8")
-    scene = tmp_path / "scene.toml"
-    tables = '[contact.profile]\nfile = "trace.csv"\n[contact.lower]\nlength = "20 mm"\n'
-    scene.write_text(PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables, "utf-8")
-    model = build(scene)
-    *_, uniform, automatic = numerical_settings.make_setting_values(model, "element_size")
-    assert automatic.value is None and automatic.model.patch.gap.average is None
-    assert automatic.model.patch.gap.limit == model.patch.gap.limit == LENGTH / 200
-    assert uniform.model.patch.gap.limit == uniform.model.patch.gap.average == uniform.value
-
-
-def test_exact_table_contains_values_and_errors(tmp_path):
-    """The table contains the errors of each run."""
-    scene = tmp_path / "a.toml"
-    scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
-    process = run_cli(
-        "cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q"
-    )
-    assert process.code == 0, process.err
-    answer = json.loads(process.out)["element_size"]
-    *uniform, adaptive = answer["runs"]
-    assert [one["value"] for one in uniform] == pytest.approx(
-        [LENGTH / n for n in (12, 25, 50, 100)]
-    )
-    assert adaptive["value"] is None
-    assert {one["timings"] for one in answer["runs"]} == {3}
-    with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    for row, one in zip(rows, answer["runs"], strict=True):
-        found = {
-            name.removeprefix("error_"): float(text)
-            for name, text in row.items()
-            if name.startswith("error_")
-        }
-        assert row["setting"] == one["label"] and found == one["errors"]
-    assert json.loads((tmp_path / "out" / "cost.json").read_text("utf-8"))["element_size"] == answer
-
-
 def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     """The summary states the coarsest run within the tolerance, or else the measure with the largest error."""
     runs = [make_cost("2", 1, 4e-2), make_cost("4", 2, 8e-3), make_cost("8", 5, 2e-3)]
@@ -152,52 +81,6 @@ def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     assert describe_best_setting(automatic, 1e-2) == within
     automatic[-1] = make_cost("auto", 3, 1e-3, value=None)
     assert describe_best_setting(automatic, 1e-3).startswith("a knob at auto: 3 CPU s per run")
-
-
-def test_exact_unknown_error_is_not_within_tolerance():
-    """A run with an unknown error is not within the tolerance, and unknown errors are stated.
-
-    Once a run with 4 modes whose work had no error estimate was called the fastest "with every measure within the
-    tolerance".
-    """
-    runs = [make_cost("4", 0.1, 1e-4), make_cost("8", 1, 1e-5), make_cost("16", 2, 1e-5)]
-    forget_errors(runs[0], "b")
-    assert find_best_run(runs, 1e-2).label == "8"
-    assert find_best_run(runs, 1e-6).label == "8"
-    for run_cost in runs:
-        forget_errors(run_cost, "a", "b")
-    assert describe_best_setting(runs, 1e-2) == (
-        "no setting is known to meet the tolerance 0.01: no run has an error estimate of every measure"
-    )
-
-
-def test_exact_notes_are_those_of_the_named_run():
-    """The advice of a note belongs to the setting that it names, which is the best run of the sentence.
-
-    Once the advice of the finest run was printed, though another run had the smallest errors.
-    """
-    model = build_model(tolerance=1e-3)
-    errors = {"2": 4e-2, "4": 2e-3, "8": 8e-3}
-    runs = [
-        replace(make_cost(label, 1, error), tolerance=1e-3, remedies=(f"advice {label}",))
-        for label, error in errors.items()
-    ]
-    answer = make_answer({"shear_modes": runs}, model)
-    assert answer.remarks.notes == ("With a knob at 4: advice 4.",)
-    assert answer.verdict[0].startswith(
-        "No setting is known to meet the tolerance 0.001: the best run, with a knob at 4,"
-    )
-    assert answer.quantities["largest_error"].value == pytest.approx(2e-3)
-
-    # The note of a curve over tolerances is that of the scene as it is.
-    runs = [replace(run, tolerance=10.0**-k) for k, run in enumerate(runs, 2)]
-    answer = make_answer({"tolerance": runs}, model)
-    assert answer.remarks.notes == ("With a knob at 4: advice 4.",)
-    assert answer.verdict == (
-        "At its tolerance 0.001 the scene takes 1 CPU s and misses the tolerance, with a largest error of 0.002 in a.",
-        "No run meets its tolerance.",
-        "For the tolerance 0.0001: advice 8.",
-    )
 
 
 def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
@@ -232,24 +115,3 @@ def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, message):
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = run_cli("cost", scene, *words)
     assert answer.code == 2 and message in answer.err
-
-
-def test_always_each_value_of_a_setting_runs_once(monkeypatch):
-    """Each value of a setting runs once, and fewer than three values are no curve.
-
-    A quarter and a half of a jump both give a single jump.
-    """
-    worn = build(WORN)
-    labels = [one.label for one in numerical_settings.make_setting_values(worn, "jumps")]
-    assert labels == ["1", "2", "4", "by tolerance"]
-    assert [one.label for one in compute_setting_costs(worn, "jumps")] == labels
-    run_plan = cost.run_plan
-
-    def run_one_jump(planned, **options):
-        if planned.model.wear.jumps != 1:
-            raise NotConverged("more than one jump")
-        return run_plan(planned, **options)
-
-    monkeypatch.setattr(cost, "run_plan", run_one_jump)
-    with pytest.raises(NotConverged, match="only 1 values of it succeeded"):
-        compute_setting_costs(worn, "jumps")

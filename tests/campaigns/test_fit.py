@@ -1,22 +1,21 @@
 """Parameters of each friction law fitted to friction loops, and output and refusals of the fit command."""
 
-import csv
 import json
 import math
 
 import numpy as np
 import pytest
 from command_line import run_cli
-from scipy.integrate import solve_ivp
+from friction_loops import dahl_force, elastic_plastic_force, write_loop
 
 from patchfem import SceneError, build
-from patchfem.campaigns.fits.loop import BenchModel, fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import FitOptions, FreeKeys, parse_ranges
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
+from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
-from patchfem.scene import BOUNDS, load, loads, read_assignments
+from patchfem.scene import load, loads
 
 LOAD = 100.0
 POINT = '[normal]\nload = "100 N"\n'
@@ -36,19 +35,11 @@ TRUTH = {
     "springs": {"friction.static": 0.31, "friction.stiffness": 1.3e7},
     "tanh": {"friction.static": 0.31, "friction.reference_speed": 1.7e-3},
     "bonds": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
-    "growth": {
-        "friction.static": 0.31,
-        "friction.kinetic": 0.22,
-        "friction.bond_length": 2.3e-6,
-        "friction.rest_growth": 7.0,
-        "friction.slip_growth": 1.1e-6,
-    },
 }
 FREE = {
-    "friction.static": "0.1..0.7", "friction.kinetic": "0.1..0.3", "friction.bond_length": "0.3 um..20 um",
+    "friction.static": "0.1..0.7", "friction.bond_length": "0.3 um..20 um",
     "friction.stiffness": "2e6 N/m..1e8 N/m",
-    "friction.reference_speed": "0.1 mm/s..100 mm/s", "friction.rest_growth": "1 m/s^2..50 m/s^2",
-    "friction.slip_growth": "0.2 um..10 um", "normal.load": "50 N..200 N",
+    "friction.reference_speed": "0.1 mm/s..100 mm/s",
 }  # fmt: skip
 
 
@@ -58,90 +49,20 @@ def sine_path(count=80, cycles=2):
     return time, 10e-6 * np.sin(2 * np.pi * 100 * time)
 
 
-def elastic_plastic_force(slide, mu, eps):
-    """Return the elastic-plastic friction force (n,) [N] along a piecewise linear path, by the play operator."""
-    out = [0.0]
-    for dq in np.diff(slide):
-        out.append(min(max(out[-1] + mu * LOAD * dq / eps, -mu * LOAD), mu * LOAD))
-    return np.array(out)
-
-
-def dahl_force(slide, mu, eps):
-    """Return the friction force (n,) [N] of bonds of constant length on a piecewise linear path.
-
-    It solves F' = mu N (sgn v - F/mu N) |v|/eps in closed form on each segment of the path.
-    """
-    out = [0.0]
-    for dq in np.diff(slide):
-        g = np.sign(dq) * mu * LOAD
-        out.append(g + (out[-1] - g) * np.exp(-abs(dq) / eps))
-    return np.array(out)
-
-
-def growing_bond_force(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
-    """Return the friction force (n,) [N] of bonds that grow at rest, along a piecewise linear path.
-
-    It integrates z' = v - |v| z/eps and equation 2.10 by a Runge-Kutta method of order 8.
-    """
-    out = [0.0]
-    eps = eps0
-    z = 0.0
-    m = 1.0
-    for dt, dq in zip(np.diff(time), np.diff(slide)):
-        v = dq / dt
-
-        def rate(_, y, v=v):
-            z, m, eps = y
-            w = abs(v)
-            return [
-                v * m - w * z / eps,
-                w * (1 - m) / eps,
-                rest / max(w, floor) * (eps0 - eps) + w / slip * (kinetic / mu * eps0 - eps),
-            ]
-
-        z, m, eps = solve_ivp(
-            rate, (0, dt), [z, m, eps], method="DOP853", rtol=1e-12, atol=1e-20
-        ).y[:, -1]
-        out.append(mu * LOAD / eps0 * z)
-    return np.array(out)
-
-
 def reference_force(law, time, slide, truth):
     """Return the friction force (n,) [N] of a law, computed without the package where a formula exists."""
     values = list(truth.values())
     if law == "elastic-plastic":
-        return elastic_plastic_force(slide, *values)
+        return elastic_plastic_force(slide, values[0] * LOAD, values[1])
     if law == "springs":
-        return elastic_plastic_force(slide, values[0], values[0] * LOAD / values[1])
+        return elastic_plastic_force(slide, values[0] * LOAD, values[0] * LOAD / values[1])
     if law == "bonds":
-        return dahl_force(slide, *values)
-    if law == "growth":
-        return growing_bond_force(time, slide, *values)
+        return dahl_force(slide, values[0] * LOAD, values[1])
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
     # The force at a row is the mean of those of the two adjacent segments.
     both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])
     return values[0] * LOAD * both
-
-
-def write_loop(path, time, slide, force, cycle=None, quantity="force [N]"):
-    """Write a measured loop as CSV and return its path; `cycle` (n,) adds a column of labels."""
-    with open(path, "w", newline="") as file:
-        out = csv.writer(file)
-        out.writerow(
-            ["time [ms]", "displacement [um]", quantity, *(["cycle"] if cycle is not None else [])]
-        )
-        for k in range(len(force)):
-            more = [int(cycle[k])] if cycle is not None else []
-            out.writerow(
-                [
-                    repr(float(1e3 * time[k])),
-                    repr(float(1e6 * slide[k])),
-                    repr(float(force[k])),
-                    *more,
-                ]
-            )
-    return path
 
 
 def load_scene(tmp_path, law, *sets, slide=SINE):
@@ -175,40 +96,6 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
     assert np.ptp(result.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
 
 
-def test_order_of_bond_growth_fit_is_two(tmp_path):
-    """The residual of a fit with growing bonds falls with the second power of the time step.
-
-    The steps are halved until the loop changes by less than a tenth of the tolerance, and this
-    change bounds the residual against the integrated reference loop.
-    """
-    time, slide = sine_path(24, 1)
-    loop = write_loop(
-        tmp_path / "loop.csv", time, slide, reference_force("growth", time, slide, TRUTH["growth"])
-    )
-    sets = [
-        f"{name}={value!r}"
-        + {"m": " m", "r": " m/s^2"}.get(
-            "m" if "length" in name or "slip" in name else "r" if "rest" in name else "", ""
-        )
-        for name, value in TRUTH["growth"].items()
-        if name != "friction.static"
-    ]
-    results = []
-    for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
-        scene = load_scene(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
-        result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
-        assert result.step_error <= 0.1 * tolerance * 31
-        assert result.rms < 1.4 * result.step_error
-        assert pieces is None or result.steps_per_row == pieces
-        results.append((result.steps_per_row, result.rms))
-    (few_pieces, coarse_rms), (many_pieces, fine_rms) = results
-    assert (
-        np.log(coarse_rms / fine_rms) / np.log(many_pieces / few_pieces)
-        == pytest.approx(2, abs=0.1)
-        and fine_rms < 3e-4
-    )
-
-
 def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     """A column of friction ratios gives the same parameters for a point and for a patch.
 
@@ -227,27 +114,6 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
         assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
-def test_exact_loop_of_tilted_patch_is_independent_of_earlier_trials(tmp_path):
-    """The loop of a patch at a tilt is the same to the bit for any earlier trial values.
-
-    A free tilt moves the contact but not the mesh.
-    """
-    time, slide = sine_path(8, 1)
-    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6))
-    text = (
-        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
-        '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'
-    )
-    scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
-    ranges, _ = read_assignments(["contact.tilt.angle=5 urad..200 urad"], BOUNDS)
-    loops = []
-    for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
-        model = BenchModel(FreeKeys(scene, ranges), loop, time)
-        loops.append([model(np.array([value])) for value in values])
-    assert np.array_equal(loops[0][1], loops[1][1]) and np.array_equal(loops[0][2], loops[1][0])
-    assert np.abs(loops[0][0] - loops[0][2]).max() > 1e-3 * np.abs(loops[0][0]).max()
-
-
 # ---- parameters that the rows do not determine, and doubtful records
 
 
@@ -258,7 +124,7 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
     fitted.
     """
     time, slide = sine_path(40)
-    force = elastic_plastic_force(slide, 0.31, 2.3e-6)
+    force = elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     cycle = 1 + (np.arange(81) > 40)
     wrong = write_loop(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = load_scene(tmp_path, "elastic-plastic")
@@ -286,7 +152,7 @@ def test_exact_parameters_of_steady_loop_follow_from_repeated_cycles(tmp_path):
     Without it the fit is poor and proposes `--hold`.
     """
     time, slide = sine_path(80, 4)
-    force = dahl_force(slide, 0.31, 2.3e-6)
+    force = dahl_force(slide, 0.31 * LOAD, 2.3e-6)
     names = ("friction.static", "friction.bond_length")
     cut = slice(93, 254)
     scene = load_scene(tmp_path, "bonds")
@@ -305,7 +171,7 @@ def test_exact_parameters_of_steady_loop_follow_from_repeated_cycles(tmp_path):
 def test_always_doubtful_records_give_warnings(tmp_path):
     """Correlated rows and a nonzero first force give warnings."""
     time, slide = sine_path(40)
-    late = elastic_plastic_force(slide, 0.31, 2.3e-6)[20:]
+    late = elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)[20:]
     result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic"),
         write_loop(
@@ -330,7 +196,7 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
     slide = sine_path(40)[1]
     text = "displacement [um],force [N]\n" + "\n".join(
         f"{1e6 * q!r},{f!r}"
-        for q, f in zip(slide.tolist(), elastic_plastic_force(slide, 0.31, 2.3e-6).tolist())
+        for q, f in zip(slide.tolist(), elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6).tolist())
     )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
@@ -354,7 +220,7 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
 def fit_command(tmp_path):
     """Return the words of a fit command for a noisy loop, with its files written."""
     time, slide = sine_path(24)
-    force = elastic_plastic_force(slide, 0.31, 2.3e-6)
+    force = elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     force += 0.1 * np.random.default_rng(1).normal(size=49)
     write_loop(tmp_path / "loop.csv", time, slide, force, 1 + (np.arange(49) > 24))
     load_scene(tmp_path, "elastic-plastic", slide='[slide]\nkind = "file"\nfile = "loop.csv"\n')
@@ -386,9 +252,9 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
 
 def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_path):
     """A fit that reaches its limit of evaluations exits with code 3 and states that it did not converge."""
-    from patchfem.identify import least_squares
+    from patchfem.identify import descent
 
-    monkeypatch.setattr(least_squares, "MAX_EVALUATIONS", 1)
+    monkeypatch.setattr(descent, "MAX_EVALUATIONS", 1)
     assert (
         run_cli(
             *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
@@ -438,33 +304,6 @@ def test_refuses_invalid_loop_with_line_number(fit_command, text, message, tmp_p
     assert answer.code == 2 and "loop.csv" in answer.err and message in answer.err, answer.err
 
 
-@pytest.mark.parametrize("table, message", [
-    ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
-    ("time [s],wobble [m]\n0,0\n0.1,2e-6\n", "slide.csv:1: a header like"),
-])  # fmt: skip
-def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, message):
-    """An invalid path file is refused by `fit` with the message of `check`.
-
-    The fit used to report an internal error instead, because the scene itself was valid.
-    """
-    (tmp_path / "slide.csv").write_text(table)
-    scene = tmp_path / "bench.toml"
-    loop = tmp_path / "loop.csv"
-    scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
-    time, slide = sine_path(8, 1)
-    np.savetxt(
-        loop,
-        np.c_[time, slide, elastic_plastic_force(slide, 0.3, 1e-6)],
-        delimiter=",",
-        comments="",
-        header="time [s],displacement [m],force [N]",
-    )
-    words = ("--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit")
-    answers = [run_cli("check", scene), run_cli("fit", scene, *words)]
-    assert f"{scene}:8: slide.file: " in answers[0].err and message in answers[0].err
-    assert answers[0] == answers[1] and answers[0].code == 2
-
-
 def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
     """Invalid options of `--hold`, missing files and unsuitable scenes are refused."""
     free = ["--free", "friction.static=0.1..0.7"]
@@ -502,7 +341,7 @@ def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
         ["accuracy.steps_per_cycle=24"],
     )
     loop = write_loop(
-        tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
+        tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     )
     result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()

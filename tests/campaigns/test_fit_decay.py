@@ -1,7 +1,5 @@
 """Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,11 +7,9 @@ from command_line import run_cli
 from page_data import find_accessibility_errors
 from scene_texts import (
     DRIVE,
-    ELASTIC_JOINT,
     KILOGRAM,
     POINT,
     make_friction_table,
-    make_shaken_block,
 )
 
 import patchfem as pf
@@ -52,6 +48,7 @@ def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=A
     return path
 
 
+@pytest.mark.slow
 def test_band_of_the_fitted_curve_contains_the_truth_beyond_the_data(tmp_path):
     """The 95 % band of a curve that is fitted to noisy data contains the true curve at three times the amplitudes."""
     path = write_decay(tmp_path / "decay.csv", IWAN, 0.03, 5, np.geomspace(2e-7, 1e-5, 6))
@@ -88,70 +85,6 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     )
     np.testing.assert_allclose(rows[:, :5], measured, rtol=1e-12)
     np.testing.assert_allclose(rows[:, 5:], measured[:, [1, 3]], rtol=1e-5)
-
-
-FLUID = make_shaken_block('law = "tanh"\nreference_speed = "0.3 m/s"').replace(
-    "static = 0.3", "static = 0.6"
-)
-
-
-def test_exact_overdamped_trials_are_skipped(tmp_path):
-    """Trial values at which the mode is overdamped are skipped, and the reference speed is recovered.
-
-    With friction of 60 N and a reference speed below about 0.1 m/s, where the search begins, the
-    damping ratio at the smallest amplitude is above 1; with 1 kN it is above 1 at every amplitude,
-    and the fit is refused.
-    """
-    path = write_decay(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 2))
-    free = {"friction.reference_speed": ("0.01 m/s", "3 m/s")}
-    result = pf.fit(
-        FLUID,
-        to=path,
-        free=free,
-        out=tmp_path / "out",
-        starts=1,
-        **{"friction.reference_speed": "20 mm/s"},
-    )
-    assert (
-        result["method"] == "balance" and result["rms"]["damping"] < 1e-4 and result["failures"] > 0
-    )
-    assert result["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
-    static = {"friction.static": (10.0, 20.0)}
-    with pytest.raises(
-        PatchfemError,
-        match=r"no curve of frequency and damping.*balance: .*the mode does not oscillate.*"
-        r"leave out the rows with the largest damping",
-    ):
-        pf.fit(FLUID, to=path, free=static, starts=1, out=tmp_path / "none")
-
-
-@pytest.mark.parametrize("gaps", [("quasi-static",), ("balance",), ("balance", "quasi-static")])
-def test_exact_method_with_gaps_is_not_used(gaps, tmp_path, monkeypatch):
-    """A method that has no value at one of the rows is left out of the fit with a note; the fit is refused without any.
-
-    Once a method with gaps counted as usable, so that all searches failed though the other one had every row.
-    """
-
-    def compute_with_gaps(model, amplitudes, method):
-        """Return frequency and damping that depend on chi, with a gap at the largest amplitude for some methods."""
-        values = np.outer([100.0, 0.01], 1 + np.arange(amplitudes.size) * model.friction.chi)
-        if method in gaps:
-            values[:, -1] = np.nan
-        return values
-
-    monkeypatch.setattr(curves, "compute_points", compute_with_gaps)
-    path = tmp_path / "curve.csv"
-    path.write_text("amplitude [um],frequency [Hz],damping\n1,100,0.01\n20,60,0.006\n")
-    free = parse_ranges(["friction.chi=-0.9..-0.05"])
-    reason = ".*the mode of the model does not oscillate at 1 of 2 amplitudes, from 20 um to 20 um"
-    if len(gaps) == 2:
-        with pytest.raises(PatchfemError, match=f"quasi-static: {reason}.*balance: {reason}"):
-            curves.fit_curve(pf.load(IWAN), path, free)
-        return
-    fit = curves.fit_curve(pf.load(IWAN), path, free)
-    (used,) = {"balance", "quasi-static"} - set(gaps)
-    assert fit.method == used and fit.keys.fit.values == pytest.approx([-0.4], rel=1e-6)
-    assert re.match(f"the fit is by {used} alone: {gaps[0]}: {reason}", fit.notes[0])
 
 
 def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):
@@ -219,26 +152,6 @@ def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
     assert far.describe_assumed_errors().endswith(
         "fit: 2 % of each frequency (no column frequency_error)"
     )
-
-
-def test_scatter_replaces_errors_that_a_table_does_not_give(tmp_path):
-    """With 3 % noise on both columns and no columns of errors, the intervals of a fit hold the truth.
-
-    The assumed errors, of which that of the frequency is 60 times too small, gave twice the friction coefficient.
-    """
-    joint = ELASTIC_JOINT.replace("0.3", "0.27").replace("2e5", "2.5e5")
-    amplitudes = np.geomspace(5e-6, 5e-4, 12)
-    true = pf.backbone(joint, amplitudes=amplitudes, method="balance")
-    noise = 1 + 0.03 * np.random.default_rng(8).standard_normal((2, 12))
-    rows = [amplitudes, true.balance_frequency * noise[0], true.balance_damping * noise[1]]
-    path = tmp_path / "points.csv"
-    head = "amplitude [m],frequency [Hz],damping [1]"
-    np.savetxt(path, np.transpose(rows), delimiter=",", header=head, comments="")
-    free = parse_ranges(["friction.static=0.05..0.6,friction.stiffness=5e4 N/m..1e6 N/m"])
-    drive = '[drive]\nkind = "force"\nforce = "1 N"\nfrequency = "200 Hz"\ncycles = 100\n'
-    fit = curves.fit_curve(pf.load(joint + drive), path, free).keys.fit
-    for value, (low, high) in zip((0.27, 2.5e5), fit.intervals.ends, strict=True):
-        assert low < value < high and high - low < 0.3 * value
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):

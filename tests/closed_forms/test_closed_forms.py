@@ -1,5 +1,6 @@
 """Closed forms compared with quadrature, arithmetic in many digits, and independent integration."""
 
+import contact_forms as exact
 import mpmath
 import numpy as np
 import pytest
@@ -14,8 +15,6 @@ from vibration_forms import (
     decay_rest,
     sliding_amplitude,
 )
-
-from patchfem.closed_forms import contact as exact
 
 HERTZ_PARAMETERS = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
 

@@ -15,8 +15,8 @@ SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob(
 STEADY = (
     "rig",
     "linear",
-)  # templates whose motion becomes steady; all other runs are done at their end
-# scenes of a normal run; the others are slow
+)  # templates whose motion becomes steady; other runs are done at their end
+DEAR = ("patch", "wear")
 MEANT = {  # expected warnings of a scene, each with its remedy and the reason to keep it
     "studies/rig/report.toml": (
         "the shape of the patch does not",
@@ -70,7 +70,7 @@ def run_and_list_warnings(path: Path, out: Path, *words) -> list:
 @pytest.mark.parametrize(
     "kind",
     [
-        pytest.param(one, marks=pytest.mark.slow) if one in NEXT_VERBS else one
+        pytest.param(one, marks=pytest.mark.slow) if one in (*NEXT_VERBS, *DEAR) else one
         for one in TEMPLATE_DESCRIPTIONS
     ],
 )

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 import patchfem as pf
 
 PIECE_SHARE = 0.5
+COARSE = {"contact.element_size": "0.1 mm"}
 RUN = """
 [contact]
 length = "3 mm"
@@ -59,7 +60,7 @@ def artificial_pair(tmp_path_factory) -> tuple:
     """
     truth = json.loads(Path(__file__).with_name("worn_patch.json").read_text("utf-8"))
     folder = tmp_path_factory.mktemp("made") / "wear"
-    pf.run(truth["scene"]).save(folder)
+    pf.run(truth["scene"], **COARSE).save(folder)
     x = np.arange(0.0, 8e-3, 1e-6)
     random = np.random.default_rng(7)
     new = draw_surface(x)
@@ -81,7 +82,7 @@ def artificial_pair(tmp_path_factory) -> tuple:
 def crowned_run(tmp_path_factory) -> Path:
     """Return the folder of a run in which the contact of a crown grows by wear."""
     folder = tmp_path_factory.mktemp("crowned") / "wear"
-    pf.run(RUN).save(folder)
+    pf.run(RUN, **COARSE).save(folder)
     return folder
 
 

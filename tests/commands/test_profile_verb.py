@@ -1,15 +1,14 @@
 """`patchfem profile`: definitions, JSON, report, several files, split traces, and error messages."""
 
 import json
-import os
 from pathlib import Path
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
 from command_line import run_cli
 
 import patchfem as pf
-from patchfem.closed_forms import contact as closed_forms
 
 UM = 1e-6
 
@@ -65,25 +64,6 @@ def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
         "profiles"
     ][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
-
-
-@pytest.mark.skipif(
-    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
-)
-def test_exact_dektak_parameters_agree_with_instrument():
-    """The parameters of a Dektak file between its cursors agree with those printed by the instrument."""
-    path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
-    answer = json.loads(run_cli("profile", path, "--window", "468 um,733 um", "--json").out)[
-        "profiles"
-    ][0]
-    assert answer["step"] == pytest.approx(0.15625e-6, rel=1e-12)
-    known = {
-        "Ra": ("Pa", 5.25e-9, 5e-12),
-        "Rq": ("Pq", 11.43e-9, 5e-12),
-        "Skew": ("Psk", 6.96, 5e-3),
-    }
-    for name, (parameter, printed, tolerance) in known.items():
-        assert answer["measures"][parameter]["value"] == pytest.approx(printed, abs=tolerance), name
 
 
 SPLIT_SCENE = """\

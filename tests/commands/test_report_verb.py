@@ -14,9 +14,9 @@ def folders(tmp_path_factory):
     base = tmp_path_factory.mktemp("report")
     (base / "bench.toml").write_text(BENCH, encoding="utf-8")
     for name, static in SETS.items():
-        words = ("--set", f"friction.static={static}", "-o", base / name, "-q")
+        words = ("--set", f"friction.static={static}", "-o", base / name, "-q", "--no-page")
         assert run_cli("run", base / "bench.toml", *words).code == 0
-    over = ("--over", "friction.static=0.2,0.3", "-o", base / "sweep", "-q")
+    over = ("--over", "friction.static=0.2,0.3", "-o", base / "sweep", "-q", "--no-page")
     assert run_cli("sweep", base / "bench.toml", *over).code == 0
     return base
 

@@ -42,25 +42,14 @@ def test_exact_closed_streams_do_not_affect_run(scene_file, tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "words, code, name",
-    [
-        (["run"], 0, "report.html"),
-        (["run", "--json"], 0, "report.html"),
-        (["sweep", "--over", "normal.load=100 N,-1 N"], 3, "report.html"),
-    ],
-)
-def test_exact_closed_pipe_changes_neither_files_nor_exit_code(
-    words, code, name, scene_file, tmp_path
-):
+def test_exact_closed_pipe_changes_neither_files_nor_exit_code(scene_file, tmp_path):
     """A command whose reader has gone writes all files and ends with the code of its work."""
     reader, writer = os.pipe()
     os.close(reader)
-    done = run_patchfem(
-        words[0], scene_file, *words[1:], "-o", tmp_path / "out", stdout=writer, stderr=writer
-    )
+    words = ("sweep", scene_file, "--over", "normal.load=100 N,-1 N", "--json", "--no-page")
+    done = run_patchfem(*words, "-o", tmp_path / "out", stdout=writer, stderr=writer)
     os.close(writer)
-    assert done.returncode == code and (tmp_path / "out" / name).is_file()
+    assert done.returncode == 3 and (tmp_path / "out" / "sweep.csv").is_file()
 
 
 def test_exact_full_stderr_keeps_exit_code(tmp_path):

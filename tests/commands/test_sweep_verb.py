@@ -43,7 +43,7 @@ def assert_equals_single_run(found, measure, part="value", tolerance=1e-12) -> N
 
 def sweep_into(out, rig_scene, *words):
     """Sweep a scene into a folder with the command line, and return the answer."""
-    return run_cli("sweep", rig_scene, *words, "-o", out)
+    return run_cli("sweep", rig_scene, *words, "-o", out, "--no-page")
 
 
 def read_rows(out) -> list:
@@ -114,8 +114,6 @@ def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
             one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
         } == before
     # sweeps over the same keys share a folder
-    answer = sweep_into(out, rig_scene, "--over", "normal.load=20 N,30 N", "--resume")
-    assert answer.code == 0 and len(read_rows(out)) == 2
     answer = sweep_into(out, rig_scene, "--over", "normal.load=10 N,20 N,30 N", "--resume")
     assert answer.code == 0 and len(read_rows(out)) == 3
 
@@ -154,16 +152,14 @@ cycles = 2
 """
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("words", [("--random", "5", "--seed", "3"), ("--sobol", "8")])
-def test_exact_command_and_table_repeat_random_cases(tmp_path, monkeypatch, words):
+def test_exact_command_and_table_repeat_random_cases(tmp_path, monkeypatch):
     """Random cases are repeated by their command, which the answer has, and by the rows of their table."""
     scene = tmp_path / "bench.toml"
     scene.write_text(BENCH, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    given = ["sweep", "bench.toml", "--over", "friction.static=0.24..0.36", *words]
+    over = ("--over", "friction.static=0.24..0.36", "--random", "5", "--seed", "3", "--no-page")
+    given = ["sweep", "bench.toml", *over]
     assert run_cli(*given, "-o", "first").code == 0
-
     assert store.read(tmp_path / "first").origin["command"].startswith("patchfem")
     assert run_cli(*given, "-o", "again").code == 0
     listed = sweep_into(tmp_path / "listed", scene, "--cases", tmp_path / "first" / "sweep.csv")

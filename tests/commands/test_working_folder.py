@@ -2,21 +2,19 @@
 
 from pathlib import Path
 
-import pytest
 from command_line import run_cli
 from scene_texts import BENCH
 
 NAMES = "random numpy pyvista signal copy socket selectors matplotlib h5py".split()
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_always_commands_execute_no_local_modules(tmp_path, monkeypatch, jobs):
+def test_always_commands_execute_no_local_modules(tmp_path, monkeypatch):
     """A run and the processes of a sweep execute no module of the working folder."""
     monkeypatch.chdir(tmp_path)
     Path("bench.toml").write_text(BENCH)
     for name in NAMES:
         Path(f"{name}.py").write_text("open('RAN', 'a')\nraise SystemExit(9)\n")
-    over = ("--over", "friction.static=0.2,0.3", "-j", jobs)
+    over = ("--over", "friction.static=0.2,0.3", "-j", 2, "--no-page")
     assert run_cli("run", "bench.toml", "-o", "out").code == 0
     assert run_cli("sweep", "bench.toml", *over, "-o", "swept").code == 0
     assert Path("swept/sweep.csv").is_file() and not Path("RAN").exists()

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from contact_forms import hertz_half_width
 from pieces import TITANIUM, make_bare_layers, make_refined_grid
 from pressed import press
 
-from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact import edges
 from patchfem.core import Compliance, Interface, frozen_array
 from patchfem.elasticity import Piece, interface_compliance

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
 
-from patchfem.closed_forms import contact as closed_forms
 from patchfem.contact import (
     PointCompliance,
     end_compliance,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contact_forms as exact
 import numpy as np
 import pytest
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, make_compliance
 from pressed import press
 from study_module import load_study
 
-from patchfem.closed_forms import contact as exact
 from patchfem.contact.gaps import crown
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.grid import graded_rows

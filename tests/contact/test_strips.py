@@ -6,16 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from contact_forms import (
+    wedge_on_asperities,
+    wedge_on_linear_foundation,
+    wedge_opening_tilt,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from skins import press_strips
 
-from patchfem.closed_forms.contact import (
-    wedge_on_asperities,
-    wedge_on_linear_foundation,
-    wedge_opening_tilt,
-)
 from patchfem.contact import (
     ExponentialAsperities,
     HertzAsperities,

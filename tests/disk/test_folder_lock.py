@@ -42,20 +42,6 @@ FolderLock(Path(sys.argv[1]), "out", "run").acquire()
 print("taken", flush=True)
 sys.stdin.readline()
 """
-KILLED_CODE = """\
-import os, sys
-from pathlib import Path
-from patchfem.disk import exchange
-from patchfem.export.folder import Folder
-real, moved = os.rename, []
-def rename(*both):
-    if len(moved) == int(sys.argv[2]):
-        os._exit(9)  # killed
-    moved.append(real(*both))
-with Folder(Path(sys.argv[1])) as folder:
-    (folder.path / "summary.json").write_text("new")
-    os.rename = rename
-"""
 
 
 def start_process(code: str, *words):
@@ -129,36 +115,6 @@ def test_exact_lock_is_that_of_open_file(tmp_path, left):
     assert path.exists()
     other.release()
     assert not path.exists()
-
-
-@pytest.mark.parametrize(
-    "n_moved, expected_names",
-    [
-        (0, {"out", "out.partial", ".out.writer"}),
-        (1, {".out.old", "out.partial", ".out.writer"}),
-        (2, {"out", ".out.old", ".out.writer"}),
-        (9, {"out"}),
-    ],
-    ids=["before", "between", "behind", "never"],
-)
-def test_exact_kill_between_renames_preserves_results(tmp_path, n_moved, expected_names):
-    """After a kill between two renames the next run restores the older or the newer results."""
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "summary.json").write_text("older")
-    code = KILLED_CODE
-    if n_moved == 2:  # killed before the older folder is removed
-        code = KILLED_CODE.replace(
-            "moved = os.rename, []",
-            "moved = os.rename, []\n"
-            "exchange.shutil.rmtree = lambda path, **_: path.exists() and os._exit(9)",
-        )
-    done = subprocess.run([*PYTHON, code, out, str(n_moved)])
-    assert done.returncode == (0 if n_moved == 9 else 9) and list_names(tmp_path) == expected_names
-    with pytest.raises(ZeroDivisionError), Folder(out) as folder:
-        assert (out / "summary.json").read_text() == ("older" if n_moved < 2 else "new")
-        raise ZeroDivisionError
-    assert folder.target == out and list_names(tmp_path) == {"out"}
 
 
 def test_refuses_to_remove_foreign_files(tmp_path):

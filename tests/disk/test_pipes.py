@@ -7,8 +7,10 @@ import time
 import pytest
 
 from patchfem.campaigns.sweeps.table import read_case_table
+from patchfem.core import PatchfemError
 from patchfem.disk import open_with_timeout
 from patchfem.scene import scene, toml_text
+from patchfem.surface import read_surface
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 
@@ -46,6 +48,8 @@ def test_refuses_pipe_without_writer(named_pipe, monkeypatch):
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):
         toml_text.read_text(named_pipe)
+    with pytest.raises(PatchfemError, match=r"x\.toml: the profile cannot be read .*no data came"):
+        read_surface(named_pipe)
     assert read_case_table(named_pipe)[1] == [
         f"{named_pipe}: the table of cases cannot be read (this is a pipe, and no data came through it within 0 s)"
     ]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from contact_forms import layered_compliance
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM
 
-from patchfem.closed_forms.contact import layered_compliance
 from patchfem.core import NotConverged
 from patchfem.elasticity import (
     Layers,

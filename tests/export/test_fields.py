@@ -14,6 +14,8 @@ from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
+from patchfem import PatchfemError
+from patchfem.export import page
 from patchfem.export.fields.blocks import FIELDS
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
@@ -227,3 +229,26 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         values = getattr(patch, name)
         np.testing.assert_allclose(line[name], values, 1e-6, 1e-6 * np.abs(values).max())
     assert np.array_equal(line.points[:, 0], patch.x)
+
+
+@pytest.mark.parametrize(
+    "name, value, is_refused",
+    [
+        ("lower/Connectivity", 10**9, True),
+        ("upper/Connectivity", -1, True),
+        ("interface/PointData/normal_stress", -1.0, False),
+    ],
+)
+def test_refuses_impossible_mesh_of_a_page(tmp_path, name, value, is_refused):
+    """A page names the file whose cells have nodes that do not exist; pressures that are all below 0 are drawn."""
+    write_small_series(tmp_path / "out")
+    path = tmp_path / "out" / NAME
+    with h5py.File(path, "r+") as file:
+        file[f"VTKHDF/{name}"][...] = value
+    if is_refused:
+        with pytest.raises(
+            PatchfemError, match=f"{path}: not the fields .* node that does not exist"
+        ):
+            page.make_stress_panels(path)
+    else:
+        assert len(page.make_stress_panels(path)) == 1

@@ -7,7 +7,6 @@ import xarray as xr
 from command_line import run_cli
 from scene_texts import BENCH
 
-import patchfem as pf
 from patchfem.core import Missing
 from patchfem.export import page
 
@@ -61,24 +60,3 @@ def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, f
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
-
-
-def test_always_failing_page_leaves_results_in_python(scene_file, tmp_path, monkeypatch):
-    """Results that Python saves, and those of the cases of a sweep, are complete if their pages cannot be written."""
-
-    def fail(folder):
-        """Fail in place of writing a page."""
-        raise Missing("report.html: no space")
-
-    result = pf.run(scene_file)
-    monkeypatch.setattr(page, "write_page", fail)
-    with pytest.raises(Missing, match="no space"):
-        result.save(tmp_path / "out")
-    over = ("--over", "friction.static=0.2", "--keep", "pages")
-    assert run_cli("sweep", scene_file, *over, "-o", tmp_path / "sweep").code == 4
-    for summary in (
-        tmp_path / "out" / "summary.json",
-        *tmp_path.glob("sweep/cases/*/summary.json"),
-    ):
-        assert {path.name for path in summary.parent.iterdir()} == RESULT_FILES
-    assert len(list(tmp_path.glob("sweep/cases/*"))) == 1

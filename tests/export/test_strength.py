@@ -7,10 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 from command_line import run_cli
-from scipy.optimize import minimize_scalar
 
 import patchfem as pf
-from patchfem.runs.patch import strength
 from patchfem.scene import MATERIALS
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
@@ -109,17 +107,3 @@ def test_exact_yield_bound_from_peak_pressure(tmp_path, plane):
     (told,) = [note for note in result.notes if "yield strength" in note]
     # the stress of the mesh is larger and replaces the bound
     assert "the von Mises stress reaches" in told
-
-
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_exact_least_stress_of_a_face_that_yields(plane):
-    """At a frictionless face the von Mises stress is smallest for one stress along the face, found here numerically."""
-    poisson = 0.3
-
-    def compute_von_mises(along):
-        through = poisson * (along - 1) if plane == "strain" else 0.0
-        differences = np.diff([along, -1.0, through, along])
-        return np.sqrt((differences**2).sum() / 2)
-
-    smallest = minimize_scalar(compute_von_mises, (-1.0, 0.0), tol=1e-12).fun
-    assert strength.min_von_mises_ratio(poisson, plane) == pytest.approx(smallest, rel=1e-9)

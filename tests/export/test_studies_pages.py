@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
+from friction_loops import elastic_plastic_force, write_loop
 from page_data import find_strange_curves, find_wrong_numbers, read_charts
 from scene_texts import DRIVE, MODE, PLASTIC, POINT
 
@@ -21,19 +22,6 @@ BLOCK = POINT + PLASTIC + MODE + DRIVE
 STATIC = "friction.static=0.1..0.7"
 G_N = 9.80665
 MIL = 25.4e-6
-
-
-def write_loop(path, noise: float) -> None:
-    """Write the loop of an elastic-plastic contact (30 N, 2 um) under a sine with noise [N], in two labelled cycles."""
-    time = np.linspace(0.0, 0.1, 121)
-    slide = 10e-6 * np.sin(2 * np.pi * 20 * time)
-    force = [0.0]
-    for step in np.diff(slide):
-        force.append(float(np.clip(force[-1] + 30.0 / 2e-6 * step, -30.0, 30.0)))
-    force += noise * np.random.default_rng(1).normal(size=time.size)
-    rows = zip(time, slide, force, 1 + (time > 0.05), strict=True)
-    lines = [f"{t!r},{x!r},{f!r},{c}" for t, x, f, c in (map(float, row) for row in rows)]
-    path.write_text("\n".join(["time [s],displacement [m],force [N],cycle", *lines]), "utf-8")
 
 
 def write_rows(path) -> None:
@@ -54,7 +42,11 @@ def folders(tmp_path_factory):
     (base / "bench.toml").write_text(BENCH, "utf-8")
     (base / "block.toml").write_text(BLOCK, "utf-8")
     (base / "linear.toml").write_text(MODE + DRIVE, "utf-8")
-    write_loop(base / "loop.csv", 0.3)
+    time = np.linspace(0.0, 0.1, 121)
+    slide = 10e-6 * np.sin(2 * np.pi * 20 * time)
+    force = elastic_plastic_force(slide, 30.0, 2e-6)
+    force += 0.3 * np.random.default_rng(1).normal(size=time.size)
+    write_loop(base / "loop.csv", time, slide, force, 1 + (time > 0.05))
     write_rows(base / "rows.csv")
     free_mode = (
         "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2"
@@ -194,25 +186,3 @@ def test_exact_plot_is_a_picture(folders, tmp_path, ending, names):
         assert path.read_bytes().startswith(starts[ending])
     with pytest.raises(PatchfemError, match=r"\.png, \.svg, \.pdf"):
         axes.write_plot(store.read(folders / "cost"), tmp_path / "a.jpg")
-
-
-def test_exact_signed_maps_have_same_colours_in_page_and_picture():
-    """The largest value of a map with both signs is red, and the smallest is blue, on the page and in a picture."""
-    from base64 import b64decode
-    from gzip import decompress
-
-    from patchfem.export import page
-    from patchfem.export.charts import axes, panel, plotly
-
-    curve = panel.Curve("", np.arange(2.0), np.array([[-1.0, 0.5]]), rows=np.zeros(1))
-    chart = panel.Panel("map", "map", panel.Axis("x"), panel.Axis("y"), [curve])
-    (mesh,) = axes.make_figure([chart]).axes[0].collections
-    drawn = [mesh.cmap(mesh.norm(value))[:3] for value in (-1.0, 1.0)]
-
-    (trace,) = plotly.draw(chart)["data"]
-    library = decompress(b64decode(page.read_library())).decode()
-    scale = re.search(rf"{trace['colorscale']}:(\[\[.*?\]\])", library)[1]
-    colours = re.findall(r"rgb\((\d+),(\d+),(\d+)\)", scale)
-    shown = [tuple(map(int, colours[place])) for place in (0, -1)]
-    for low, high in (drawn, shown):
-        assert low[2] > low[0] and high[0] > high[2]

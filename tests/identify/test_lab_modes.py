@@ -25,18 +25,6 @@ def test_exact_modes_from_record_without_window_bias(quantity):
     assert modes.misfit < 1e-8
 
 
-def test_exact_modes_from_impact_without_window():
-    """The modes fitted to an impact whose response decays within the record are exact."""
-    s = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
-    force = 50 * np.exp(-(((TIME - 0.4) / 1e-3) ** 2))
-    H = sum(a / (w * w + s**2 + 0.04 * w * s) for w, a in zip(OMEGA, RESIDUE))
-    response = np.fft.irfft(s**2 * H * np.fft.rfft(force), SAMPLES)
-    modes = fit_driven_modes(STEP, force, response, "acceleration")
-    np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
-    identified = identify_driven_modes({"time": TIME, "force": force, "acceleration": response})
-    assert not identified.notes and identified.mass == pytest.approx(1 / 1.2, rel=1e-7)
-
-
 def test_always_noisy_damping_is_within_stated_error():
     """The damping from a record with 10 % noise is within 1.5 times its stated error."""
     force, response = driven_response("acceleration")

@@ -1,11 +1,7 @@
 """Bounded least squares compared with linear algebra, closed-form profiles and known solutions."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
@@ -52,24 +48,6 @@ def test_exact_linear_fit_has_closed_form_intervals():
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
     assert fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc") == []
-
-
-@given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
-def test_always_fit_is_invariant_to_scaling(seed, shift, power):
-    """Scaling of data and values leaves the scaled fit and its intervals unchanged."""
-    rng = np.random.default_rng(seed)
-    scale = 10.0**power
-    design = rng.normal(size=(12, 2))
-    data = rng.normal(size=12)
-    values, half, *_ = solve_linear(design, data)
-    # the bounds have different signs, so that no value is searched by its logarithm
-    low = -np.abs(values) - (20 + shift) * half
-    high = np.abs(values) + (20 - shift) * half
-    fit = Problem(
-        lambda v: scale * (design @ (v / scale) - data), scale * low, scale * high
-    ).solve()
-    assert fit.values / scale == pytest.approx(values, abs=1e-6 * half.max())
-    assert np.ptp(fit.intervals.ends, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
 
 
 def test_exact_value_at_bound_has_profile_interval():
@@ -244,31 +222,6 @@ def make_failing_residual(error):
         raise error
 
     return residual
-
-
-def test_exact_counts_contain_every_evaluation():
-    """The counts of a search contain its last descent and its failures, and those of an earlier search if asked.
-
-    Once the evaluations of the last descent, and those of the search by the quasi-static curve, were lost.
-    """
-    calls = []
-
-    def residual(values):
-        calls.append(values)
-        if values[0] > 4:
-            raise PatchfemError("too large")
-        return DESIGN @ values - NOISY
-
-    problem = Problem(residual, [-5, -5, -5], [5, 5, 5])
-    fit = problem.search(Search(3, seed=1))
-    assert fit.counts.evaluations == len(calls)
-    first = problem.solve(4, "")
-    second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
-    assert fit.counts.evaluations + second.counts.evaluations == len(calls)
-    assert second.n_best == first.n_best == 4
-    failures = fit.counts.failures + second.counts.failures
-    assert failures == sum(values[0] > 4 for values in calls) > 0
-    assert second.counts.reason == "too large"
 
 
 def test_exact_descent_begins_at_bound_beside_failures():

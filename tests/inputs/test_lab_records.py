@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from command_line import run_cli
-from lab_files import INCH, SI, elastic_plastic_loop, make_record, write_universal
+from lab_files import INCH, SI, make_record, write_universal
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import parse_requests, read_records
+from patchfem.inputs import parse_requests, read_records, read_signal
 
-TIME, SLIDE, FORCE = elastic_plastic_loop(20, 1)
+TIME = np.arange(21) / 2000
+SLIDE = 1e-5 * np.sin(200 * np.pi * TIME)
+FORCE = 36 * np.cos(200 * np.pi * TIME)
 
 
 @pytest.mark.parametrize("binary, spacing, digits", [(0, 0, 6), (0, 1, 6), (1, 1, 6)])
@@ -21,6 +23,15 @@ def test_exact_universal_file_layouts(tmp_path, binary, spacing, digits):
     records = read_records(write_universal(tmp_path / "a.unv", [SI, *datasets]), [])
     assert records.values["force"] == pytest.approx(FORCE, rel=1e-11)
     assert records.values["time"] == pytest.approx(TIME, rel=10 ** (1 - digits))
+
+
+def test_exact_signal_of_universal_file(tmp_path):
+    """The acceleration of a universal file is a signal; a missing quantity is refused."""
+    path = write_universal(tmp_path / "a.uff", [SI, make_record(TIME, FORCE, 12, binary=0)])
+    time, value = read_signal(path, "acceleration")
+    assert time == pytest.approx(TIME, rel=1e-5) and value == pytest.approx(FORCE, rel=1e-11)
+    with pytest.raises(PatchfemError, match="0 of the 2 datasets match"):
+        read_signal(path, "force")
 
 
 def test_exact_units_of_dataset_164_and_channel_labels(tmp_path):

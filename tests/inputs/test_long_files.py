@@ -77,13 +77,6 @@ def test_refuses_invalid_cell_with_line_number(write_table, n_rows, cell, messag
     assert sentence.partition("a.csv:")[2].startswith(f"{n_rows + 2}: ") and message in sentence
 
 
-def test_refuses_empty_matrices():
-    """Matrices without coordinates are refused."""
-    empty = np.zeros((0, 0))
-    with pytest.raises(PatchfemError, match="M must be square with at least one row"):
-        arrays.build_basis({"M": empty, "K": empty, "slide": np.zeros(0), "output": np.zeros(0)})
-
-
 @pytest.mark.parametrize(
     "name, reader, expected",
     [

@@ -117,3 +117,17 @@ def test_refuses_invalid_matrix_file(tmp_path, name):
     with pytest.raises(PatchfemError) as caught:
         matrices.read_matrix(tmp_path / name, "stiffness")
     assert message in str(caught.value) and name in str(caught.value), str(caught.value)
+
+
+def test_exact_mass_is_padded_to_size_of_stiffness(tmp_path):
+    """A mass of lines of row, column and number is padded with zeros to the size of the stiffness.
+
+    Such lines do not state the size of the matrix.
+    """
+    stiffness = tmp_path / "k.mtx"
+    mass = tmp_path / "m.mtx"
+    stiffness.write_text("1 1 4.0\n1 2 -1.0\n2 2 3.0\n")
+    mass.write_text("1 1 2.5\n")
+    pair = (matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass"))
+    matrix_lists = [matrix.values.toarray().tolist() for matrix in matrices.align_rows(*pair)]
+    assert matrix_lists == [[[4.0, -1.0], [-1.0, 3.0]], [[2.5, 0.0], [0.0, 0.0]]]

@@ -23,8 +23,7 @@ from scene_texts import (
     TRIANGLE,
 )
 
-from patchfem.effects import EFFECTS, import_effect
-from patchfem.model import build, gap
+from patchfem.model import build
 from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -185,12 +184,6 @@ def test_exact_replaced_part_equals_changed_scene_key(text, sets, change):
 # ---- effects and derived properties
 
 
-def test_always_every_effect_names_a_module_that_exists():
-    """The module of every effect that has code of its own can be imported."""
-    for name, effect in EFFECTS.items():
-        assert not effect.module or import_effect(name).__name__ == effect.module, name
-
-
 def test_exact_run_in_of_one_stroke_has_steps_of_cycles():
     """A run-in as long as the amplitude of a triangle has the same steps as its cycles."""
     slide = build(loads(BENCH, sets=["slide.distance=10 um", "slide.cycles=2"])).slide
@@ -222,10 +215,3 @@ def test_exact_only_base_sine_at_resonance_of_single_mode_has_knee(text, sets, h
     """Only a sine of the base at resonance of a single mode has a drive that friction can bound."""
     model = build(loads(POINT + COULOMB + text, sets=sets))
     assert set(find_drive_and_knee(model)) == ({"drive", "knee"} if has_knee else set())
-
-
-@pytest.mark.parametrize("loaded, length", [((), 3), ((0,), 1), ((1,), 2)])
-def test_exact_longest_loaded_cell(loaded, length):
-    """Only cells next to a node with pressure count; without such nodes all cells count."""
-    x = np.array([0.0, 1.0, 3.0, 6.0])
-    assert gap.longest_loaded_cell(x, np.isin(range(4), loaded)) == length

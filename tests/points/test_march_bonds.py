@@ -267,7 +267,7 @@ def test_exact_enlarged_list_equals_large_list(name, monkeypatch):
 
 def test_refuses_list_longer_than_limit(monkeypatch):
     """A list that exceeds the largest number of entries is refused with a message that names the key to change."""
-    monkeypatch.setattr(engine, "MAX_STRIPS", 100)
+    monkeypatch.setattr(engine, "MAX_LIST_STRIPS", 100)
     with pytest.raises(
         Missing, match=r"grew beyond 100 entries \(0 MB\) after step \d+; raise accuracy.tail"
     ):

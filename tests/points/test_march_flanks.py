@@ -183,4 +183,4 @@ def test_exact_tractions_of_scene_sum_to_friction_force(law):
             np.isfinite(result.fields["slip"]).all()
             and result.measures["energy_balance"].value < 1e-10
         )
-        assert any("are the same for all points" in note for note in result.extra["notes"])
+        assert any("are the same for all points" in note for note in result.notes)

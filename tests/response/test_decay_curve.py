@@ -138,7 +138,7 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
     values = np.linalg.eigvals(matrix)
     frequency = values.imag / (2 * np.pi)
     damping = -values.real / np.abs(values)
-    decay = done.extra["decay"]
+    decay = done.motion.decay
     k = np.argmin(np.abs(frequency - decay.frequency[-1]))
     rings = decay.frequency == decay.frequency[-1]
     assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
@@ -154,7 +154,7 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
 def test_exact_linear_release_has_eigenvalue():
     """Every row of a release without friction has frequency and damping of the first mode, although another one rings."""
     text = TWO_MODES[TWO_MODES.index("[structure]") :]
-    decay = pf.run(text).extra["decay"]
+    decay = pf.run(text).motion.decay
     assert decay.frequency.size > 100
     assert decay.frequency == pytest.approx(40 * np.sqrt(1 - 0.002**2), rel=1e-9)
     assert decay.damping == pytest.approx(0.002, rel=1e-7)
@@ -166,8 +166,8 @@ def test_exact_decay_that_ends_stuck_on_stiffening_spring():
     spring = '1 kg"\nstiffening = {cubic = "2e10 N/m^3"}'
     text = first.replace('1 kg"', spring) + TWO_MODES[TWO_MODES.index("[drive]") :]
     run = pf.run(text)
-    decay = run.extra["decay"]
-    late = decay.select(decay.time > run.extra["events"].time[-1] + 0.1)
+    decay = run.motion.decay
+    late = decay.select(decay.time > run.motion.events.time[-1] + 0.1)
     assert late.time.size > 40
 
     # Energy: T = 4 int_0^(pi/2) d theta / sqrt(w^2 + c a^2 (1 + sin^2 theta) / 2).
@@ -225,7 +225,7 @@ def mindlin_damping(amplitude, stuck: float, slide: float):
 
 def test_always_release_errors_cover_mindlin_damping():
     """The errors of the decay curve cover Mindlin's damping."""
-    decay = pf.run(CROWNED).extra["decay"]
+    decay = pf.run(CROWNED).motion.decay
     stuck = decay.frequency[-1]
     known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
     law = mindlin_damping(decay.amplitude[known], stuck, 1.0)

@@ -65,7 +65,7 @@ def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
     result = run(loads(RIG.format(levels=levels)))
     onset = result.measures["onset_level"]
     assert abs(onset.value - ONSET) <= onset.error <= 1e-3 * ONSET
-    table = result.extra["levels"]
+    table = result.motion.levels
     up = table[:3]  # on the way back a block that stands aside slips below mu N/m
     assert [one.stuck for one in up] == [one.drive < ONSET for one in up]
     assert result.response.time[-1] * 143 == pytest.approx(30 * len(table))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from patchfem import run
-from patchfem.core import DriveSegment, Measure
-from patchfem.response import STICKS_AT_REVERSAL_REASON, find_missing_loops
+from patchfem.core import DriveSegment, Measure, Outcome
+from patchfem.response import STICKS_AT_REVERSAL_REASON, find_invalid
 from patchfem.response.reasons import APERIODIC_REASON, OPEN_LOOP_REASON, OUTPUT_AT_REST_REASON
 
 FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
@@ -51,7 +51,8 @@ def make_window(stored: float, lost: float) -> SimpleNamespace:
 def test_exact_loop_area_needs_dissipation_above_storage(stored, lost, open_):
     """A loop that stores more energy than it dissipates is not closed and has no area."""
     area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
-    found = find_missing_loops({"loop_area": area}, make_window(stored, lost), FREE)
+    window = make_window(stored, lost)
+    found = find_invalid({"loop_area": area}, window, FREE, Outcome.STEADY, is_rigid=False)
     assert set(found) == ({"loop_area"} if open_ else set())
     if open_:
         one = found["loop_area"]

@@ -182,7 +182,7 @@ def test_exact_block_on_belt_is_not_stuck(end, outcome):
     slipped = result.response.slide[-1] - result.response.slide[0]
     assert abs(slipped) > 0.1 and result.outcome == outcome
     if outcome == "steady":
-        assert result.extra["window"] == 2
+        assert result.settings.window_cycles == 2
         assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
             np.sqrt(0.17), abs=2e-7
         )

@@ -22,7 +22,7 @@ def find_failed_remedies(seed: int) -> list:
     """Return the remedies of a random scene that do not have the promised effect."""
     tables = draw_scene(seed)
     result = run_tables(tables)
-    sentences = [] if result is None else [*result.warnings, *result.extra.get("notes", [])]
+    sentences = [] if result is None else [*result.warnings, *result.notes]
     remedies = [remedy for sentence in sentences for remedy in parse_remedies(sentence)]
     return [
         remedy for remedy in remedies if try_remedy(tables, result, remedy) in ("failed", "refused")
@@ -61,7 +61,7 @@ def test_always_unresolved_free_vibration_is_solved_without_prescribed_steps():
     loose = "[accuracy]\ntolerance = 0.3\n"
     marched = run(JOINT_SHAKEN + loose + 'method = "march"\nsteps_per_cycle = 200\n')
     advice = "leave out accuracy.method and accuracy.steps_per_cycle"
-    assert marched.extra["engine"] == "march" and advice in marched.warnings[0]
+    assert marched.settings.engine == "march" and advice in marched.warnings[0]
     exact = run(JOINT_SHAKEN + loose)
     errors = [result.measures["equivalent_damping"].error for result in (marched, exact)]
     assert errors[1] < errors[0] / 10

@@ -133,7 +133,7 @@ def test_exact_two_ways_agree_within_errors(name):
     second run counts 1.5 times; the main measures agree to what the coarser steps leave."""
     text, common, first, second, names, engines, difference = PAIRS[name]
     one, other = (run_scene(text, f"{common}; {changes}") for changes in (first, second))
-    assert [one.extra["engine"], other.extra["engine"]] == engines.split()
+    assert [one.settings.engine, other.settings.engine] == engines.split()
     assert one.outcome == other.outcome
     assert names or one.measures.keys() == other.measures.keys()
     names = names.split() or [

@@ -119,7 +119,7 @@ def run_to_time_loop(text: str, changes: str) -> None:
         assert method in ("", "march"), changes
     else:
         assert result.measures, changes
-        assert not method or result.extra["engine"] == METHODS_OF_ENGINES[method], changes
+        assert not method or result.settings.engine == METHODS_OF_ENGINES[method], changes
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -49,7 +49,7 @@ def test_exact_linear_curve_agrees_with_modal_sum():
     """The curve without friction agrees with the modal sum at every point, and within 1 % between
     the points. The peak is output base a/(2 zeta omega^2)."""
     result = pf.run(RIG)
-    curve = result.extra["curve"]
+    curve = result.motion.steady.curve
     displacement = modal_sum(curve["frequency"])
     np.testing.assert_allclose(curve["amplitude"], np.abs(displacement), rtol=1e-12)
     acceleration = LEVEL - (2 * np.pi * curve["frequency"]) ** 2 * displacement
@@ -81,7 +81,7 @@ def test_curve_that_ends_early_has_a_note(max_points, monkeypatch):
     scene = RIG + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n'
     result = pf.run(scene, **{"drive.from": begin})
     notes = [text for text in result.warnings if "and not the end of the sweep" in text]
-    reached = result.extra["curve"]["frequency"].max()
+    reached = result.motion.steady.curve["frequency"].max()
     if max_points > 15:
         assert not notes and reached == pytest.approx(210)
         return
@@ -97,7 +97,7 @@ def test_always_undamped_resonance_is_missing_in_curve():
     """The point at the frequency of an undamped mode has no amplitude and is marked as unbounded; the others are finite."""
     curve = pf.run(
         RIG.replace("0.003", "0"), **{"drive.from": "142 Hz", "drive.to": "144 Hz"}
-    ).extra["curve"]
+    ).motion.steady.curve
     at_resonance = curve["frequency"] == 143.0
     assert np.isnan(curve["amplitude"][at_resonance]).all() and at_resonance.any()
     assert (curve["regime"][at_resonance] == "unbounded").all()

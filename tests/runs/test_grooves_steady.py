@@ -39,7 +39,7 @@ def test_exact_coulomb_steady_state_closes_to_round_off():
     """The residual of the cycle is below 1e-8, its energy balance closes within 1e-9, and it agrees
     with a long run within 1e-7."""
     result = pf.run(load_rig("coulomb"))
-    assert result.extra["residual"] < 1e-8 and result.extra["map"] == "shooting"
+    assert result.motion.steady.residual < 1e-8 and result.settings.map == "shooting"
     assert result.measures["energy_balance"].value < 1e-9
     run = pf.run(load_rig("coulomb", "accuracy.method=exact", "drive.cycles=100"))
     for name in MAIN_MEASURES[:2]:
@@ -55,7 +55,7 @@ def test_exact_multipliers_agree_with_linear_groove_stiffness():
         "normal.grooves.amplitude=0.5 um",
         "drive.acceleration=1e-3 m/s^2",
     )
-    multipliers = pf.run(scene_to_run).extra["multipliers"]
+    multipliers = pf.run(scene_to_run).motion.steady.multipliers
     model = build(scene_to_run)
     modes = model.rig.modes
     drive = model.rig.drive.signal

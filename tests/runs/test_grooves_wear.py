@@ -85,7 +85,7 @@ def test_exact_worn_amplitude_agrees_with_differential_equation():
     assert measure_value(result, "friction_force_peak") == pytest.approx(
         LOAD * (t + MU) / (1 - MU * t), rel=1e-9
     )
-    history = result.extra["wear"]
+    history = result.wear.columns
     assert history["groove_amplitude"][0] == 7.5e-6
     assert (np.diff(history["groove_amplitude"]) < 0).all()
 

@@ -3,10 +3,10 @@ nodes."""
 
 import numpy as np
 import pytest
+from contact_forms import hertz_half_width, hertz_peak
 from scene_texts import PIECE
 
 from patchfem import run
-from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Outcome
 from patchfem.runs.patch import mesh_levels
 from patchfem.scene import loads

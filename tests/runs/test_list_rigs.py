@@ -74,5 +74,5 @@ def test_always_energy_balance_of_random_rigs_closes():
         is_created = values["energy_created"] > 1e-9 * values["energy_dissipated"]
         assert any("in the report created" in line for line in result.warnings) == is_created, text
         if '"stretch"' in text:
-            exchanged = values["energy_dissipated"] + result.extra["book"]["power"]
+            exchanged = values["energy_dissipated"] + result.motion.energies["power"]
             assert values["energy_created"] <= 1e-12 * exchanged, text

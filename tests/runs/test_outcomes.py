@@ -237,7 +237,7 @@ def test_exact_outcome_and_sentences(text, changes, outcome, sentence, absent):
         estimate="loop" in sentence or ("[slide]" not in text and "[drive]" not in text),
     )
     assert outcome in (None, str(result.outcome)), result.outcome
-    sentences = [*result.warnings, *result.extra.get("notes", ())]
+    sentences = [*result.warnings, *result.notes]
     assert any(re.search(sentence, one, re.S) for one in ["", *sentences]), sentences
     assert not absent or not any(re.search(absent, one) for one in sentences)
     if "changes until" in sentence:
@@ -299,7 +299,7 @@ def test_exact_plan_chooses_engine(text, changes, engine):
     assert run_plan.engine == engine
     if "bench" in engine:
         result = run_scene(text, changes + "; accuracy.steps_per_cycle=200", estimate=False)
-        assert result.extra["engine"] == engine
+        assert result.settings.engine == engine
         assert ("bond_list_about" in run_plan.unknowns) == engine.endswith("list")
 
 

@@ -4,13 +4,13 @@ automatic mesh."""
 import json
 import re
 
+import contact_forms as exact
 import numpy as np
 import pytest
 from command_line import run_cli
 from scene_texts import PIECE
 
 from patchfem import build
-from patchfem.closed_forms import contact as exact
 from patchfem.core import PatchfemError
 from patchfem.model import make_piece_meshes
 from patchfem.runs import solve_with_coarser

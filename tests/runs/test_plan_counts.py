@@ -40,7 +40,7 @@ def test_always_plan_estimates_bond_list_near_friction_limit():
     """The plan estimates the strips of a block whose friction limit is 1.13 times the load within a factor of 3."""
     scene = load(BARELY_STUCK)
     run_plan = plan(scene)
-    counts = run(scene, estimate=False).extra["book"]
+    counts = run(scene, estimate=False).motion.energies
     assert counts["strips"] / 3 <= run_plan.unknowns["bond_list_about"] <= 3 * counts["strips"]
 
 

@@ -36,8 +36,8 @@ def test_exact_two_half_runs_agree_with_closed_form(earlier_run_folder):
     assert abs(second.measures["static_coefficient"].value - MU * (1 - depth / DEPTH)) <= 1e-3 * MU
     first = run_in_folder(earlier_run_folder, HALF_CYCLES).measures["worn_volume"]
     assert volume.error > first.error and scene.wear.start is None
-    assert second.extra["wear"]["worn_volume"][0] == pytest.approx(first.value, rel=1e-12, abs=0)
-    np.testing.assert_array_equal(second.extra["wear"]["cycle"][[0, -1]], [0, 1e6])
+    assert second.wear.columns["worn_volume"][0] == pytest.approx(first.value, rel=1e-12, abs=0)
+    np.testing.assert_array_equal(second.wear.columns["cycle"][[0, -1]], [0, 1e6])
 
 
 def test_exact_run_continues_on_other_mesh(earlier_run_folder):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contact_forms
 import numpy as np
 import pytest
 from scene_texts import COATED, COATING, PIECE
 
 import patchfem as pf
 from patchfem import build
-from patchfem.closed_forms import contact as closed_forms
+from patchfem.closed_forms import rounded_punch_half_width
 from patchfem.runs.patch import profile_points as trace
 from patchfem.scene import loads
 
@@ -36,9 +37,9 @@ def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolera
         'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
     )
     result = run_profile(tmp_path, x, z, text, f"accuracy.tolerance={tolerance}")
-    modulus = closed_forms.combined_modulus(120e9, 0.32)
-    half = closed_forms.rounded_punch_half_width(load, flat, radius, modulus)
-    peak = closed_forms.rounded_punch_pressure(
+    modulus = contact_forms.combined_modulus(120e9, 0.32)
+    half = rounded_punch_half_width(load, flat, radius, modulus)
+    peak = contact_forms.rounded_punch_pressure(
         np.linspace(flat, half, 4001), load, flat, radius, modulus
     ).max()
     for name, reference, rel_tol in (

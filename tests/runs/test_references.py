@@ -252,9 +252,9 @@ def test_always_unlike_pieces_have_note_on_coupling():
     hard = 'contact.substrate={young = "1e6 GPa", poisson = 0.3, density = "1 kg/m^3"}; contact.load=100 N; '
     block = PAD.partition("[contact.asp")[0]
     result = run_scene(block, hard + soft + "; contact.element_size=0.5 mm")
-    (note,) = find_sentences(result.extra["notes"], "different elasticity")
+    (note,) = find_sentences(result.notes, "different elasticity")
     assert 0.02 < float(note.split("displacement is ")[1].split(" times")[0]) < 1
-    assert not find_sentences(run_scene(NARROW).extra["notes"], "different elasticity")
+    assert not find_sentences(run_scene(NARROW).notes, "different elasticity")
 
 
 WORN = (

@@ -67,8 +67,8 @@ def test_exact_bench_has_more_steps_until_its_peak_meets_the_tolerance():
     done = pf.run(WEAKENING)
     exact = pf.run(WEAKENING, **{"accuracy.steps_per_cycle": 20000})
     truth = exact.measures["friction_ratio_peak"].value
-    assert fixed.extra["steps"] == 400
-    assert done.extra["steps"] > 400
+    assert fixed.settings.steps_per_cycle == 400
+    assert done.settings.steps_per_cycle > 400
     assert find_excess(fixed) > 1
     assert find_excess(done) <= 1
     for result in (fixed, done):

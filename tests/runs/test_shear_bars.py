@@ -56,7 +56,7 @@ frequency = "100 Hz"
     )
     assert (
         0 < difference <= two_modes.measures["loop_area"].error
-        and two_modes.extra["shear_modes"] == 2
+        and two_modes.settings.shear_modes == 2
     )
     assert sixteen_modes.measures["loop_area"].error < 0.1 * two_modes.measures["loop_area"].error
     assert any("set accuracy.shear_modes = 8" in warning for warning in two_modes.warnings)

@@ -17,7 +17,7 @@ SOFT_ELEMENT = PLASTIC.replace("1 um", "20 um")
 
 def run_curve(text, **keys):
     """Return the curve of a scene by the harmonic engine."""
-    return pf.run(text, **STEADY, **keys).extra["curve"]
+    return pf.run(text, **STEADY, **keys).motion.steady.curve
 
 
 @pytest.fixture
@@ -55,13 +55,13 @@ def test_always_unstable_steady_state_is_not_converged():
     """At 200 Hz the only steady state is unstable, and a march does not settle; the outcome is
     not_converged."""
     result = pf.run(INTERLOCK + SINE.format(200, 10), **STEADY, **{"accuracy.tolerance": 1e-2})
-    assert result.outcome == "not_converged" and "unstable" in result.extra["regime"]
+    assert result.outcome == "not_converged" and "unstable" in result.motion.steady.regime
     assert any("is unstable" in warning and "march" in warning for warning in result.warnings)
 
 
 def test_exact_number_of_steady_motions_is_stated():
     """With an interlock of 80 um three steady motions exist at 180 Hz; a warning says how many are stable."""
     steady = pf.run(INTERLOCK + SINE.format(180, 10), **STEADY)
-    assert steady.outcome == "steady" and np.abs(steady.extra["multipliers"]).max() < 1
+    assert steady.outcome == "steady" and np.abs(steady.motion.steady.multipliers).max() < 1
     (sentence,) = find_sentences([*steady.warnings, *steady.notes], "3 steady motions exist")
     assert "1 of them stable" in sentence

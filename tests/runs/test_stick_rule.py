@@ -50,7 +50,7 @@ def run_exact_and_march(scene, steps: int) -> list:
             (
                 result.measures["stick_fraction"].value,
                 result.measures["slip_start_phase"].value,
-                result.extra["engine"],
+                result.settings.engine,
             )
         )
     assert rows[0][2] != "march" == rows[1][2]

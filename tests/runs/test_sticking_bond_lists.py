@@ -78,7 +78,7 @@ def test_always_plan_estimates_strips_of_stuck_block(text):
     scene = load(text)
     run_plan = plan(scene)
     result = run(scene)
-    strips = result.extra["book"]["strips"]
+    strips = result.motion.energies["strips"]
     assert strips <= run_plan.unknowns["bond_list_about"] <= 1.5 * strips
     # A warning states the missing error.
     assert any("accuracy.steps_per_cycle" in text for text in result.warnings)

@@ -50,7 +50,7 @@ def test_exact_linear_response_to_tones_is_superposition():
     expected = response_from_rest(result.response.time, 2 * np.pi * 100, 0.02, tones)
     assert np.abs(result.response.output - expected).max() < 1e-6 * np.abs(expected).max()
     # The window is one beat of 1/6 s, in cycles of 96 Hz.
-    assert result.outcome == "steady" and result.extra["window"] == 16
+    assert result.outcome == "steady" and result.settings.window_cycles == 16
     t = np.linspace(10, 10 + 1 / 6, 20001)
     steady = response_from_rest(t, 2 * np.pi * 100, 0.02, tones)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(

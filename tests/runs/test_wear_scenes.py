@@ -178,7 +178,7 @@ def test_exact_worn_through_coating_ends_run():
     assert result.outcome == "worn_through" and 0 < cycle < 1e9
     assert depth * 0.8 == pytest.approx(6 * 25.4e-6, rel=1e-6)
     assert volume == pytest.approx(1e-13 * LOAD * 40e-6 * cycle, rel=1e-12)
-    assert any("lower piece, 152.4 um, is worn through" in text for text in result.extra["notes"])
+    assert any("lower piece, 152.4 um, is worn through" in text for text in result.notes)
     # The mean depth is the volume over the area; the tilt adds to the largest depth.
     assert volume / 12.7e-3**2 < depth < volume / 12.7e-3**2 + 0.1e-3 * 12.7e-3
     error = result.measures["worn_through_cycle"].error

@@ -71,4 +71,4 @@ def test_exact_strips_of_rig_wear_by_their_own_slip():
     expected = np.ptp(slides[last_cycle], axis=0) / 2
     assert np.ptp(expected) > 1e-2 * expected.mean()
     assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
-    assert sum("across x" in note for note in result.extra["notes"]) == 1
+    assert sum("across x" in note for note in result.notes) == 1

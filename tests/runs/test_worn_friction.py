@@ -59,7 +59,7 @@ def test_exact_run_in_agrees_with_exponential_closed_form():
     result = run_scene(f"accuracy.tolerance={tolerance}")
     coefficient = result.measures["static_coefficient"]
     volume = result.measures["worn_volume"]
-    history = result.extra["wear"]
+    history = result.wear.columns
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * history["cycle"] / DEPTH)
     assert abs(volume.value - depth[-1] * AREA) <= volume.error < tolerance * volume.value
     assert history["worn_volume"] == pytest.approx(depth * AREA, rel=tolerance, abs=0)

@@ -11,7 +11,6 @@ from patchfem.scene import (
     choose_law,
     compose_scene,
     load,
-    loads,
 )
 from patchfem.scene.joint_laws import JOINT_LAWS
 
@@ -79,17 +78,6 @@ def test_exact_small_loop_closure_of_laws(law, tmp_path):
     history = pf.run(path).to_xarray()
     first, second = np.interp([1, 3], history.time, history.friction_force.values.ravel())
     assert 100 * second / first == pytest.approx(SMALL_LOOPS[law], abs=1)
-
-
-@pytest.mark.parametrize(("name", "power"), [("iwan-iwan", 2.5), ("bouc-wen-bouc-wen", 3.0)])
-def test_exact_micro_slip_loss_exponent(name, power):
-    """The dissipation in micro-slip grows with the power chi + 3 (Iwan) and exponent + 2 (Bouc-Wen) of the amplitude."""
-    scene = loads(compose_scene(choose_law(ROWS[name].known[0], "loss")))
-    areas = [
-        pf.run(scene, **{"slide.amplitude": amplitude}).measures["loop_area"].value
-        for amplitude in ("1 nm", "10 nm")
-    ]
-    assert np.log10(areas[1] / areas[0]) == pytest.approx(power, abs=0.03)
 
 
 @pytest.mark.parametrize("words", REFUSED)

@@ -38,19 +38,6 @@ def test_exact_unknown_key_gets_suggestion(kind, right, wrong, meant):
 
 
 @pytest.mark.parametrize(
-    "wrong, meant",
-    [
-        ("structure.mass=1 kg", "moving_mass"),
-        ("normal.force=3 N", "load"),
-    ],
-)
-def test_exact_setting_suggests_key_of_file(wrong, meant):
-    """An unknown key in --set gets the suggestion of a key that the file has."""
-    with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?"):
-        loads(read_template("rig"), sets=[wrong])
-
-
-@pytest.mark.parametrize(
     "wrong, says",
     [
         ("friction.amplitude=2 um", "[normal] and [slide] have a key of this name"),

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 from scene_texts import (
     BENCH,
-    FORCED,
     LINEAR,
-    PAIR,
     PATCH,
     RIG,
     find_line,
@@ -28,71 +26,8 @@ PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 REPORT = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report"]
 STEADY = "accuracy.method=harmonic"
-UNBUILT = "not supported yet"
 
 # (text, sets, key, what the message says)
-REFUSED = [
-    (RIG, [SHEAR, "friction.static=0"], "friction.static", "static = 0 with"),
-    (
-        RIG,
-        [SHEAR, "contact.strips.count=8"],
-        "contact.strips",
-        "with [contact.shear]; leave one of the two out",
-    ),
-    (
-        PATCH_BENCH,
-        [SHEAR, "friction.kinetic=0.2"],
-        "friction.kinetic",
-        "is not supported yet; leave out the key kinetic",
-    ),
-    (
-        RIG,
-        [SHEAR, COULOMB, "friction.kinetic=0.2"],
-        "friction.kinetic",
-        "0.2 below static = 0.3 with",
-    ),
-    (
-        PATCH_BENCH,
-        ["contact.crown.radius=1 m", LOWER],
-        "contact.tilt.on",
-        "put all shapes on one piece",
-    ),
-    (
-        RIG,
-        [SHEAR, COULOMB, LOWER],
-        "contact.tilt.on",
-        "a shape on the lower piece with law 'coulomb' is not",
-    ),
-    (
-        RIG,
-        [COULOMB, LOWER],
-        "contact.tilt.on",
-        "a shape on the lower piece with law 'coulomb' is not supported yet; put the",
-    ),
-    (
-        POINT_RIG,
-        [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"],
-        "accuracy.method",
-        "use 'march', or law",
-    ),
-    (
-        POINT_RIG,
-        [
-            COULOMB,
-            STEADY,
-            "structure.bonded.stiffness=1e6 N/m",
-            "structure.bonded.wavelength=80 um",
-        ],
-        "accuracy.method",
-        "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength",
-    ),
-    (
-        PAIR + FORCED,
-        [STEADY, "accuracy.harmonics=9"],
-        "accuracy.harmonics",
-        "with accuracy.method = 'harmonic' and other interfaces; leave `harmonics` out",
-    ),
-]
 PLAIN = [
     (
         RIG,
@@ -115,12 +50,12 @@ PLAIN = [
 ]
 
 
-@pytest.mark.parametrize("text, sets, key, says", REFUSED + PLAIN)
-def test_refuses_unsupported_combination(text, sets, key, says):
-    """A combination of keys that no run supports is refused with its key and a remedy."""
+@pytest.mark.parametrize("text, sets, key, says", PLAIN)
+def test_refuses_combination_without_meaning(text, sets, key, says):
+    """A combination of keys that has no meaning is refused with its key and a remedy (others: test_support)."""
     message = get_only_mistake(text, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
-    assert (UNBUILT in message) == ((text, sets, key, says) in REFUSED)
+    assert "not supported yet" not in message
 
 
 def test_refuses_unsupported_keys_at_their_lines():
@@ -198,18 +133,6 @@ def test_exact_remarks_on_keys_without_effect(text, sets, remark):
     assert scene.remarks == [remark]
     assert loads(scene.resolved()).remarks == []
     assert loads(scene.resolved()).tables() == scene.tables()
-
-
-def test_exact_quadrature_of_interface_is_used_without_remark():
-    """The quadrature of a law of bonds between masses is used: it stands in the resolved scene, and gives no remark."""
-    law = ["law=nonlocal", "bond_length=5 um", "reading=report"]
-    sets = [f"structure.interface[1].{change}" for change in law]
-    text = PAIR[: PAIR.rindex("[[structure.interface]]")] + FORCED
-    scene = loads(text, sets=[*sets, "accuracy.quadrature=merged"])
-    assert scene.remarks == []
-    assert loads(scene.resolved()).accuracy.quadrature == "merged"
-    (remark,) = loads(text, sets=["accuracy.quadrature=merged"]).remarks
-    assert "has no meaning without law 'nonlocal'" in remark
 
 
 STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))

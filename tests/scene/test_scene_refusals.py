@@ -18,7 +18,6 @@ from scene_texts import (
     list_mistakes,
 )
 
-from patchfem.effects import name_laws_with_key
 from patchfem.scene import load, loads
 from patchfem.scene.scene import SceneError
 
@@ -142,31 +141,6 @@ def test_refuses_missing_key_at_its_table(text, pattern, header, key, says):
     lines = [n for n, line in enumerate(cut.splitlines(), 1) if line == header]
     assert message.startswith(f"a.toml:{lines[-1]}: {key}: missing")
     assert says in message
-
-
-@pytest.mark.parametrize(
-    "sets, key, says",
-    [
-        (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs this key"),
-        (["friction.law=elastic-plastic"], "friction.bond_length", "needs this key or stiffness"),
-        (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs this key"),
-        (["slide.kind=file"], "slide.file", "kind 'file' needs this key"),
-        (["friction.slip_growth=1 um"], "friction.rest_growth", "slip_growth needs this key"),
-    ],
-)
-def test_refuses_missing_key_of_selected_kind(sets, key, says):
-    """A key required by the selected law or kind is reported as missing."""
-    message = get_only_mistake(BENCH, *sets)
-    assert f": {key}: missing" in message and says in message
-
-
-@pytest.mark.parametrize("law", ["tanh", "elastic-plastic", "convolution"])
-def test_refuses_kinetic_for_laws_with_one_coefficient(law):
-    """A kinetic coefficient is refused for laws that have only one coefficient of friction."""
-    found = list_mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
-                     "friction.reference_speed=1 mm/s")  # fmt: skip
-    assert found == [f"--set: friction.kinetic: law '{law}' has no key kinetic; leave it out; laws with it are "
-                     f"{name_laws_with_key('kinetic')}"]  # fmt: skip
 
 
 def test_refuses_unbreakable_initial_bonds_with_shear():
@@ -388,41 +362,6 @@ def test_refuses_unreadable_file(tmp_path):
 def test_refuses_wrong_structure_of_table(text, says):
     """A table where a value is expected, or the reverse, is refused."""
     assert any(says in message for message in list_mistakes(text))
-
-
-UNBUILT = [
-    (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
-    (
-        RIG,
-        ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=coulomb"],
-        "friction.law",
-    ),
-    (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
-    (RIG, ["structure.mode.second.pitch=2 rad/m", "accuracy.method=harmonic"], "accuracy.method"),
-    (
-        STRUCTURE + BENCH.split("[slide]")[0],
-        [
-            "normal.amplitude=1 N",
-            "normal.frequency=5 Hz",
-            "friction.law=convolution",
-            "friction.bond_length=1 um",
-        ],
-        "friction.law",
-    ),
-    (
-        RIG,
-        ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10", "structure.mode.axial.normal=0.1"],
-        "wear",
-    ),
-]
-
-
-@pytest.mark.parametrize("text, sets, key", UNBUILT)
-def test_refuses_unsupported_features_by_name(text, sets, key):
-    """Features that are not supported yet are refused by name."""
-    found = list_mistakes(text, *sets)
-    assert all("not supported yet" in message for message in found), found
-    assert any(f"{key}: " in message for message in found), found
 
 
 def test_always_masses_and_interfaces_are_read():

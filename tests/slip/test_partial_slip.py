@@ -15,7 +15,7 @@ from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
 from patchfem.slip import jenkins_set, scale_limits
-from patchfem.slip.shear_modes import shear_modes
+from patchfem.slip.shear_modes import estimate_force_errors, find_sufficient_modes, shear_modes
 
 MU = 0.3
 
@@ -159,12 +159,32 @@ def test_exact_all_shear_modes_reproduce_compliance(angle):
     assert np.array_equal(modes.points, touching)
     c = pair.tangential[np.ix_(touching, touching)]
     assert np.abs(modes.shape / modes.stiffness @ modes.shape.T - c).max() <= 1e-12 * c.max()
-    assert modes.backbone_error <= 1e-13
     assert np.all(np.diff(modes.stiffness) >= 0)
     slides = np.array([0.1, 1.0, 4.0]) * 1e-6
     for slide in slides:
         reference = solve_exponential_law(c, limit[touching], 1e-6, slide).sum()
         assert solve_with_modes(modes, limit, 1e-6, slide) == pytest.approx(reference, rel=1e-12)
+
+
+@pytest.mark.parametrize("angle", TILTS[::3])
+@pytest.mark.parametrize("length", [1e-7, 1e-6, 1e-5])
+def test_order_force_error_of_first_modes_is_estimated(angle, length):
+    """The force of the first modes differs from that of all modes by 0.2 to 1.5 times the estimated error."""
+    pair = make_coated_pair(100)
+    limit = friction_limit(100, angle)
+    modes = shear_modes(pair.tangential, limit, length, 10**6)
+    errors = estimate_force_errors(modes, length)
+    slides = np.geomspace(0.05, 6.0, 25) * length + np.geomspace(1e-9, 2e-7, 25)
+    reference = np.array([solve_with_modes(modes, limit, length, slide) for slide in slides])
+    for count in (1, 2, 4):
+        if count >= modes.stiffness.size:
+            break
+        forces = [solve_with_modes(modes.select(count), limit, length, slide) for slide in slides]
+        true = np.abs(forces - reference).max() / limit.sum()
+        assert 0.2 * errors[count] <= true <= 1.5 * errors[count]
+        enough = find_sufficient_modes(pair.tangential, limit, length, 1, 1.01 * errors[count])
+        assert enough.stiffness.size <= count
+    assert errors[-1] == 0.0
 
 
 def test_refuses_unstable_slip_weakening():

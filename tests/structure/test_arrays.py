@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.io import savemat
-from scipy.sparse import csc_matrix
 
 from patchfem.core import PatchfemError
-from patchfem.structure import arrays, masses, matrices
+from patchfem.structure import arrays, masses
 
 M, K, C = (
     np.diag([2.0, 1.0]),
@@ -14,22 +12,6 @@ M, K, C = (
     np.array([[0.4, -0.3], [-0.3, 0.3]]),
 )
 FULL = {"M": M, "K": K, "C": C, "slide": np.array([0.0, 1.0])}
-
-
-@pytest.mark.parametrize("ending", ["npz", "mat"])
-def test_exact_basis_from_file_equals_basis_from_arrays(tmp_path, ending):
-    """A basis read from a file equals the basis of the arrays that were written."""
-    path = tmp_path / f"rig.{ending}"
-    data = FULL | {"unused": np.ones(3)}
-    if ending == "npz":
-        np.savez(path, **data)
-    else:
-        savemat(path, data | {"K": csc_matrix(K)})
-    basis = arrays.build_basis(arrays.read_arrays(path))
-    expected = matrices.build_basis(M, K, C, faces=[0, 1])
-    for key in ("omega", "zeta", "damping", "slide", "base", "output", "shapes"):
-        np.testing.assert_array_equal(getattr(basis, key), getattr(expected, key))
-    assert basis.names == ("1", "2") and basis.faces is None
 
 
 def test_exact_interfaces_of_file_equal_interfaces_of_masses():
@@ -58,18 +40,6 @@ def test_exact_force_vector_defines_modal_forces():
     np.testing.assert_allclose(
         arrays.build_basis(FULL, is_forced=True, driven_mass=1).base, -forced.shapes[0], rtol=1e-14
     )
-
-
-def test_exact_modes_written_as_matrices():
-    """Modes of mass m, written as m I, m omega^2 and m 2 zeta omega, keep frequencies, damping and participations."""
-    mass, omega, zeta = 0.884, 2 * np.pi * np.array([143.0, 990.0]), np.array([0.003, 0.01])
-    slide, base = np.array([1.0, 0.2]), np.array([0.9, 0.1])
-    data = {"M": mass * np.eye(2), "K": mass * np.diag(omega**2), "slide": slide, "base": base}
-    basis = arrays.build_basis(data | {"C": mass * np.diag(2 * zeta * omega)})
-    np.testing.assert_allclose(basis.omega, omega, rtol=1e-12)
-    np.testing.assert_allclose(basis.zeta, zeta, rtol=1e-12)
-    np.testing.assert_allclose(basis.slide * basis.base, slide * base, rtol=1e-12)
-    np.testing.assert_allclose(basis.slide**2, slide**2 / mass, rtol=1e-12)
 
 
 @pytest.mark.parametrize("change, message", [

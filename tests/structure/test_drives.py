@@ -7,11 +7,10 @@ from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad
 
 from patchfem import SceneError, plan, run
-from patchfem.core import InitialState, Outcome, SineDrive
-from patchfem.points.contacts import make_contact, make_parallel_contact
+from patchfem.core import Outcome, SineDrive
+from patchfem.points.contacts import make_contact
 from patchfem.points.time_march import march
 from patchfem.scene import loads
-from patchfem.structure import make_release
 from patchfem.structure.drives import SweepDrive, make_levels, make_step
 
 OMEGA = 2 * np.pi * 143
@@ -78,38 +77,6 @@ def test_exact_step_response_agrees_with_closed_form():
         -2 * zeta * OMEGA * response.slide_rate - OMEGA**2 * response.slide, abs=1e-9
     )
     assert response.base_acceleration == pytest.approx(9.0)
-
-
-def test_exact_release_response_and_energy_balance():
-    """A release decays as the closed form, and with friction the released energy equals the energy dissipated and stored."""
-    marched = march_without_friction(
-        sdof_basis(),
-        make_release(2 * np.pi / OMEGA),
-        30,
-        50,
-        InitialState(np.array([1e-3]), np.array([0.2])),
-    )
-    response = marched.response
-    damped_omega = OMEGA * np.sqrt(1 - 0.003**2)
-    decay_rate = 0.003 * OMEGA
-    expected = np.exp(-decay_rate * response.time) * (
-        1e-3 * np.cos(damped_omega * response.time)
-        + (0.2 + decay_rate * 1e-3) / damped_omega * np.sin(damped_omega * response.time)
-    )
-    assert response.slide == pytest.approx(expected, abs=1e-13)
-    marched = march(
-        sdof_basis(),
-        make_release(2 * np.pi / OMEGA),
-        make_parallel_contact([39.0 / 1e-6], [1e-6], np.ones(1)),
-        60,
-        100,
-        start=InitialState(np.array([3e-4]), np.zeros(1)),
-    )
-    ledger = marched.ledger
-    assert ledger["work_in"] == pytest.approx(0.45 * (OMEGA * 3e-4) ** 2, rel=1e-12)
-    assert ledger["friction"] + ledger["viscous"] + ledger["stored"] == pytest.approx(
-        ledger["work_in"], rel=1e-11
-    )
 
 
 # ---- scenes

@@ -32,29 +32,6 @@ def reduce_dense(K, M, C=None, n_modes=3, method=METHODS[0], boundary=BOUNDARY, 
     )
 
 
-@pytest.mark.parametrize("is_fixed", [True, False])
-@pytest.mark.parametrize("method", METHODS)
-def test_exact_full_set_of_modes_equals_full_matrices(method, is_fixed):
-    """A reduction that keeps all modes has the frequencies, rows and damping of the full matrices."""
-    K, M, C = chain_matrices(is_fixed=is_fixed)
-    ones = np.ones(12)
-    reduction = reduce_dense(K, M, C, 5, method, base_motion=ones)
-    assert reduction.modes.is_complete
-    basis = reduced.build_basis(reduction, reduction.modes.omega.size, [(1, 0), (1, 2)])
-    rows = np.zeros((2, 12))
-    rows[:, 11] = 1
-    rows[1, 4] = -1
-    full = matrices.build_basis(M, K, C, faces=rows, output=rows[0], base=ones)
-    scale = full.omega[-1]
-    np.testing.assert_allclose(basis.omega, full.omega, atol=1e-10 * scale)
-    assert (basis.omega[0] == 0) == (not is_fixed)
-    for name in ("base", "output", "faces", "damping_matrix"):
-        expected = getattr(full, name)
-        np.testing.assert_allclose(
-            getattr(basis, name), expected, atol=1e-7 * np.abs(expected).max(), err_msg=name
-        )
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_exact_boundary_statics_for_any_number_of_modes(method):
     """Flexibility of the boundary and response to a steady base acceleration are exact for any number of modes."""
@@ -76,15 +53,6 @@ def test_exact_boundary_statics_for_any_number_of_modes(method):
             (inverse @ M).sum(axis=1)[11],
             rtol=1e-9,
         )
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_exact_rigid_mode_carries_total_mass(method):
-    """The squared participation factor of the rigid mode equals the total mass."""
-    K, M, _ = chain_matrices(is_fixed=False)
-    basis = reduced.build_basis(reduce_dense(K, M, None, 2, method, base_motion=np.ones(12)), 2)
-    assert basis.omega[0] == 0 and (basis.omega[1:] > 0).all()
-    np.testing.assert_allclose(basis.base[0] ** 2, M.sum(), rtol=1e-9)
 
 
 def test_order_of_reduction_methods():

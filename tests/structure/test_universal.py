@@ -247,24 +247,3 @@ def test_exact_heave_of_modes_from_file_changes_the_load(tmp_path):
         PatchfemError, match=r"friction\.law: law 'iwan' with a mode's normal is not"
     ):
         load(tmp_path / "a.toml", IWAN)
-
-
-def test_refuses_heave_in_array_file_beside_friction(tmp_path):
-    """An array `normal`, which no engine reads, is refused beside friction and ignored without it."""
-    np.savez(
-        tmp_path / "a.npz",
-        M=[[0.5]],
-        K=[[4e5]],
-        C=[[9.0]],
-        slide=[1.0],
-        normal=[0.1],
-    )
-    text = HEAVING_RIG.replace("a.uff", "a.npz")
-    text = text.replace('slide_at = "12:+y"\nnormal_at = "13:+y"\n', "")
-    (tmp_path / "a.toml").write_text(text)
-    with pytest.raises(
-        PatchfemError, match=r"a\.toml:\d+: structure\.file: .* contains `normal`, but"
-    ):
-        build(load(tmp_path / "a.toml"))
-    (tmp_path / "linear.toml").write_text(text[text.index("[structure]") :])
-    assert build(load(tmp_path / "linear.toml")).kind == "linear"

@@ -116,6 +116,7 @@ def test_exact_accelerometers_agree(beam):
     assert np.abs(one[:, 2] / three[:, 2] - 1).max() < 0.012
 
 
+@pytest.mark.slow
 def test_always_titanium_study_gives_its_stated_depths_and_widths(wear):
     """Depths, widths and the fitted wear coefficient of the titanium tracks are those stated."""
     tracks = {track.name: track for track in wear.main()}

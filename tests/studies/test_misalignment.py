@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
+import contact_forms as exact
 import numpy as np
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
 
@@ -47,7 +47,7 @@ def solve_coarse(tilted, pieces):
     return compute_static_values(solve_patch_contact(pieces, tilted.pair(1)))
 
 
-@pytest.mark.share(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", ["1e-6", "1e-5", "1e-4", "1e-3", "1e-2"])
 def test_exact_fixture_table_has_the_computed_values(tilted, fixtures, tilt):
     """The table of the rigid fixture in the docstring has the computed values, to its last digit."""
@@ -189,6 +189,7 @@ def test_always_tolerated_tilt_changes_the_motion_by_under_five_percent(moving, 
     )
 
 
+@pytest.mark.slow
 def test_always_table_of_the_moving_rig_has_stated_values(moving, maps_at_one_load):
     """Stiffness, resonance, loop area and amplitude with and without tilt are those stated."""
     stuck = maps_at_one_load.isel(drive_acceleration=0)

@@ -62,7 +62,14 @@ def kernel(tmp_path_factory):
             manager.shutdown_kernel(now=True)
 
 
-@pytest.mark.share(0)
+def test_always_code_of_own_joint_runs(tmp_path, monkeypatch):
+    """The code cells of a notebook run in this process, with their asserts."""
+    monkeypatch.chdir(tmp_path)
+    exec("\n".join(cell_sources("own_joint", "code")), {})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_always_notebook_runs_without_errors_or_warnings(name, kernel):
     """All cells of a notebook run, with their asserts; it shows its pictures and writes no warning."""

@@ -104,6 +104,7 @@ def test_sweeps_give_stated_critical_levels(tmp_path, capsys):
     assert sweeps.ANSWER in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_always_stepped_levels_reach_the_steady_motion():
     """The time march through increasing levels ends each level in the steady motion of harmonic balance."""
     steps = load_study("report/steps.py")

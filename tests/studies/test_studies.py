@@ -59,7 +59,7 @@ def test_figure_14_curve_has_stated_values(tmp_path):
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 
-@pytest.mark.share(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words", [(), ("--set", "contact.element_size=64 um", "--over", "element_size")]
 )

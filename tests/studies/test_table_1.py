@@ -15,11 +15,6 @@ def check_scores(scores, expected, within=0.0011):
         )
 
 
-def test_table_1_point_contact_scores_like_the_patch():
-    """A point contact with the same parameters scores like the patch within 0.005."""
-    check_scores(load_study("table_1/second_path.py").as_it_stands(point=True), POINT, 0.005)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "point, wanted, values",

@@ -51,6 +51,7 @@ def test_exact_scores_follow_from_the_stored_cells(fitting, records):
                 )
 
 
+@pytest.mark.slow
 def test_always_stored_cells_are_reproduced(fitting, records):
     """The cell at 143 Hz and 5 g follows from the fitted parameters; with wear, that at 135 Hz and 5 g."""
     for (rung, reading, protocol, placebo), row in records.items():
@@ -118,6 +119,7 @@ def test_table_1_scores_support_the_conclusions(records, fitting):
     assert min(found["acceleration"] for found in left) > strong[1]["acceleration"]
 
 
+@pytest.mark.slow
 def test_table_1_onset_and_slip_phase_of_the_path_of_figure_27(records):
     """At 143 Hz the model slips from 4.2 g, begins to slip at 49 degrees and does not run away."""
     values = records["path of Fig. 27", "peak x stuck", "143", ""]["values"]

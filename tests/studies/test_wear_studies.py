@@ -1,7 +1,5 @@
 """The wear studies: their stated figures, from inexpensive cases."""
 
-import re
-
 import numpy as np
 import pytest
 from study_module import make_study_fixture
@@ -24,18 +22,6 @@ def check_bands(bands, rows, within):
     assert [six.seen, twelve.seen] == pytest.approx([0.18, 0.45], abs=5 * within)
     # these inequalities support the stated conclusion
     assert six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
-
-
-def test_always_few_bands_give_stated_ratios(bands, tmp_path, capsys):
-    """Two surfaces give the stated amplitude ratios within 0.03."""
-    rows = bands.main(strokes=(2, 4), seeds=2, bite=0.03e-6, path=tmp_path / "x.svg")
-    check_bands(bands, rows, 0.03)
-    text = (tmp_path / "x.svg").read_text()
-    assert all(
-        each in text
-        for each in ("along x (sliding)", "6 um worn off each: whole area", "strokes of Table 1")
-    )
-    assert len(re.findall("one trace each way", capsys.readouterr().out)) == 5
 
 
 @pytest.mark.slow
@@ -70,14 +56,6 @@ def check_worn_rig(story, rows, within):
         [229, 303], rel=within
     )
     assert [r.onset for r in (new, ten, hundred)] == pytest.approx([3.88, 3.90, 4.00], abs=0.02)
-
-
-@pytest.mark.slow
-def test_always_short_run_of_the_worn_rig_gives_stated_figures(story, tmp_path):
-    """Short time marches with a loose tolerance give the stated figures within 15 %."""
-    rows = story.main((1e-14, 1e-13), motion=60, tolerance="3e-2", path=tmp_path / "x.svg")
-    check_worn_rig(story, rows, 0.15)
-    assert "friction loop, change" in (tmp_path / "x.svg").read_text()
 
 
 @pytest.mark.slow

@@ -1,23 +1,10 @@
-"""Files as instruments write them: universal files by pyuff, and an elastic-plastic loop known in closed form."""
+"""Universal files as instruments write them, by pyuff."""
 
 from __future__ import annotations
 
 import numpy as np
 import pyuff
 
-LOAD, MU, BOND = 115.0, 0.31, 2.3e-6
-SCENE = f"""\
-[normal]
-load = "{LOAD} N"
-[friction]
-law = "elastic-plastic"
-static = 0.5
-bond_length = "5 um"
-[slide]
-kind = "sine"
-amplitude = "10 um"
-frequency = "100 Hz"
-"""
 SI = {
     "type": 164,
     "units_code": 1,
@@ -65,16 +52,3 @@ def write_universal(path, sets):
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, "add")
     return path
-
-
-def elastic_plastic_loop(count=80, cycles=2) -> tuple:
-    """Return (time, displacement, force) of an elastic-plastic point along a sine of 10 um at 100 Hz.
-
-    The forces are exact at every sample.
-    """
-    time = np.arange(count * cycles + 1) / count / 100
-    slide = 10e-6 * np.sin(2 * np.pi * 100 * time)
-    out = [0.0]
-    for step in np.diff(slide):
-        out.append(min(max(out[-1] + MU * LOAD * step / BOND, -MU * LOAD), MU * LOAD))
-    return time, slide, np.array(out)

@@ -3,7 +3,7 @@
 Campaign `made-fits` of `campaigns`: a row for each fitted value. A seed k makes, by k % 3:
 
 - 0: a friction loop of two cycles of a sine of 10 um with 80 rows each, of law elastic-plastic (even k) or of bonds of
-  constant length (odd k), from the closed forms of `test_fit`, with noise of 3 % of the peak force; coefficient of
+  constant length (odd k), from closed forms, with noise of 3 % of the peak force; coefficient of
   friction 0.1 to 0.6, bond length 0.5 to 8 um (log-uniform). Both values are fitted, each in a range around it.
 - 1: frequency and damping against amplitude of a block of 1 kg at 100 Hz on an Iwan joint (`backbone`, balance) at nine
   amplitudes, with noise of 3 % of the damping ratio and 0.03 % of the frequency, which the table states as errors; stiffness
@@ -21,6 +21,7 @@ from time import process_time
 
 import numpy as np
 from campaigns import Row
+from friction_loops import dahl_force, elastic_plastic_force, write_loop
 from scene_texts import DRIVE, KILOGRAM, POINT
 
 import patchfem as pf
@@ -69,18 +70,9 @@ def fit_loop(seed: int, rng, folder: Path) -> list[Row]:
     time = np.arange(161) / 80 / 100
     slide = 10e-6 * np.sin(2 * np.pi * 100 * time)
     limit = static * LOAD
-    force = [0.0]
-    for step in np.diff(slide):
-        if seed % 2:
-            end = np.sign(step) * limit
-            force.append(end + (force[-1] - end) * np.exp(-abs(step) / bond))
-        else:
-            force.append(float(np.clip(force[-1] + limit * step / bond, -limit, limit)))
-    force = np.array(force) + NOISE * limit * rng.normal(size=time.size)
-    path = folder / "loop.csv"
-    table = np.stack([1e3 * time, 1e6 * slide, force], axis=1)
-    head = "time [ms],displacement [um],force [N]"
-    np.savetxt(path, table, fmt="%.17g", delimiter=",", header=head, comments="")
+    compute_force = dahl_force if seed % 2 else elastic_plastic_force
+    force = compute_force(slide, limit, bond) + NOISE * limit * rng.normal(size=time.size)
+    path = write_loop(folder / "loop.csv", time, slide, force)
     law = "nonlocal" if seed % 2 else "elastic-plastic"
     text = POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "2 um"\n' + SLIDE
     truth = {"friction.static": static, "friction.bond_length": bond}

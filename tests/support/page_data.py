@@ -38,9 +38,8 @@ def _unpack(content):
 
 def read_charts(text: str) -> dict[str, dict]:
     """Return the figures of a page by title."""
-    titles = re.findall(r'<figure id="(\w+)"[^>]*><h2>(.*?)</h2>', text)
-    figures = {figure["anchor"]: figure for figure in read_figures(text)}
-    return {unescape(title): figures[anchor] for anchor, title in titles}
+    titles = re.findall(r'<figure id="chart\d+"[^>]*><h2>(.*?)</h2>', text)
+    return dict(zip(map(unescape, titles), read_figures(text), strict=True))
 
 
 def read_measures(text: str) -> dict[str, str]:

@@ -177,7 +177,7 @@ def try_remedy(tables: dict, found, remedy: Remedy) -> str:
 def _scale_number(tables: dict, result, key: str, sentence: str):
     """Return a number of the scene or of the run times or over FACTOR; None if there is no number."""
     table, _, last = key.rpartition(".")
-    number = tables.get(table, {}).get(last, result.extra.get(last))
+    number = tables.get(table, {}).get(last, getattr(result.settings, last, None))
     if not isinstance(number, int | float):
         return None
     return number * FACTOR if "raise" in sentence else number / FACTOR
@@ -187,7 +187,7 @@ def _judge_effect(before, after, remedy: Remedy, sets: dict) -> str:
     """Return the effect of a remedy from the results before and after it."""
     sentence = remedy.sentence
     if not (names := _find_measures(before, sentence)):
-        messages = [*after.warnings, *after.extra.get("notes", [])]
+        messages = [*after.warnings, *after.notes]
         old_sentence = sentence
         new_sentence = next(
             (

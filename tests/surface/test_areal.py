@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface import Profile, make_report
 from patchfem.surface.areal import Areal, level
 
 
@@ -38,13 +39,22 @@ def test_exact_levelling_agrees_with_least_squares():
 
 
 def test_refuses_collinear_heights():
-    """A scan of collinear heights is refused."""
+    """A scan of collinear heights is refused, and a trace of one height."""
     line = np.full((4, 6), np.nan)
     line[range(4), range(4)] = 1e-6
     line[0, 0] = 2e-6
     line[1, 1] = 1e-6
     for heights in (line, np.full((4, 6), np.nan)):
         with pytest.raises(
-            PatchfemError, match="all lie on one straight line; a plane needs three points"
+            PatchfemError, match="heights; a plane needs three that do not lie on one straight"
         ):
             level(make_scan(heights))
+    with pytest.raises(PatchfemError, match="trace: 1 heights; a line needs two"):
+        level(Profile(np.arange(3.0), np.array([np.nan, 1.0, np.nan]), "trace"))
+
+
+def test_refuses_window_of_a_single_column():
+    """A window of a scan that contains a single sample along x is refused."""
+    scan = make_scan(np.ones((4, 6)))
+    with pytest.raises(PatchfemError, match="the window contains a single sample along x; take"):
+        make_report(scan, window=(scan.x[1], scan.x[1] + 2e-6, scan.y[0], scan.y[-1]))

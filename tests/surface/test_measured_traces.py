@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from patchfem.surface import Profile, describe_lost_waves, read_surface
+from patchfem.surface import read_surface
 from patchfem.surface.areal import level
-from patchfem.surface.spectrum import wave_spectrum
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
 )
-
-
-@pytest.fixture
-def data_folder() -> Path:
-    """Return the folder of measured data."""
-    return Path(os.environ["PATCHFEM_DATA"])
-
-
-@pytest.fixture
-def reference_values(data_folder) -> dict:
-    """Return the reference values of the measured data."""
-    return json.loads((data_folder / "truth.json").read_text())
-
-
-def read_mitutoyo_trace(data) -> Profile:
-    """Return the measured trace of a Mitutoyo instrument."""
-    return read_surface(data / "mitutoyo-2.csv.gz")
 
 
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
@@ -71,25 +51,3 @@ def test_exact_gap_map_of_bolted_beam(data_folder, reference_values):
     column = np.searchsorted(scan.x, points[:, 0] - 1e-9)
     row = np.searchsorted(scan.y, points[:, 1] - 1e-9)
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
-
-
-def test_exact_spectrum_agrees_with_filtered_rms(data_folder, reference_values):
-    """Rq after a Gaussian filter, from the spectrum, agrees with another code within 1 to 5 %.
-
-    Each wave is reduced by the part 2^-(cut/wave)^2 that the filter passes.
-    """
-    profile = read_mitutoyo_trace(data_folder)
-    expected = reference_values["mitutoyo-2.csv.gz"]
-    waves, power = wave_spectrum(profile)
-    assert np.sqrt(power.sum()) == pytest.approx(expected["Pq"] * 1e-6, rel=1e-4)
-    for cut, name, tolerance in (
-        (80e-6, "own_gauss_lc80", 0.01),
-        (250e-6, "own_gauss_lc250", 0.01),
-        (800e-6, "own_gauss_lc800", 0.05),
-    ):
-        rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
-        assert rough == pytest.approx(expected[name]["Rq"] * 1e-6, rel=tolerance)
-    assert (
-        "% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add "
-        '[contact.asperities], or set element_size = "20.3 um"'
-    ) in str(describe_lost_waves(profile, 100e-6))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from synthetic import self_affine, waves
+from synthetic import waves
 
-from patchfem.closed_forms import contact as closed_forms
-from patchfem.surface import Profile, describe_lost_waves, level
+from patchfem.surface import Profile, describe_lost_waves
 from patchfem.surface.spectrum import wave_spectrum
 
 LENGTH = 12.7e-3
@@ -26,20 +24,6 @@ def make_cosines(orders, heights) -> Profile:
     return waves(X, heights, [2 * LENGTH / k for k in orders], [np.pi / 2] * len(orders))
 
 
-@given(st.integers(0, 10**6), st.integers(3, 300))
-def test_exact_wave_powers_sum_to_mean_square(seed, count):
-    """The powers of the waves sum to the mean square of the levelled trace (Parseval)."""
-    z = np.random.default_rng(seed).normal(size=count)
-    profile = Profile(np.linspace(-1, 1, count), z, "a")
-    weight = np.full(count, 1.0)
-    weight[[0, -1]] = 0.5
-    flat = level(profile).z
-    mean = weight @ flat / weight.sum()
-    wavelengths, power = wave_spectrum(profile)
-    assert power.sum() == pytest.approx(weight @ (flat - mean) ** 2 / weight.sum(), rel=1e-10)
-    assert wavelengths == pytest.approx(4 / np.arange(1, count))
-
-
 @pytest.mark.parametrize("length, fraction", [
     (2 * LENGTH / 1999, 0.0), (2 * LENGTH / 300, 0.0), (2 * LENGTH / 299, 1.0), (2 * LENGTH / 40, 1.0),
     (2 * LENGTH / 39, np.sqrt(5.0)), (2 * LENGTH / 6, np.sqrt(5.0)), (2 * LENGTH / 5, np.sqrt(14.0)),
@@ -48,19 +32,6 @@ def test_exact_fine_fraction_of_three_waves(length, fraction):
     """The fine fraction of three waves is the root of the squares of the waves shorter than the given length."""
     assert fine_fraction(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(
         fraction / np.sqrt(14), abs=1e-9
-    )
-
-
-@given(st.integers(0, 1000), st.floats(0.05, 0.95))
-def test_always_element_length_keeps_requested_fraction(seed, fraction):
-    """The returned element length keeps the requested fraction of the height, and a longer one does not."""
-    profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
-    element = wave_spectrum(profile).element_length(fraction)
-    assert fine_fraction(profile, 2 * element) <= 1 - fraction + 1e-12
-    assert (
-        fine_fraction(profile, 2 * element * 1.3)
-        >= fine_fraction(profile, 2 * element * 1.001)
-        > 1 - fraction
     )
 
 

@@ -9,7 +9,6 @@ import pytest
 from command_line import run_cli
 from import_graph import read_sources, syntax_nodes
 from scene_texts import BENCH, MODE
-from torture.hostile import MaliciousPickle
 
 import patchfem
 
@@ -144,26 +143,6 @@ def test_always_pages_escape_text_of_scenes(tmp_path):
     assert "&lt;img src=x" in page
     page_without_scripts = re.sub(r"<script.*?</script>", "", page, flags=re.S)
     assert "<img src=x" not in page_without_scripts
-
-
-def test_always_pickles_are_never_loaded(tmp_path, monkeypatch):
-    """A pickle with the suffix of any supported file is refused with a message and is not
-    executed."""
-    import pickle
-
-    monkeypatch.chdir(tmp_path)
-    for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"):
-        Path(f"x.{suffix}").write_bytes(pickle.dumps(MaliciousPickle()))
-        arguments = (
-            ["check", f"x.{suffix}"]
-            if suffix == "toml"
-            else ["profile", f"x.{suffix}", "--units", "um,um"]
-        )
-        answer = run_cli(*arguments)
-        assert answer.code in (2, 4) and answer.err.strip(), (suffix, answer)
-    assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted(
-        f".{suffix}" for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml")
-    )
 
 
 def test_exact_scanned_sources_are_the_installed_package():

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from contact_forms import hertz_half_width
 from pieces import make_bare_layers, make_bare_pair, make_refined_grid
 from pressed import solve_forces
 from scipy.linalg import expm
 from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
-from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump, wear_rates
 from patchfem.wear.depth import solve_jump

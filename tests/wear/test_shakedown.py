@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from contact_forms import hertz_half_width, hertz_peak
 from pieces import make_bare_layers, make_refined_grid
 from pressed import solve_forces
 from scipy.optimize import brentq
 
-from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.slip import jenkins_set

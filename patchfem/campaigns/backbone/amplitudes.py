@@ -25,7 +25,7 @@ TRAVEL_FACTOR = 1.15
 MAX_LINEAR_AMPLITUDE = 1e-3  # largest amplitude of a linear rig [m]
 N_LINEAR = 4  # number of amplitudes of a linear rig, whose values are constant
 # Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
-MAX_CHANGE = 0.08
+MAX_CURVE_CHANGE = 0.08
 MIN_SPACING = 1.02  # ratio of neighbouring amplitudes below which no point is added
 MAX_REFINEMENTS = 3  # each one may halve the spacing
 N_EXTENSIONS = 8  # number of decades by which the default range is extended to reach a force
@@ -95,7 +95,7 @@ def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
 
 
 def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
-    """Add amplitudes where frequency or damping ratio change by more than MAX_CHANGE of their range.
+    """Add amplitudes where frequency or damping ratio change by more than MAX_CURVE_CHANGE of their range.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
         is_wide = np.zeros(known.amplitude.size - 1, bool)
         for values in (known.frequency, known.damping):
             step = np.abs(np.diff(values))
-            is_wide |= step > MAX_CHANGE * (np.nanmax(values) - np.nanmin(values))
+            is_wide |= step > MAX_CURVE_CHANGE * (np.nanmax(values) - np.nanmin(values))
         is_wide &= known.amplitude[1:] > MIN_SPACING**2 * known.amplitude[:-1]
         if not is_wide.any():
             break

@@ -21,12 +21,12 @@ HARMONIC_COUNTS = (9, 19, 39)
 # Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
 # the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1 or changes without end.
 N_LINEAR_STEPS = 200
-# A force holds the mode if the shape of the free motion has at least MIN_ENERGY of the kinetic energy of the motion under
-# the force, else it holds another mode; and if this shape moves the output by what it moves in all, within MAX_DEVIATION
-# of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
-MIN_ENERGY = 0.5
+# A force holds the mode if the shape of the free motion has at least MIN_MODE_ENERGY of the kinetic energy of the motion
+# under the force, else it holds another mode; and if this shape moves the output by what it moves in all, within
+# MAX_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
+MIN_MODE_ENERGY = 0.5
 MAX_DEVIATION = 0.6
-NO_MOTION = "no free motion of these amplitudes was found"
+NO_FREE_MOTION = "no free motion of these amplitudes was found"
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
 
@@ -62,7 +62,7 @@ def compute_balance_curve(
         # Beyond the last motion that few harmonics find, more harmonics find none.
         count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
         if not count:
-            raise NotConverged(NO_MOTION)
+            raise NotConverged(NO_FREE_MOTION)
         amplitudes = amplitudes[:count]
         better, motions = tabulate_free_motions(laws, joint, amplitudes, harmonics)
         error = convergence_error(better - values[:, :count]) + ROUND_OFF_ERROR * np.abs(better)
@@ -76,7 +76,7 @@ def compute_balance_curve(
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():
-        raise NotConverged(NO_MOTION)
+        raise NotConverged(NO_FREE_MOTION)
     oscillates = known & (values[1] < 1)
     if not oscillates.any():
         raise NotConverged(NO_OSCILLATION)
@@ -187,7 +187,7 @@ def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> boo
     part = free * np.vdot(free, forced) / np.vdot(free, free)
     energy = np.vdot(part, part).real / np.vdot(forced, forced).real
     whole = output @ forced
-    return energy >= MIN_ENERGY and abs(output @ part - whole) <= MAX_DEVIATION * abs(whole)
+    return energy >= MIN_MODE_ENERGY and abs(output @ part - whole) <= MAX_DEVIATION * abs(whole)
 
 
 def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:

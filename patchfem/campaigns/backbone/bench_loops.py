@@ -12,7 +12,7 @@ from ...runs.rig import decays
 # Number of cycles of the first loop, of which the last one is evaluated.
 FIRST_CYCLES = 3.0
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
-MAX_CYCLES = 192.0
+MAX_LOOP_CYCLES = 192.0
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
@@ -55,7 +55,7 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
             change = [abs(run.values[name] - before[name]) for name in LOOP_MEASURES]
             limits = [tolerance * abs(run.values[name]) for name in LOOP_MEASURES]
             is_steady = all(step <= limit for step, limit in zip(change, limits))
-            if cycles >= MAX_CYCLES or is_steady:
+            if cycles >= MAX_LOOP_CYCLES or is_steady:
                 return SteadyLoop(run, contact, steps, change)
         before = run.values
         cycles *= 2

@@ -20,7 +20,7 @@ from .balance import compute_balance_curve
 from .joint import JointMode, build_joint
 from .quasi_static import compute_static_curve
 from .records import (
-    AMPLITUDE_TOL,
+    EQUAL_AMPLITUDE_TOL,
     METHODS,
     ROUND_OFF_ERROR,
     VALUES,
@@ -170,7 +170,7 @@ def compute_backbones(
 def _merge(amplitudes) -> np.ndarray:
     """Return amplitudes in rising order, without those that differ by round-off."""
     ordered = np.unique(amplitudes)
-    return ordered[np.append(True, np.diff(ordered) > AMPLITUDE_TOL * ordered[1:])]
+    return ordered[np.append(True, np.diff(ordered) > EQUAL_AMPLITUDE_TOL * ordered[1:])]
 
 
 def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Backbone:
@@ -226,7 +226,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
 
     richer: the curve of the structure with more modes.
     """
-    low, high = richer.amplitude[[0, -1]] * [1 - AMPLITUDE_TOL, 1 + AMPLITUDE_TOL]
+    low, high = richer.amplitude[[0, -1]] * [1 - EQUAL_AMPLITUDE_TOL, 1 + EQUAL_AMPLITUDE_TOL]
     curve = curve.at((curve.amplitude >= low) & (curve.amplitude <= high))
     if not curve.amplitude.size:
         raise NotConverged(

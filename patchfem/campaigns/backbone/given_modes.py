@@ -33,7 +33,9 @@ class PreparedModel(NamedTuple):
     notes: tuple[str, ...]
 
 
-def prepare_model(build: Callable[..., Model], modes: str | Iterable = "") -> PreparedModel:
+def prepare_model(
+    build: Callable[..., Model], modes: str | Iterable, sets: tuple[str, ...]
+) -> PreparedModel:
     """Build the model of a backbone from a scene, with its own modes or modes given beside it.
 
     Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
@@ -42,27 +44,26 @@ def prepare_model(build: Callable[..., Model], modes: str | Iterable = "") -> Pr
     Parameters
     ----------
     build : callable
-        Function of `BackboneTables` that returns the model of the scene with these tables; with
-        `is_written` that of the scene as written, before the changes by --set.
+        As in `request.compute_cases`.
     modes : str or iterable
         Text such as "120 Hz:0.01, 170 Hz:0.02", or tuples of frequency, damping ratio and slide; "" for the modes of
         the scene.
+    sets : tuple of str
+        Assignments "table.key=value" that change the scene.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
-    model = build(tables, is_written=False)
+    model = build(tables, sets)
     notes = tuple(IGNORED_TABLE_NOTE.format(table=name) for name in tables.ignored)
     if not tables.modes:
         return PreparedModel(model, notes)
     given_modes = tables.modes
 
     # The joint that was bolted in the modal test is that of the scene as written.
-    stiffness = _find_sticking_stiffness(
-        build(BackboneTables(given_modes, stuck=False), is_written=True)
-    )
+    stiffness = _find_sticking_stiffness(build(BackboneTables(given_modes, stuck=False), None))
     used_modes = given_modes
     if stiffness is not None:
         used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
-        model = build(BackboneTables(used_modes), is_written=False)
+        model = build(BackboneTables(used_modes), sets)
 
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
     if tables.assumes_mass and not tables.is_assumed:

@@ -11,11 +11,11 @@ from ...runs.rig import decays
 from .balance import compute_constant_curve
 from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import JointMode
-from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
+from .records import EQUAL_AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 N_SAMPLES = 4096  # Number of samples of a friction loop per cycle; half as many give the error.
 # Largest number of corrections of the displacement until the amplitude is the requested one.
-MAX_STEPS = 60
+MAX_AMPLITUDE_STEPS = 60
 # Relative error that is added to the estimated errors of a computed friction loop.
 MIN_FLOOR = 1e-10
 
@@ -51,7 +51,7 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
 
     # The sampling error is the change from half the samples.
     best = tabulate(laws, N_SAMPLES)
-    has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+    has_amplitude = np.abs(best[0] / amplitudes - 1) < EQUAL_AMPLITUDE_TOL
     best[0] = np.where(has_amplitude, amplitudes, best[0])
     error = np.abs(best - tabulate(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
     error += joint.spatial_discretization_errors(lambda _, group: tabulate(group, N_SAMPLES))
@@ -92,14 +92,14 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
 
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_AMPLITUDE_STEPS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
         best = _compute_from_loops(
             joint, slides, [quasi_static.StaticLoops(*loop) for loop in loops]
         )
-        has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+        has_amplitude = np.abs(best[0] / amplitudes - 1) < EQUAL_AMPLITUDE_TOL
         if has_amplitude.all():
             break
         # The deflection shape differs from the stuck mode shape, so that the output amplitude is missed.
@@ -107,7 +107,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
 
     best = np.where(has_amplitude, best, np.nan)
     best[0] = amplitudes
-    relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
+    relative = ROUND_OFF_ERROR + (EQUAL_AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
     return _select_rising_part(best, relative * np.abs(best))
 
 

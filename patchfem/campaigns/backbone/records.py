@@ -6,7 +6,7 @@ import numpy as np
 
 METHODS = ("balance", "quasi-static")  # methods, the recommended one first
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
-AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
+EQUAL_AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
 VALUES = ("frequency", "damping", "force")  # values of a curve that have an error
 
 
@@ -62,7 +62,7 @@ def make_curve(amplitude, values, errors) -> Curve:
 def match_amplitudes(curve: Curve, other: Curve) -> tuple[np.ndarray, np.ndarray]:
     """Return the indices of the common amplitudes of two curves, for each of them."""
     distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
-    return np.nonzero(distance < AMPLITUDE_TOL)
+    return np.nonzero(distance < EQUAL_AMPLITUDE_TOL)
 
 
 class Band(NamedTuple):
@@ -165,7 +165,3 @@ class Backbone(NamedTuple):
     def best(self) -> Curve | None:
         """Curve of the recommended method; None without a curve."""
         return next((self.curves[name] for name in METHODS if name in self.curves), None)
-
-    def add_notes(self, notes) -> "Backbone":
-        """Return the backbone with further notes placed first."""
-        return self._replace(notes=(*notes, *self.notes))

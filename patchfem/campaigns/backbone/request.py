@@ -57,8 +57,9 @@ def compute_cases(
     Parameters
     ----------
     build : callable
-        Function of `BackboneTables` that returns the model of the scene with these tables. With `is_written` it is that of
-        the scene as written; with `sets`, a tuple of assignments "table.key=value", that of the changed scene.
+        Function of `BackboneTables` and of a tuple of assignments "table.key=value" that returns the model of the scene
+        with these tables and changes. With None in place of the changes it is that of the scene as written, also without
+        the changes by --set.
     request : BackboneRequest
         What is asked for.
     progress : callable, optional
@@ -78,18 +79,19 @@ def compute_cases(
         read_positive_values(request.amplitudes, "--amplitudes") if request.amplitudes else (),
         read_positive_values(request.forces, "--forces", "force") if request.forces else (),
     )
-    axis = _read_axis(request.over) if request.over else None
-    changes = [()] if axis is None else [(f"{axis.key}={text}",) for text in axis.texts]
+    axis = None
+    changes = [()]
+    if request.over:
+        axes, mistakes = read_assignments([request.over])
+        if mistakes:
+            raise PatchfemError("; ".join(mistakes))
+        axis = axes[0]
+        changes = [(f"{axis.key}={text}",) for text in axis.texts]
 
     prepared = []
     for sets in changes:
-
-        def build_changed(tables, *, is_written: bool, sets=sets):
-            """Build the scene as written, or the one with the value of the key."""
-            return build(tables, is_written=is_written, sets=() if is_written else sets)
-
         try:
-            prepared.append(prepare_model(build_changed, request.modes))
+            prepared.append(prepare_model(build, request.modes, sets))
         except SceneError as error:
             if axis is None:
                 raise
@@ -103,13 +105,7 @@ def compute_cases(
             raise SceneError(mistakes) from None
     models = [case.model for case in prepared]
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
-    backbones = [one.add_notes(case.notes) for one, case in zip(backbones, prepared)]
+    backbones = [
+        one._replace(notes=(*case.notes, *one.notes)) for one, case in zip(backbones, prepared)
+    ]
     return BackboneCases(axis, backbones, models[0].source)
-
-
-def _read_axis(over: str) -> Axis:
-    """Read the key of --over with its values; raise PatchfemError for any other text."""
-    axes, mistakes = read_assignments([over])
-    if mistakes:
-        raise PatchfemError("; ".join(mistakes))
-    return axes[0]

@@ -5,11 +5,10 @@ quasi-static curve, which is a hundred times faster, gives the start of this sea
 result at its starting points, the other is used.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +43,6 @@ SAME_ERROR = 0.1  # relative change of an error at which it is known
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
-PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
 SAME_AMPLITUDE = (
     1e-6  # largest relative difference of a measured amplitude and that of its computed point
 )
@@ -77,10 +75,6 @@ class MeasuredCurve(NamedTuple):
     error: np.ndarray
     assumed: np.ndarray
     method: str
-
-    def normalized_residual(self, curve) -> np.ndarray:
-        """Return the residual (2k,) of a computed curve (2, k), divided by the standard deviations."""
-        return ((curve - self.value) / self.error).ravel()
 
     def scale_assumed_errors(self, curve, n_values: int) -> "MeasuredCurve":
         """Return the measured curve with assumed errors equal to the scatter around a fitted curve (2, k).
@@ -200,32 +194,17 @@ class CurveModel(FreeKeys):
         Bounds of the free keys.
     amplitude : (k,) array
         Measured amplitudes [m].
-    say : callable, optional
-        Called with a line of text that reports the progress.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        ranges: Sequence[Range],
-        amplitude: np.ndarray,
-        say: Callable | None = None,
-    ):
+    def __init__(self, scene: Scene, ranges: Sequence[Range], amplitude: np.ndarray):
         super().__init__(scene, ranges)
         self.amplitude = amplitude
-        self.say = say
-        self.last_progress = self.start_time
         self.n_computed = 0
         # each step of the search needs some of the last curves again
         self._compute_once = lru_cache(8)(self._compute)
 
     def _compute(self, values: tuple[float, ...], method: str) -> np.ndarray:
-        """Compute frequency and damping for values (n,) of the keys, and report the progress."""
-        now = perf_counter()
-        if self.say and now - self.last_progress >= PROGRESS_SECONDS:
-            self.last_progress = now
-            seconds = now - self.start_time
-            self.say(f"{self.n_computed} curves of the model computed in {seconds:.0f} s")
+        """Compute frequency and damping for values (n,) of the keys."""
         self.n_computed += 1
         return compute_points(self.build_model(values), self.amplitude, method)
 
@@ -262,9 +241,12 @@ class CurveModel(FreeKeys):
         start : (n,) array, optional
             First starting point in place of that of the scene.
         """
-        problem = self.make_problem(
-            lambda values: measured.normalized_residual(self.compute(values, method))
-        )
+
+        def residual(values: np.ndarray) -> np.ndarray:
+            """Return the residual (2k,) of the computed curve, divided by the standard deviations."""
+            return ((self.compute(values, method) - measured.value) / measured.error).ravel()
+
+        problem = self.make_problem(residual)
         if start is not None:
             problem = replace(problem, start=start)
         return problem.solve(starts, kind)
@@ -307,7 +289,6 @@ def fit_curve(
     curve_file: Path,
     ranges: Sequence[Range],
     options: FitOptions = DEFAULT_OPTIONS,
-    say: Callable | None = None,
 ) -> FittedCurve:
     """Fit free keys of a rig to measured frequency and damping as functions of amplitude.
 
@@ -324,8 +305,6 @@ def fit_curve(
         Bounds of the free keys.
     options : FitOptions
         `starts` is the number of starting points of the search by the fast method.
-    say : callable, optional
-        Called with a line of text that reports the progress.
 
     Raises
     ------
@@ -335,7 +314,7 @@ def fit_curve(
         If the input is invalid, or if neither method has a curve at a starting point.
     """
     measured = read_damping_curve(curve_file)
-    curves = CurveModel(scene, ranges, measured.amplitude, say)
+    curves = CurveModel(scene, ranges, measured.amplitude)
     curves.require_enough_rows(curve_file, measured.value.size, "values")
 
     # The fast method gives the start of the search by the reference method, and the errors that the table does not give.

@@ -67,7 +67,7 @@ def fit_measurement(
         return fit_wear(build(scene), to, ranges, listener.progress)
     path = Path(to)
     if kind == "curve":
-        return fit_curve(scene, path, ranges, options, listener.say)
+        return fit_curve(scene, path, ranges, options)
     if kind == "loop":
         return fit_hysteresis_loop(scene, path, ranges, options, listener.say)
     return fit_rows(scene, path, ranges, options, listener)

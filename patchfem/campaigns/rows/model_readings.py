@@ -90,14 +90,13 @@ class ModelReadings:
                     readings[k] = np.inf, np.inf
                     continue
                 self.last_motions[k] = motion.initial_guess
-                readings[k] = self._read_accelerometer(motion, drive), motion.displacement
+                acceleration = motion.fundamental
+                if self.reading[0] != "fundamental" or acceleration is None:
+                    acceleration = read_instrument(
+                        motion.window, drive, motion.acceleration, *self.reading
+                    )
+                readings[k] = acceleration, motion.displacement
         return readings
-
-    def _read_accelerometer(self, motion, drive) -> float:
-        """Return the accelerometer reading of a motion before its gain is applied [m s-2]."""
-        if self.reading[0] == "fundamental" and motion.fundamental is not None:
-            return motion.fundamental
-        return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
     def _solve_contact(self, model: Model) -> tuple[Model, object]:
         """Return a model without the joint of bolted modes, and its solved patch; None for a [normal] contact.

@@ -102,16 +102,6 @@ class Cases:
         grid = np.meshgrid(*(np.rint(place).astype(int) for place in places), indexing="ij")
         return np.ravel_multi_index(grid, self.shape).ravel().tolist()
 
-    def representative_case_numbers(self, max_cases: int) -> list[int]:
-        """Return the numbers of at most `max_cases` cases that represent the whole sweep.
-
-        For random cases these are the first ones, because every 8th point of a Sobol sequence may
-        lie in the same half of a range; otherwise they come from `spread_case_numbers`.
-        """
-        if self.is_random:
-            return list(range(min(max_cases, len(self))))
-        return self.spread_case_numbers(max_cases)
-
     def sort_by_pieces(self, numbers: Sequence[int]) -> list[int]:
         """Sort case numbers so that cases whose pieces have the same shape and material are consecutive.
 

@@ -60,16 +60,17 @@ class SweepAnalysis:
 
 
 def analyse(table: SweepTable) -> SweepAnalysis:
-    """Analyse the results of a sweep."""
+    """Analyse the results of a sweep; a single settled case has no range and no limit."""
     ranges = []
-    for name in MAIN_MEASURES:
+    is_comparable = np.count_nonzero(table.has_settled) != 1
+    for name in MAIN_MEASURES if is_comparable else ():
         if name in table.measures:
             ranges += find_range(table, name)
     ranges.sort(key=lambda entry: -entry.relative)
     return SweepAnalysis(
         cases=table.count_cases(),
         ranges=ranges,
-        limits=find_limits(table),
+        limits=find_limits(table) if is_comparable else [],
         peaks=find_peaks(table),
         ranking=rank_keys(table),
         quantiles=compute_quantiles(table),

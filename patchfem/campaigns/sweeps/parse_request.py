@@ -19,10 +19,10 @@ from . import samples, table
 from .case_models import SweepScene
 from .cases import Cases, combine_cases
 
-N_CHECKED = 32  # Largest number of cases that are validated before a sweep starts.
+N_CHECKED_CASES = 32  # Largest number of cases that are validated before a sweep starts.
 MAX_PRINTED = 12  # Largest number of validation errors that are printed.
 # Largest number of cases; the hashes and columns of more cases take gigabytes.
-MAX_CASES = 3_000_000
+MAX_SWEEP_CASES = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +141,11 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
 
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
-    if count > MAX_CASES:
+    if count > MAX_SWEEP_CASES:
         raise SceneError(
             [
-                f"{sweep_scene.path}: the sweep has {count} cases, more than the largest number possible ({MAX_CASES}); "
-                "give fewer values for each key, or draw N cases from the ranges with --sobol N"
+                f"{sweep_scene.path}: the sweep has {count} cases, more than the largest number possible "
+                f"({MAX_SWEEP_CASES}); give fewer values for each key, or draw N cases from the ranges with --sobol N"
             ]
         )
 
@@ -187,7 +187,10 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     SceneError
         If none of them is valid.
     """
-    numbers = cases.representative_case_numbers(N_CHECKED)
+    # the first random cases are as good as any others
+    numbers = cases.spread_case_numbers(N_CHECKED_CASES)
+    if cases.is_random:
+        numbers = range(min(N_CHECKED_CASES, len(cases)))
     errors = [sweep_scene.find_errors(cases.assignments(number)) for number in numbers]
     invalid = list(filter(None, errors))
     if not invalid:

@@ -41,7 +41,7 @@ MIN_KNOWN_FRACTION = (
 )
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
-ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only
+SPREAD_ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only
 
 
 class SobolIndex(NamedTuple):
@@ -103,7 +103,7 @@ def _varies(table: SweepTable, name: str) -> bool:
     if known.mean() < MIN_KNOWN_FRACTION:
         return False
     error = np.sqrt(np.mean(np.nan_to_num(column.errors[known]) ** 2.0))
-    return bool(values.std() > max(ROUND_OFF * np.abs(values).max(), error))
+    return bool(values.std() > max(SPREAD_ROUND_OFF * np.abs(values).max(), error))
 
 
 def compute_grid_indices(values: np.ndarray) -> np.ndarray:
@@ -152,7 +152,8 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
         for others, fold in folds:
             deviation = fit(others, smoothing)(coordinates[fold]) - scaled[fold]
             left.append(
-                np.mean(deviation**2, axis=0) / np.maximum(scaled[fold].var(axis=0), ROUND_OFF)
+                np.mean(deviation**2, axis=0)
+                / np.maximum(scaled[fold].var(axis=0), SPREAD_ROUND_OFF)
             )
         return np.mean(left, axis=0)
 

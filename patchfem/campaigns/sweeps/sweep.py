@@ -204,10 +204,6 @@ class ChunkQueue:
         size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
         return [self.remaining.popleft() for _ in range(size)]
 
-    def record_time(self, numbers: Sequence[int], seconds: float) -> None:
-        """Record the elapsed time [s] of a chunk."""
-        self.seconds_per_case = seconds / len(numbers)
-
     def record_death(self, numbers: Sequence[int]) -> list[int]:
         """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
         if self.repeated.issuperset(numbers):
@@ -248,7 +244,7 @@ def iterate_chunks(
     chunks = ChunkQueue(work.cases.sort_by_pieces(numbers), executor.workers, min_size)
     for chunk, seconds, answer in executor.run(work, chunks.take_chunk, say):
         if not isinstance(answer, WorkerDeath):
-            chunks.record_time(chunk, seconds)
+            chunks.seconds_per_case = seconds / len(chunk)
             yield chunk, *answer
         elif abandoned := chunks.record_death(chunk):
             failed = CaseResults.blank(1)

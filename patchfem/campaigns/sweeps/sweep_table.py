@@ -103,6 +103,8 @@ class SweepTable:
         MeasureColumn by name.
     messages : dict
         Error message of each failed case, by its number.
+    faults : dict
+        Sentences on internal faults after which cases were run one by one, as keys.
     """
 
     keys: tuple[SweptKey, ...]
@@ -112,6 +114,7 @@ class SweepTable:
     is_random: bool = False
     measures: dict[str, MeasureColumn] = field(default_factory=dict)
     messages: dict[int, str] = field(default_factory=dict)
+    faults: dict[str, None] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -156,6 +159,7 @@ class SweepTable:
             column.errors[numbers] = part.errors[name]
             column.floors[numbers] = np.nan_to_num(part.floors[name])
         self.messages.update({int(numbers[k]): text for k, text in part.messages.items()})
+        self.faults.update(dict.fromkeys(part.faults))
 
     def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of a measure that count for statements on it; NaN for others.

@@ -17,12 +17,12 @@ import numpy as np
 from ...core import NotConverged
 from ...formatting import format_length
 from .equations import HarmonicBalance, LinearPart, invert_matrices, solve_damped, split_equations
-from .laws import MAX_SAMPLES
+from .laws import MAX_SAMPLES_PER_CYCLE
 from .motion import find_loss
 from .series import N_SAMPLES, evaluate_series, find_peak, pack_harmonics
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
-MAX_HALVINGS = 6
+MAX_STEP_HALVINGS = 6
 # Largest number of Newton steps at each amplitude of a continuation. If they do not converge, an amplitude between the
 # last solution and this one is solved first, which takes fewer evaluations than more steps.
 MAX_CONTINUATION_STEPS = 10
@@ -248,7 +248,7 @@ class FreeBalance:
         Raises
         ------
         NotConverged
-            If a step fails after MAX_HALVINGS halvings.
+            If a step fails after MAX_STEP_HALVINGS halvings.
         """
         targets = [float(target)]
         while targets:
@@ -259,7 +259,7 @@ class FreeBalance:
                 x, motion = self.solve(scaled, targets[-1], MAX_CONTINUATION_STEPS)
                 start = targets.pop()
             except NotConverged:
-                if len(targets) > MAX_HALVINGS:
+                if len(targets) > MAX_STEP_HALVINGS:
                     raise
                 targets.append(float(np.sqrt(start * targets[-1])))
         return x, motion
@@ -307,7 +307,7 @@ def make_free_balance(
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     reach = 1.0 if output is None else abs(float(output @ shape))
     widest = np.abs(group.rows @ shape) * max_amplitude / reach
-    samples = min(factor * group.samples_for(harmonics, widest), MAX_SAMPLES)
+    samples = min(factor * group.samples_for(harmonics, widest), MAX_SAMPLES_PER_CYCLE)
     return FreeBalance(
         HarmonicBalance(modes, group, samples), mode, harmonics, omega, excitation, output
     )

@@ -15,7 +15,7 @@ from .equations import factor
 
 NEWTON_TOL = 1e-9  # change of the unknowns, relative to their size, at which Newton's method ends
 MAX_NEWTON_STEPS = 12  # largest number of Newton steps to a point of the curve
-MIN_STEP = 1e-7  # smallest step of the arc length
+MIN_ARC_STEP = 1e-7  # smallest step of the arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
 MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
 
@@ -121,7 +121,7 @@ def follow_curve(
         taken = _take_step(evaluate, point, step, unit, settings.tolerance)
         if taken is None:
             step /= 2
-            if step < MIN_STEP:
+            if step < MIN_ARC_STEP:
                 ended = "step"
                 break
             continue

@@ -24,14 +24,16 @@ from .forces import ForceHarmonics, LawGroup
 from .series import find_harmonics, unpack_harmonics
 
 RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
-RESONANCE_TOL = 1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
+UNDAMPED_RESONANCE_TOL = (
+    1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
+)
 SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
 BALANCE_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
 MIN_FRACTION = 0.02  # smallest fraction of a Newton step
 MAX_RESIDUAL = (
     1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
 )
-MAX_STEPS = 40
+MAX_DAMPED_STEPS = 40
 
 
 class LinearPart(NamedTuple):
@@ -195,7 +197,7 @@ class HarmonicBalance:
         )
 
     def solve(
-        self, x, omega: float, level: float, max_steps: int = MAX_STEPS
+        self, x, omega: float, level: float, max_steps: int = MAX_DAMPED_STEPS
     ) -> tuple[np.ndarray, Equations, int]:
         """Solve the balance from unknowns x (N,).
 
@@ -252,7 +254,7 @@ def has_undamped_resonance(modes: ModalBasis, omega: float) -> bool:
     """Return whether an undamped mode is driven at its natural frequency omega [rad/s]."""
     stiffness = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
     largest = float(modes.omega.max()) ** 2 + omega**2
-    return bool(np.linalg.svd(stiffness, compute_uv=False)[-1] < RESONANCE_TOL * largest)
+    return bool(np.linalg.svd(stiffness, compute_uv=False)[-1] < UNDAMPED_RESONANCE_TOL * largest)
 
 
 def invert_matrices(matrices) -> np.ndarray:
@@ -279,7 +281,7 @@ def factor(matrix):
     return lambda b: np.linalg.lstsq(matrix, b, rcond=RANK_TOL)[0]
 
 
-def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | None:
+def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_DAMPED_STEPS) -> tuple | None:
     """Solve equations by Newton's method with the natural monotonicity test.
 
     Parameters

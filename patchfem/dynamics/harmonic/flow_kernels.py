@@ -9,7 +9,7 @@ from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from ...friction.laws import stretch_kernels as law
 
-MAX_CYCLES = 60  # largest number of cycles until the stretch is periodic
+MAX_STRETCH_CYCLES = 60  # largest number of cycles until the stretch is periodic
 CLOSED_RATIO = 1e-14  # change over a cycle, relative to the stretch, that is round-off
 MIN_FADING = 1e-9  # smallest part of a stretch that fades in a cycle for Newton's method
 MIN_FADED = 1e-12  # the same for derivatives of a periodic stretch
@@ -37,7 +37,7 @@ def solve_cycle(numbers, q, velocity, dt, stretch, steps, force, slopes):
     n = q.size
     start = law.relax_stretch(numbers, 0.0, q[0], dt.sum()).stretch
     last = inf
-    for cycle in range(MAX_CYCLES):
+    for cycle in range(MAX_STRETCH_CYCLES):
         now = start
         kept = 1.0
         largest = abs(start)

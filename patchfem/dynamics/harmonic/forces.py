@@ -6,11 +6,11 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
-from .laws import MAX_SAMPLES, Jenkins, LawForce, make_law
+from .laws import MAX_SAMPLES_PER_CYCLE, Jenkins, LawForce, make_law
 from .series import find_harmonics
 from .slides import Slides, make_slides
 
-MIN_SAMPLES = 256  # smallest number of samples per cycle
+MIN_HARMONIC_SAMPLES = 256  # smallest number of samples per cycle
 SAMPLES_PER_HARMONIC = 12
 
 
@@ -91,7 +91,7 @@ class LawGroup:
         amplitudes : (i,) array, optional
             Amplitudes of the slides [m]; without them the corners are not resolved.
         """
-        samples = max(MIN_SAMPLES, SAMPLES_PER_HARMONIC * harmonics)
+        samples = max(MIN_HARMONIC_SAMPLES, SAMPLES_PER_HARMONIC * harmonics)
         corners = [
             (law.total * amplitude, law.count_samples(amplitude))
             for amplitude, laws in zip([] if amplitudes is None else amplitudes, self.laws)
@@ -101,7 +101,7 @@ class LawGroup:
         for size, count in corners:
             if count and total > 0:
                 samples = max(samples, count * np.sqrt(size / total))
-        return int(min(2 ** int(np.ceil(np.log2(samples))), MAX_SAMPLES))
+        return int(min(2 ** int(np.ceil(np.log2(samples))), MAX_SAMPLES_PER_CYCLE))
 
     def stiffness(self) -> np.ndarray:
         """Return the tangent stiffness at rest (i,) [N/m] of each interface row."""

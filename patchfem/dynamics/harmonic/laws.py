@@ -18,7 +18,7 @@ from .slides import Slides
 
 # Number of samples while an element passes from one friction limit to the other.
 SAMPLES_PER_STICK = 48
-MAX_SAMPLES = 65536  # largest number of samples per cycle
+MAX_SAMPLES_PER_CYCLE = 65536  # largest number of samples per cycle
 MAX_WAVES = 1000.0  # largest number of passed wavelengths for which the samples are increased
 
 
@@ -333,7 +333,7 @@ class FlowLaw(Law):
 def _count_stick_samples(stick_ratio: float) -> int:
     """Return the number of samples that resolve a phase of stick over the angle acos(1 - 2 stick_ratio)."""
     angle = np.arccos(max(1 - 2 * stick_ratio, -1.0))
-    return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), MAX_SAMPLES))
+    return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), MAX_SAMPLES_PER_CYCLE))
 
 
 def make_law(element: Element | None) -> Law:

@@ -23,7 +23,7 @@ from .slides import make_slides
 TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the forces of a law are compared
 TEST_SAMPLES = 512  # samples per cycle of this comparison
 FORCE_TOL = 1e-9  # relative change of a force that is round-off
-ROOT_TOL = (
+SLIDE_ROOT_TOL = (
     1e-13  # change of the slides, relative to those of the stuck mode, at which their search ends
 )
 SLIDE_TOL = 1e-9  # relative error of the slides of an equilibrium
@@ -131,7 +131,7 @@ def find_static_motions(
         def find_residual(x, amplitude=amplitude, unit=unit) -> np.ndarray:
             return np.abs(group.rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
 
-        solution = root(find_residual, stuck / unit, tol=ROOT_TOL)
+        solution = root(find_residual, stuck / unit, tol=SLIDE_ROOT_TOL)
         omega, z, loops = find_mode(np.abs(solution.x) * unit, amplitude)
         if not (omega and (np.abs(solution.fun) <= SLIDE_TOL).all()):
             omega = np.nan

@@ -24,7 +24,7 @@ MAX_STABLE_MULTIPLIER = (
 )  # largest magnitude of a multiplier of a stable motion, with round-off
 # Smallest change of the slide in a cell, relative to its range, and of the stiffness, relative to the largest, from which
 # the mean stiffness is a secant.
-MIN_CHANGE = 1e-9
+MIN_CELL_CHANGE = 1e-9
 ROUND_OFF_DIGITS = 6  # digits of the weight in the mean stiffness of a cell
 MIN_FADING = 1e-9  # smallest decay in a cell that is told from none
 
@@ -156,8 +156,8 @@ def _weigh_ends(q, force: LawForce):
         return 0.5
     jump = np.roll(force.slope, -1) - force.slope
     change = np.roll(q, -1) - q
-    is_clear = np.abs(change) > MIN_CHANGE * np.ptp(q)
-    is_clear &= np.abs(jump) > MIN_CHANGE * np.abs(force.slope).max()
+    is_clear = np.abs(change) > MIN_CELL_CHANGE * np.ptp(q)
+    is_clear &= np.abs(jump) > MIN_CELL_CHANGE * np.abs(force.slope).max()
     secant = np.divide(
         np.roll(force.force, -1) - force.force, change, where=is_clear, out=np.zeros(q.size)
     )

@@ -180,8 +180,11 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
     """
     charts = [chart for chart in CHARTS[answer.kind] if not titles or chart.title in titles]
     panels = make_panels({"": answer}, tuple(charts))
-    if not panels:
-        return None
+    return draw_panels(panels, axes, caller) if panels else None
+
+
+def draw_panels(panels: list[Panel], axes, caller: str):
+    """Draw the first panel on Axes, or all of them in a new figure; return the first Axes. Parameters as `draw_charts`."""
     check_axes(axes, caller)
     return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 

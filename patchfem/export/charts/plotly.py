@@ -13,6 +13,7 @@ COLOURS = (
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
+PARTS = ("data", "layout", "frames")  # parts of a figure that plotly.js reads
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 # figure of plotly.js, or a part of it, as an object of its JSON
@@ -27,8 +28,9 @@ MENU_PLACE = {
 
 
 def draw(panel: Panel) -> Figure:
-    """Return the figure of a panel: `title`, `data`, `layout`, `caption`, `description`, and `frames` of a film."""
-    figure = {"title": panel.title, "caption": panel.caption, "description": panel.description}
+    """Return the figure of a panel: `data`, `layout`, `frames` of a film, and texts for the page beside it."""
+    texts = ("title", "style", "caption", "description")
+    figure = {name: getattr(panel, name) for name in texts}
     figure |= {"data": _make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
         _add_menu(figure, panel.choices)

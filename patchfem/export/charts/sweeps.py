@@ -20,7 +20,7 @@ from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
-MAX_LINES = 8  # lines of a chart, one for each combination of the other keys
+MAX_CHART_LINES = 8  # lines of a chart, one for each combination of the other keys
 MAX_MAP_VALUES = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
 MIN_KEY_RATIO = 10.0
@@ -187,7 +187,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         symbols = np.broadcast_to(view.find_symbols(), values.shape)
 
         texts = view.name_lines()
-        lines = spread_indices(len(values), MAX_LINES)
+        lines = spread_indices(len(values), MAX_CHART_LINES)
         for line in lines:
             keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, error, marks = (array[line][keep] for array in (values, errors, symbols))

@@ -701,7 +701,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
             "measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width = half_power_width",
         ),
         Table(
-            "Shares of a key in the variance (Sobol indices)",
+            "Variance of a measure: share of each key, alone and with its interactions (Sobol indices)",
             "ranking",
             "measure = name, key, alone = first:rounded, with interactions = total:rounded, at least = low:rounded, "
             "at most = high:rounded",
@@ -715,7 +715,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
     "backbone": (
         Table(
             "Values of the key",
-            "table",
+            "cases",
             "value, frequency with a sticking contact = stuck_frequency, largest damping ratio = largest_damping, "
             "at = amplitude_of_largest_damping",
         ),

@@ -7,7 +7,7 @@ import numpy as np
 from .vtkhdf import Frames, read_frames
 
 GRID_POINTS = (61, 60)  # columns and rows of the grid
-MAX_FRAMES = 30
+MAX_FILM_FRAMES = 30
 WINDOW_HEIGHT = 0.6  # height of the window around the contact over its width
 # Largest contact, over the length of the pieces, that the window shows as a whole.
 MAX_CONTACT_FRACTION = 0.25
@@ -39,7 +39,8 @@ def contact_window(frames: Frames) -> tuple[float, float, float, float]:
     x = line.points[:, 0]
     pressure = line.point_data["normal_stress"].max(axis=0)
     length = np.ptp(x)
-    touching = x[pressure > 0] if pressure.any() else x[[0, -1]]
+    touching = x[pressure > 0]
+    touching = touching if touching.size else x[[0, -1]]
     width = np.ptp(touching)
     is_long = width > MAX_CONTACT_FRACTION * length
     centre = x[np.argmax(pressure)] if is_long else (touching[0] + touching[-1]) / 2
@@ -71,7 +72,9 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     """
     frames = read_frames(path)
     cycle = last_frames(frames.times)
-    numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
+    numbers = cycle[
+        np.linspace(0, cycle.size - 1, min(MAX_FILM_FRAMES, cycle.size)).round().astype(int)
+    ]
     left, right, bottom, top = contact_window(frames)
     columns, rows = GRID_POINTS
     x = np.linspace(left, right, columns)

@@ -183,6 +183,8 @@ def _read_block(group, count: int) -> Block:
     n_corners = 2 if (last - first).max() == 1 else 4
     corners = np.minimum(first[:, None] + np.arange(n_corners), last[:, None])
     cells = group["Connectivity"][:][corners]
+    if not 0 <= cells.min() <= cells.max() < len(points):
+        raise ValueError("a cell has a node that does not exist")
     data = [
         {name: _read_field(rows, name, size, count) for name, rows in group[kind].items()}
         for kind, size in (("PointData", len(points)), ("CellData", len(cells)))

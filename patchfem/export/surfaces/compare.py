@@ -127,7 +127,7 @@ def make_answer(comparison: Comparison) -> Answer:
         data=_make_data(comparison),
         details={
             "code": comparison.verdict.code,
-            "band": list(BAND),
+            "band": BAND,
             "direction": comparison.direction or None,
             **_describe_place(comparison),
             "other_tracks": [to_json(other.values) for other in comparison.tracks[1:]],
@@ -219,8 +219,8 @@ def _caption_band(comparison: Comparison) -> dict[str, object]:
     curves = comparison.evidence.curves
     if curves is None or comparison.is_areal:
         return {}
-    width = 2 * SIDE * float(np.median(curves.noise))
-    if width < MIN_BAND_FRACTION * float(np.ptp(curves.depth)):
+    width = 2 * SIDE * np.median(curves.noise)
+    if width < MIN_BAND_FRACTION * np.ptp(curves.depth):
         return {}
     return {"captions": {"Worn depth": "Band: 95 % noise of a single depth."}}
 

@@ -49,8 +49,8 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     notes = describe_reliability(fitted)
 
     entry = {
-        "coefficient": values["wear_coefficient"].as_json(),
-        "patch_centre": values["patch_centre"].as_json(),
+        "coefficient": values["wear_coefficient"],
+        "patch_centre": values["patch_centre"],
         "difference_rms": fitted.difference_rms,
         "sentence": sentence,
         "run": fitted.history.source,
@@ -104,7 +104,7 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     # what the interval of the lost area adds to all depths alike
     known = np.isfinite(curves.depth)
     x = curves.x[known]
-    datum_error = (area.high - area.low) / (2 * SIDE) / float(np.ptp(x))
+    datum_error = (area.high - area.low) / (2 * SIDE) / np.ptp(x)
     track = comparison.track
     width = None if track is None or any(track.cut) else track.values["width"].value
     correlation = curves.errors.correlation
@@ -123,7 +123,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     """
     run = read_patch(folder)
     wear = run.tables.get("wear", {})
-    upper_share = float(wear.get("upper_share", 0.0))
+    upper_share = wear.get("upper_share", 0.0)
     share = {"lower": 1 - upper_share, "upper": upper_share, "": 0.5}.get(piece, 0.0)
 
     # A run that cannot be that of the traces is refused with the reason.
@@ -169,7 +169,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 def describe(fitted: PredictedWear) -> str:
     """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
-    percent = 100 * fitted.difference_rms / float(fitted.depths.computed[fitted.on_patch].mean())
+    percent = 100 * fitted.difference_rms / fitted.depths.computed[fitted.on_patch].mean()
     return (
         f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
         f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({format_number(percent, 2)} % of its mean)."

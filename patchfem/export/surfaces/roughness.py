@@ -117,22 +117,22 @@ def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
     from scipy.special import stdtrit
 
     count = len(members)
-    student = float(stdtrit(count - 1, (1 + LEVEL) / 2))
+    student = stdtrit(count - 1, (1 + LEVEL) / 2)
     means = {}
     for quantity in members[0].values:
         name = quantity.name
         values = [each[name].value for each in members]
         if None in values:
             continue
-        mean = float(np.mean(values))
-        scatter = float(np.std(values, ddof=1))
-        error = student * scatter / float(np.sqrt(count))
+        mean = np.mean(values)
+        scatter = np.std(values, ddof=1)
+        error = student * scatter / np.sqrt(count)
 
         # A skewness may have either sign.
         ends = (mean - error, mean + error)
         reason = ""
         if not name.endswith("sk") and mean > 0:
-            factor = float(np.exp(error / mean))
+            factor = np.exp(error / mean)
             ends = (mean / factor, mean * factor)
             if factor > MAX_FACTOR:
                 ends = (None, None)
@@ -208,18 +208,18 @@ def report_to_dict(each: RoughnessReport) -> dict[str, object]:
         "kind": each.kind,
         "length": size.length,
         "step": size.step,
-        "shape": list(size.shape),
+        "shape": size.shape,
         "cutoff": treatment.cutoff,
-        "window": None if treatment.window is None else list(treatment.window),
+        "window": treatment.window,
         "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
         "measures": sentences.to_json({value.name: value for value in each.values}),
-        "notes": list(each.notes),
+        "notes": each.notes,
     }
     if each.kind == "areal":
         return content
-    return content | {"band": list(BAND), "asperities": _find_moments(each)}
+    return content | {"band": BAND, "asperities": _find_moments(each)}
 
 
 def _find_moments(each: RoughnessReport) -> dict | None:

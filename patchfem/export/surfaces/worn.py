@@ -79,16 +79,16 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     warnings = []
     for side, run in zip(SIDES, runs, strict=True):
         known = {name: run.answer.quantities.get(name) for name in MEASURES}
-        measures = {name: q.as_json() for name, q in known.items() if sentences.is_known(q)}
+        measures = {name: q for name, q in known.items() if sentences.is_known(q)}
         outcome = run.answer.details.get("outcome")
         sides[side] = {"outcome": outcome, "cycles": run.cycles, "measures": measures}
         warnings += [f"{side}: {text}" for text in run.answer.remarks.warnings]
 
     # Wear only removes material, so the later run cannot be less worn.
-    if float(wear.depth.min()) < -wear.error:
+    if wear.depth.min() < -wear.error:
         warnings.append(
             f"at {_find_place(runs[1], np.argmin(wear.depth))} the later run is worn by "
-            f"{format_length(-float(wear.depth.min()), 3)} less, so it does not continue the earlier one"
+            f"{format_length(-wear.depth.min(), 3)} less, so it does not continue the earlier one"
         )
 
     zero = to_json({"shift": Quantity(0.0, 0.0, 0.0, "m", "")})
@@ -150,8 +150,8 @@ def _find_place(run: PatchRun, number) -> str:
     """Return where on the patch a node lies, given its number."""
     state = run.state
     strip, node = divmod(int(number), state.x.size)
-    text = f"x = {format_length(float(state.x[node]), 3)}"
-    return text if state.y is None else f"{text}, y = {format_length(float(state.y[strip]), 3)}"
+    text = f"x = {format_length(state.x[node], 3)}"
+    return text if state.y is None else f"{text}, y = {format_length(state.y[strip], 3)}"
 
 
 def _describe_measures(runs: tuple[PatchRun, PatchRun]) -> list[str]:

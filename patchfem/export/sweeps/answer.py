@@ -12,12 +12,11 @@ from ... import __version__
 from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
-from ...campaigns.sweeps.peaks import PeakOnLine
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
-from ..answer import Answer, Quantities, Quantity, Remarks, Variable, Variables
+from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
 from ..runs import list_versions
 from .tables import sort_measures
 from .words import describe_place, make_peak_quantities, make_verdict
@@ -58,7 +57,7 @@ def make_answer(
         verdict=verdict,
         quantities=_make_quantities(table, analysis),
         data=_make_data(table, case_folders),
-        remarks=Remarks(_describe_failures(table), tuple(notes)),
+        remarks=Remarks((*_describe_failures(table), *table.faults), tuple(notes)),
         details=details,
         origin={
             "patchfem": __version__,
@@ -82,45 +81,34 @@ def read_tolerance(sweep_scene: SweepScene, cases: Cases) -> float:
     return np.nan
 
 
-def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict[str, object]:
+def _make_details(table: SweepTable, analysis: SweepAnalysis) -> JsonObject:
     """Return the numbers of sweep.json."""
-    ranking = {
-        name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
-    }
+    peaks = []
+    for entry in analysis.peaks:
+        row = {"measure": entry.measure, "case": describe_place(table, entry)}
+        peaks.append(row | make_peak_quantities(table, entry))
+    quantiles = []
+    for name, values in analysis.quantiles.items():
+        ends = zip(("low", "median", "high"), values, strict=True)
+        unit = table.measures[name].unit
+        quantiles.append({"measure": name} | {end: Quantity(one, unit) for end, one in ends})
+
     tolerance = np.ravel(table.tolerance)
     return {
         "cases": analysis.cases,
-        "ranking": ranking,
-        "limits": [limit._asdict() for limit in analysis.limits if np.isfinite(limit.value)],
-        "peaks": [_make_peak_row(table, entry) for entry in analysis.peaks],
-        "quantiles": [
-            {"measure": name} | _make_quantile_row(values, table.measures[name].unit)
-            for name, values in analysis.quantiles.items()
-        ],
-        "tolerance": float(tolerance[0]) if np.isfinite(tolerance).tolist() == [True] else None,
+        "ranking": analysis.ranking,
+        "limits": [limit for limit in analysis.limits if np.isfinite(limit.value)],
+        "peaks": peaks,
+        "quantiles": quantiles,
+        "tolerance": tolerance[0] if np.isfinite(tolerance).tolist() == [True] else None,
     }
-
-
-def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict[str, object]:
-    """Return a peak as a row of sweep.json."""
-    unit = table.measures[entry.measure].unit
-    row = {"measure": entry.measure, "case": describe_place(table, entry)}
-    quantities = make_peak_quantities(entry, unit)
-    return row | {name: quantity.as_json() for name, quantity in quantities.items()}
-
-
-def _make_quantile_row(values: np.ndarray, unit: str) -> dict[str, dict]:
-    """Return quantiles as objects of sweep.json."""
-    names = ("low", "median", "high")
-    return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}
 
 
 def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     """Return the peak if there is only one, the limits of the key, and the ends of the largest ranges."""
     quantities = {}
     if len(analysis.peaks) == 1:
-        unit = table.measures[analysis.peaks[0].measure].unit
-        quantities |= make_peak_quantities(analysis.peaks[0], unit)
+        quantities |= make_peak_quantities(table, analysis.peaks[0])
 
     # A limit without a value gives the reason.
     for limit in analysis.limits:

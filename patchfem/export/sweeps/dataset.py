@@ -39,10 +39,6 @@ def draw_sweep(dataset, measure: str, axes=None):
     if measure not in names:
         listed = ", ".join(sorted(names)) or "none; give a Dataset returned by pf.sweep"
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
-    if axes is None:
-        from matplotlib.figure import Figure
-
-        axes = Figure(figsize=drawing.PANEL_SIZE, layout="constrained").subplots()
     keys = [str(name) for name in dataset.coords if name != "case"]
     panel = make_measure_panel({"": replace(answer, details={"of": {"keys": keys}})}, measure)
-    return drawing.draw(panel, axes)
+    return drawing.draw_panels([panel], axes, "plot.sweep")

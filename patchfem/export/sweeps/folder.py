@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from ...model.model import Model
 from ...runs.batch.case_results import CaseResults
 from .. import store as answers
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks
-from ..folder import LOCK, refuse_others
+from ..folder import LOCK, refuse_others, remove, remove_partial_files
 from .store import CHUNKS, Chunks, case_folder_name, write_chunk
 
 CASES = "cases"
@@ -278,6 +277,7 @@ class Folder:
             The folders of cases are removed if it is "none".
         """
         self.chunks.merge_files(removes_others=removes_others)
+        remove_partial_files(self.target)
         own = set() if keep == "none" else set(self.case_folder_names())
         stored = set(self.chunks.list_files())
         stored |= {self.target / CASES / name for name in own}
@@ -285,8 +285,6 @@ class Folder:
             for path in (self.target / folder).glob("*"):
                 is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
                 if path not in stored and (is_incomplete or removes_others):
-                    shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(
-                        missing_ok=True
-                    )
+                    remove(path)
         with suppress(OSError):  # the folder does not exist, or still contains cases
             (self.target / CASES).rmdir()

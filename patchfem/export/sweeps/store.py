@@ -46,6 +46,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
     attributes = {
         "measures": json.dumps(results.units),
         "messages": json.dumps(results.messages, ensure_ascii=False),
+        "faults": json.dumps(results.faults, ensure_ascii=False),
     }
     path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{SUFFIX}"
     write_arrays(data, attributes, path)
@@ -63,6 +64,7 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         results.units.update(json.loads(attributes["measures"]))
         messages = json.loads(attributes["messages"])
         results.messages.update({int(case): text for case, text in messages.items()})
+        results.faults += json.loads(attributes["faults"])
         for part in TABLE_TYPES if results.units else ():
             columns = zip(results.units, data[part].values, strict=True)
             getattr(results, part).update(columns)

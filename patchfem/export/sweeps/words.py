@@ -42,6 +42,8 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if n_known < 2:
         one = "Only one case has a result, so that no change is known."
         return one if n_known else "No case has a result."
+    if np.count_nonzero(table.has_settled) == 1:
+        return f"Only one of {n_known} cases settled, so that no change is known."
     if not analysis.ranges:
         return f"No main measure of {n_known} cases changes by more than its error."
 
@@ -105,9 +107,10 @@ def describe_place(table: SweepTable, entry: PeakOnLine) -> str:
     )
 
 
-def make_peak_quantities(entry: PeakOnLine, unit: str) -> Quantities:
-    """Return frequency, height and width of a peak, whose height has this unit."""
+def make_peak_quantities(table: SweepTable, entry: PeakOnLine) -> Quantities:
+    """Return frequency, height and width of a peak."""
     peak = entry.peak
+    unit = table.measures[entry.measure].unit
     reason = "" if np.isfinite(peak.width) else "the cases do not show it"
     return {
         "peak_frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
@@ -121,7 +124,7 @@ def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
     name = peaks[0].measure
     clauses = []
     for entry in peaks if len(peaks) < 3 else (peaks[0], peaks[-1]):
-        quantities = make_peak_quantities(entry, table.measures[name].unit)
+        quantities = make_peak_quantities(table, entry)
         frequency, height, width = (format_quantity("", one) for one in quantities.values())
         place = describe_place(table, entry)
         text = f"{frequency}{' with ' * bool(place)}{place} ({height}"

@@ -116,13 +116,11 @@ def gamma_table(law: Bonds) -> np.ndarray:
     return gammainc(law.order + 1, np.arange(n_nodes) / N_TABLE_STEPS)
 
 
-def list_capacity(law: Bonds, reach: float, merge: float) -> int:
+def list_capacity(reach: float, merge: float) -> int:
     """Return the number of strips for which memory is allocated in a bond list.
 
     Parameters
     ----------
-    law : Bonds
-        Parameters of the bonds.
     reach : float
         Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float

@@ -14,8 +14,7 @@ Load. Where the load falls at rest, the bonds without stretch, which formed last
 long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
 keeps more than mu_s sigma. Where it rises, unstretched bonds of density m_0 form. Neither adds energy.
 
-Functions named short_* hold for increments up to MAX_SHORT_PATH bond lengths and have no branch, so that loops over
-points vectorise. All arrays are C-ordered float64.
+All arrays are C-ordered float64.
 """
 
 from math import exp, factorial, log
@@ -27,16 +26,14 @@ from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from .point_rows_kernels import GROWTH
 
-# Largest path in bond lengths for which the power series are exact to round-off
-MAX_SHORT_PATH = 0.5
-# Largest path in bond lengths for which half of the terms of SHAPE_SERIES suffice
+# Largest paths in bond lengths for which the power series SHAPE_SERIES and MOMENT_SERIES are exact to round-off
 MAX_SERIES_PATH = 0.03
+MAX_SHORT_PATH = 0.5
 # Coefficients of the series of (exp(-x) - 1 + x)/x^2 in powers of -x
-SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
+SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(7)])
 # Coefficients of the series of the integral of y^3 exp(-y) from 0 to x, divided by x^4, in powers
 # of -x
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
-N_SHORT_TERMS = 7  # number of terms of SHAPE_SERIES for paths up to MAX_SERIES_PATH
 MAX_GROWTH_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
 # Largest relative difference of the speeds at the ends of a step for which their mean determines the growth; it avoids
 # cancellation
@@ -49,18 +46,6 @@ class ShapeFunctions(NamedTuple):
     f1: float
     f2: float
     decay: float
-
-
-class PathIntegrals(NamedTuple):
-    """Integrals over a path from 0 to x in bond lengths.
-
-    - first, second: of y exp(-y) and y^2 exp(-y)
-    - of_second: integral of the second one over its upper limit
-    """
-
-    first: float
-    second: float
-    of_second: float
 
 
 class MeanStretch(NamedTuple):
@@ -85,23 +70,11 @@ class GrownLength(NamedTuple):
     exponent: float
 
 
-class BondStep(NamedTuple):
-    """Sums m, z, s2 over the bonds after an increment, and the integral of s2 dR/eps.
-
-    mu_s/(2 eps_0) times this integral is dissipated.
-    """
-
-    m: float
-    z: float
-    s2: float
-    damage_integral: float
-
-
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _sum_series(coefficients, n_terms, x):
-    """Return the sum of coefficients[k] (-x)^k over the first n_terms, by Horner's rule."""
+def _sum_series(coefficients, x):
+    """Return the sum of coefficients[k] (-x)^k by Horner's rule."""
     total = 0.0
-    for k in range(n_terms - 1, -1, -1):
+    for k in range(coefficients.size - 1, -1, -1):
         total = coefficients[k] - x * total
     return total
 
@@ -110,7 +83,7 @@ def _sum_series(coefficients, n_terms, x):
 def shape_functions(x):
     """Return the shape functions of a path x >= 0 in bond lengths, without cancellation; 6 ns."""
     if x < MAX_SERIES_PATH:
-        f2 = _sum_series(SHAPE_SERIES, N_SHORT_TERMS, x)
+        f2 = _sum_series(SHAPE_SERIES, x)
         f1 = 1 - x * f2
         return ShapeFunctions(f1, f2, 1 - x * f1)
     decay = exp(-x)
@@ -118,34 +91,14 @@ def shape_functions(x):
     return ShapeFunctions(f1, (1 - f1) / x, decay)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _short_shape_functions(x):
-    """Return the shape functions of a path x up to MAX_SHORT_PATH by power series."""
-    f2 = _sum_series(SHAPE_SERIES, SHAPE_SERIES.size, x)
-    f1 = 1 - x * f2
-    return ShapeFunctions(f1, f2, 1 - x * f1)
-
-
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _integrate_powers(x, decay):
-    """Return the `PathIntegrals` of a path x in bond lengths; decay = exp(-x)."""
+def _integrate_square(x, decay):
+    """Return the integral of y^2 exp(-y) from 0 to x; decay = exp(-x)."""
     if x < MAX_SHORT_PATH:
-        return _integrate_short_powers(x, decay)
-    return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _integrate_short_powers(x, decay):
-    """Return the `PathIntegrals` of a path x up to MAX_SHORT_PATH by a power series; decay = exp(-x)."""
-    series = _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
-    return _powers_from_cubic(x, decay, x**4 * series)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _powers_from_cubic(x, decay, cubic):
-    """Return the `PathIntegrals` from the integral of y^3 exp(-y) by parts."""
-    second = (cubic + x * x * x * decay) / 3
-    return PathIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
+        # By parts from the integral of y^3 exp(-y), without the cancellation of nearly equal numbers.
+        cubic = x**4 * _sum_series(MOMENT_SERIES, x)
+        return (cubic + x * x * x * decay) / 3
+    return 2 - decay * (x * x + 2 * x + 2)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -163,35 +116,9 @@ def bond_mean(m, z, increment, sigma, eps):
     -------
     MeanStretch
     """
-    shapes = shape_functions(abs(increment) / eps)
-    return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_bond_mean(m, z, increment, sigma, eps):
-    """Return the path-mean stretch of the bonds of a point over a short increment.
-
-    Parameters
-    ----------
-    m, z : float
-        Sums over the bonds before the increment [Pa], [Pa m].
-    increment, sigma, eps : float
-        Increment [m] up to MAX_SHORT_PATH bond lengths, pressure [Pa] under which new bonds form, and bond length [m].
-
-    Returns
-    -------
-    MeanStretch
-    """
-    shapes = _short_shape_functions(abs(increment) / eps)
-    return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _mean_stretch(m, z, increment, sigma, eps, shapes):
-    """Return the mean of z over the path of an increment; `shapes` are f1 and f2."""
-    f1, f2 = shapes
-    direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / eps
+    f1, f2, _ = shape_functions(x)
+    direction = 1.0 if increment > 0 else -1.0
     density_deficit = sigma - m
     mean = z * f1 + direction * eps * x * (sigma * f2 - density_deficit * (f1 - f2))
     slope = (
@@ -213,57 +140,19 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
     Returns
     -------
-    BondStep
+    BondMoments
     """
-    x = abs(increment) / eps
-    shapes = shape_functions(x)
-    powers = _integrate_powers(x, shapes.decay)
-    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_bond_step(m, z, s2, increment, sigma, eps):
-    """Advance the bonds of a contact point by a short increment of displacement.
-
-    Parameters
-    ----------
-    m, z, s2 : float
-        Sums over the bonds before the increment [Pa], [Pa m], [Pa m2].
-    increment, sigma, eps : float
-        Increment [m] up to MAX_SHORT_PATH bond lengths, pressure [Pa] under which new bonds form, and bond length [m].
-
-    Returns
-    -------
-    BondStep
-    """
-    x = abs(increment) / eps
-    shapes = _short_shape_functions(x)
-    powers = _integrate_short_powers(x, shapes.decay)
-    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
-    """Return the sums over the bonds after an increment: the solution of the equations of the module.
-
-    `bonds` are m, z and s2 before it, `shapes` are f1 and exp(-x), `powers` the `PathIntegrals` of its path.
-    """
-    m, z, s2 = bonds
-    f1, decay = shapes
-    first, second, second_integral = powers
     path = abs(increment)
-    direction = 1.0 if increment > 0 else -1.0
     x = path / eps
-    zeroth = x * f1
+    f1, _, decay = shape_functions(x)
+    square = _integrate_square(x, decay)
+    direction = 1.0 if increment > 0 else -1.0
     density_deficit = sigma - m
-    square = eps * eps
     stretched = s2 + 2 * direction * z * path + m * path * path
-    damage = s2 * zeroth + 2 * direction * z * eps * first
-    return BondStep(
+    return BondMoments(
         sigma - density_deficit * decay,
-        z * decay + direction * eps * (sigma * zeroth - density_deficit * x * decay),
-        decay * stretched + sigma * square * second,
-        damage + m * square * second + sigma * square * second_integral,
+        z * decay + direction * eps * (sigma * x * f1 - density_deficit * x * decay),
+        decay * stretched + sigma * eps * eps * square,
     )
 
 

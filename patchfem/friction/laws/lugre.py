@@ -49,17 +49,8 @@ class LuGre:
             np.zeros(1),
             self.static * load,
             self.static / self.stiffness,
-            is_bounded=False,
             form="flow",
         )
-
-    def limit(self, speed):
-        """Return the steady friction force / load, g/N [1], at a speed [m/s].
-
-        It is at least 1e-9 mu_s, because the rate of z divides by it.
-        """
-        rise = (self.static - self.kinetic) * np.exp(-((speed / self.speed) ** 2))
-        return np.maximum(self.kinetic + rise, 1e-9 * self.static)
 
 
 def from_keys(friction, load: float) -> LuGre:

@@ -15,6 +15,5 @@ def points_element(law: Bonds, load: float) -> Element:
         memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0]),
         limit=law.static * load,
         length=law.length,
-        is_bounded=False,
         form="points",
     )

@@ -99,15 +99,19 @@ def _solve_group(
     report: Callable | None,
 ) -> CaseResults:
     """Compute the results of a group together, or by single runs if it is None or if this fails."""
+    faults = []
     if group is not None:
         try:
             return lumped.solve(models, report)
         except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
+            faults.append(
+                f"{len(models)} cases are run one by one, because running them together failed with an internal "
+                f"fault, please report it: {type(error).__name__}: {error}"
+            )
             if report is not None:
-                report(
-                    f"{len(models)} cases are run one by one, because running them together failed with an internal "
-                    f"fault, please report it: {type(error).__name__}: {error}"
-                )
-    return solve_one_by_one(models)
+                report(faults[0])
+    results = solve_one_by_one(models)
+    results.faults += faults
+    return results

@@ -31,6 +31,7 @@ class CaseResults:
     - warnings, notes: {case: list of sentences}.
     - numerics: {case: dict} with the numerical settings; cases may share a dict.
     - seconds (n,): computing time [s]; the time of a batch is divided equally among its cases.
+    - faults: sentences on internal faults after which cases were run one by one.
     """
 
     outcome: np.ndarray
@@ -44,6 +45,7 @@ class CaseResults:
     notes: dict = field(default_factory=dict)
     numerics: dict = field(default_factory=dict)
     seconds: np.ndarray = None
+    faults: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if self.seconds is None:
@@ -115,6 +117,7 @@ class CaseResults:
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
+        self.faults += part.faults
         for name, unit in part.units.items():
             self.add_measure(name, unit)
             for columns, part_columns in zip(self._result_columns, part._result_columns):
@@ -141,6 +144,7 @@ class CaseResults:
     def select(self, cases: np.ndarray) -> CaseResults:
         """Return measures, outcomes and messages of selected cases, in a form for `insert`."""
         results = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
+        results.faults += self.faults
         for columns, all_columns in zip(results._result_columns, self._result_columns):
             columns.update({name: column[cases] for name, column in all_columns.items()})
         new_indices = {case: index for index, case in enumerate(np.asarray(cases).tolist())}

@@ -18,7 +18,7 @@ from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
-from ...points.case_rows import SAME_CYCLE, Cases, Number
+from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
@@ -68,8 +68,8 @@ STEPS = (
     1024,
 )  # steps per cycle, after two marches with a half and a quarter
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
-MIN_CYCLES = 20  # smallest number of cycles of a run
-MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
+MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
+MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
 MIN_TOLERANCE = 1e-4  # smallest tolerance that STEPS meet
 N_FINAL_WINDOWS = 5  # windows from which the steady motion is extrapolated (response.settling)
 # Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
@@ -161,7 +161,7 @@ def refusal_reason(model: Model) -> str:
 
     # All cases of a group have arrays of one length, so that the cycles are whole and bounded.
     cycles = rig.drive.cycles
-    if not MIN_CYCLES <= cycles <= MAX_CYCLES or cycles != int(cycles):
+    if not MIN_BATCH_CYCLES <= cycles <= MAX_BATCH_CYCLES or cycles != int(cycles):
         return "its number of cycles is not whole, too small or too large"
 
     # The only setting of the kernel is its number of steps, which follows from the tolerance.
@@ -287,13 +287,13 @@ def refine(cases: Cases, scales: Scales) -> Refined:
 def estimate_errors(values: Sequence[dict]) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name from marches with all, a half and a quarter of the steps.
 
-    Motions that differ by SAME_CYCLE from cycle to cycle count as periodic.
+    Motions that differ by SAME_CASE_CYCLE from cycle to cycle count as periodic.
     """
     amplitude = values[0][AMPLITUDE]
     errors = {}
     with np.errstate(all="ignore"):
         for name, error in convergence_errors(*values).items():
-            errors[name] = total_error(name, values[0][name], [error], SAME_CYCLE, amplitude)
+            errors[name] = total_error(name, values[0][name], [error], SAME_CASE_CYCLE, amplitude)
     return errors
 
 

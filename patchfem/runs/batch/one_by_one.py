@@ -60,8 +60,8 @@ def solve(
             results.numerics[case] = collect_used_settings(result)
             if result.warnings:
                 results.warnings[case] = list(result.warnings)
-            if notes := result.extra.get("notes"):
-                results.notes[case] = list(notes)
+            if result.notes:
+                results.notes[case] = list(result.notes)
         results.seconds[case] = perf_counter() - begin
     return results
 

@@ -6,7 +6,6 @@ closed form. Recursion, bond lists and parallel elements use the compiled kernel
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 from math import ceil
 from time import thread_time
 from typing import NamedTuple
@@ -22,47 +21,33 @@ MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 
 
-class Method(Enum):
-    """Methods of computing the friction force of a bench run.
-
-    The value of a member is its name in summaries and plans.
-    """
-
-    CLOSED = "closed form"
-    ELEMENTS = "parallel elements"
-    POINTS = "bond points"
-    RECURSION = "recursion"
-    LIST = "bond list"
-    LISTS = "bond lists"
-
-
-LIST_METHODS = (Method.LIST, Method.LISTS)
+# Methods of computing the friction force with a meaning beyond their names in summaries and plans.
+CLOSED_FORM = "closed form"
+PARALLEL_ELEMENTS = "parallel elements"
 
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
     """Engine of a bench run: its computation method and settings.
 
-    - method: Method.
+    - method: method of computing the friction force.
     - choice: engine of bond summation with its settings; None for other methods.
     - springs: function that replaces the stiffnesses and yield displacements of parallel elements; None: they are used
       unchanged.
     """
 
-    method: Method
-    choice: "bond_engines.EngineChoice | None" = None
-    springs: Callable | None = None
+    method: str
+    choice: bond_engines.EngineChoice | None = None
+    springs: "Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None" = None
 
     @property
     def name(self) -> str:
         """Name of the engine in summaries and plans."""
-        if self.method in LIST_METHODS:
-            return f"bench, {self.choice.engine} {self.method.value}"
-        return f"bench, {self.method.value}"
+        return f"bench, {self.method}"
 
 
 def choose_bench_engine(
-    model, slide, choice: "bond_engines.EngineChoice | None" = None
+    model, slide, choice: bond_engines.EngineChoice | None = None
 ) -> BenchEngine:
     """Choose the method that computes the friction force of a bench run.
 
@@ -77,17 +62,20 @@ def choose_bench_engine(
     """
     f = model.friction
     has_bonds = law_has_trait(f.law, "bonds")
-    if model.partial_slip and (has_bonds or model.grooves is not None):
-        if model.grooves is None and (
-            needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
-        ):
-            return _make_bond_sum_engine(model, choice or choose_bond_summation(model, slide))
-        return BenchEngine(Method.POINTS)
     if law_has_trait(f.law, "memoryless") and not model.partial_slip:
-        return BenchEngine(Method.CLOSED)
+        return BenchEngine(CLOSED_FORM)
+    if model.partial_slip and (has_bonds or model.grooves is not None):
+        is_summed = needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
+        if model.grooves is not None or not is_summed:
+            return BenchEngine("bond points")
     if not has_bonds:
-        return BenchEngine(Method.ELEMENTS)
-    return _make_bond_sum_engine(model, choice or choose_bond_summation(model, slide))
+        return BenchEngine(PARALLEL_ELEMENTS)
+
+    choice = choice or choose_bond_summation(model, slide)
+    if choice.engine == "recursion":
+        return BenchEngine("recursion", choice)
+    kind = "bond lists" if model.partial_slip or model.side == "lower" else "bond list"
+    return BenchEngine(f"{choice.engine} {kind}", choice)
 
 
 def steps_per_cycle(model) -> int:
@@ -113,7 +101,7 @@ def has_changing_pressure(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
+def choose_bond_summation(model, slide) -> bond_engines.EngineChoice:
     """Choose the method of bond summation for a rigidly sliding interface.
 
     The method is chosen as in a rig. Its error refers to the largest force, which is small for
@@ -147,7 +135,7 @@ def find_requested_engine(model) -> str:
     )
 
 
-def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
+def choose_smooth_bond_summation(model, slide) -> bond_engines.EngineChoice | None:
     """Choose a bond summation without merging, so that the force is smooth in the parameters.
 
     With merging, the summation error jumps when a parameter changes, which disturbs a fit. The
@@ -171,14 +159,6 @@ def mean_stroke(slide) -> tuple[float, float]:
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
     return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
-
-
-def _make_bond_sum_engine(model, choice: "bond_engines.EngineChoice") -> BenchEngine:
-    """Return the bench engine of a nonlocal law with a method of bond summation."""
-    if choice.engine == "recursion":
-        return BenchEngine(Method.RECURSION, choice)
-    has_lists = model.partial_slip or model.side == "lower"
-    return BenchEngine(Method.LISTS if has_lists else Method.LIST, choice)
 
 
 class BondListGuard:
@@ -240,7 +220,7 @@ class BenchSizes(NamedTuple):
     """
 
     engine: str
-    unknowns: dict
+    unknowns: dict[str, int]
     samples: int
 
 
@@ -252,14 +232,14 @@ def count_bench_sizes(model) -> BenchSizes:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
     engine = choose_bench_engine(model, slide)
     # The comparison runs keep their samples; a cell density needs one run more.
-    has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
+    has_cells = law_has_trait(model.friction.law, "cells") and engine.method == PARALLEL_ELEMENTS
     unknowns = {}
     if engine.choice is not None and engine.choice.strips:
         unknowns["bond_list_about"] = int(engine.choice.strips)
     return BenchSizes(engine.name, unknowns, (3 if has_cells else 2) * time.size // 2)
 
 
-def compute_dimensionless_groups(model) -> dict:
+def compute_dimensionless_groups(model) -> dict[str, float]:
     """Return the ratio of the displacement amplitude to the bond length as a dict, if both exist."""
     length = model.friction.bond_length
     return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

@@ -27,7 +27,7 @@ from ...response.errors import (
 from ...slip import shear_modes
 from ..results.patch_rows import Values
 from . import bench, shear
-from .engine import Method, uses_parallel_elements
+from .engine import PARALLEL_ELEMENTS, uses_parallel_elements
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
@@ -162,7 +162,7 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list[Coarse
             coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
 
-    if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
+    if law_has_trait(model.friction.law, "cells") and fine_run.engine.method == PARALLEL_ELEMENTS:
         # Groups of four cells are merged into one.
         joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
         runs = tuple(quarter._replace(springs=join) for join in joins)

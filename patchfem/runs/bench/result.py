@@ -12,19 +12,14 @@ from ...formatting import format_quantity
 from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP, remove_errors
 from ...response.rows import set_final_floors
-from ..results.notes import (
-    note_on_groove_slope,
-    note_on_growth,
-    warn_of_bonds,
-    warn_of_created_energy,
-    warn_of_work_check,
-)
+from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import (
     N_FRAMES,
+    MotionData,
     Result,
     RunInputs,
+    Settings,
     SlipRule,
-    can_estimate_mesh_error,
     make_interface_frames,
 )
 from ..results.travel import (
@@ -50,7 +45,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     # The errors follow from coarser runs on the same path.
     error_estimates = BenchErrors([], 0.0, [])
     if inputs.estimate:
-        patches = [patch, *(mesh for mesh in inputs.coarse if mesh is not None)]
+        patches = [mesh for mesh in inputs.patches if mesh is not None] or [None]
         error_estimates = estimate_bench_errors(model, patches, fine, steps, inputs.say)
         inputs.seconds["error"] = error_estimates.seconds
     step_values = [run.values for run in error_estimates.step_runs]
@@ -58,14 +53,27 @@ def run_prescribed(inputs: RunInputs) -> Result:
         fine.values, error_estimates.errors, step_values, min_relative_error=1e-10
     )
 
+    # The friction ratio has one limit only under a constant load.
+    settings = Settings(fine.engine.name, steps_per_cycle=steps)
+    if model.partial_slip:
+        settings = settings._replace(shear_modes=shear.count_shear_modes(model, patch))
+    peak_ratio = None
+    if model.friction.static > 0 and not model.load_varies:
+        peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static
+    facts = LawFacts(
+        model,
+        patch,
+        measures,
+        Outcome.DONE,
+        model.speed_scale,
+        peak_ratio,
+        fine.values["energy_created"],
+        float(np.abs(np.diff(fine.ledger[0])).sum()),
+        settings,
+    )
     warnings = [
         *inputs.warnings,
-        *warn_of_bonds(model, model.speed_scale, measures, Outcome.DONE),
-        *_warn_of_kept_pressure(model),
-        *warn_of_created_energy(
-            model, fine.values["energy_created"], float(np.abs(np.diff(fine.ledger[0])).sum())
-        ),
-        *warn_of_work_check(measures, steps),
+        *list_law_warnings(facts),
         *_warn_of_open_loop(model, patch, fine, steps),
     ]
 
@@ -83,45 +91,22 @@ def run_prescribed(inputs: RunInputs) -> Result:
         )
 
     # A missing mesh error would make every stated error too small.
-    if not (inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)):
+    if not (inputs.estimate and inputs.has_error_meshes):
         measures = remove_errors(measures)
-
-    # The friction ratio has one limit only under a constant load.
-    peak_ratio = None
-    if model.friction.static > 0 and not model.load_varies:
-        peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static
-    extra = {
-        "engine": fine.engine.name,
-        "steps": steps,
-        "notes": [*note_on_growth(model, peak_ratio), *note_on_groove_slope(model, patch)],
-        "step_runs": error_estimates.step_runs,
-    }
-    if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
-        extra["shear_modes"] = count
-
     return Result(
         inputs.plan,
         check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide),
         set_final_floors(measures, model.accuracy.tolerance),
-        fine,
-        fine,
-        patch,
-        fields,
         inputs.seconds,
         warnings,
-        extra,
+        [*inputs.notes, *list_law_notes(facts)],
+        patch,
+        fields,
+        fine,
+        fine,
+        settings,
+        MotionData(step_runs=tuple(error_estimates.step_runs)),
     )
-
-
-def _warn_of_kept_pressure(model) -> list[str]:
-    """Return a list with a warning that bonds of the printed law keep the pressure at which they formed."""
-    if model.friction.reading != "report" or not model.load_varies:
-        return []
-    return [
-        "in the law as printed in the report, a bond keeps the pressure at which it formed, "
-        "so while the load falls the friction force may exceed mu_s N; set friction.reading "
-        '= "stretch" to avoid this'
-    ]
 
 
 def _compute_loop_closing_error(fine) -> float:

@@ -1,17 +1,20 @@
-"""Contact points of pieces that deform in shear, over grooves, or under the pressure of a lower piece.
+"""Contact points of one interface, for the path of a bench and for the march of a rig.
 
-In: a model and its Patch. Out: `points.contacts.Contact`s of benches and rigs, and the fields of grooves.
+In: a model and its Patch. Out: a `points.contacts.Contact` of a law with memory along the motion: bonds, grooves, or a load
+that changes (`make_points`); and the fields of grooves. Pieces that deform in shear are replaced by shear modes.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from ...contact import contact_sets
 from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
 from ...points import contacts
 from ...slip import shear_modes
 from ...slip.fields import bond_shear_modes
+from ..patch import store
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
@@ -21,6 +24,145 @@ OPEN_PRESSURE_FRACTION = 1e-3
 COULOMB_LENGTH_RATIO = 0.1
 # Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
 MIN_LENGTH_RATIO = 1e-3
+# Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
+MIN_PRESSURE_FRACTION = 1.0
+# Error of the backbone curve by neglected shear modes, relative to the tolerance.
+MODES_TOLERANCE_RATIO = 0.1
+
+
+def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> contacts.Contact:
+    """Return the contact points of bonds, on grooves, or under a load that changes.
+
+    Under a nonlocal law with [contact.shear], the nodes of the patch with pressure become points of bonds with the
+    friction limits mu sigma_n area [N]. They are coupled by shear modes of the pieces, as many as keep the error of the
+    backbone curve below a tenth of the tolerance (`slip.shear_modes`).
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench or of a rig with one interface.
+    patch : Patch or None
+        None for a single point.
+    row : (n,) array
+        Slide per modal coordinate; (0,) for a bench.
+    choice : EngineChoice, optional
+        Method of bond summation of a law with bonds.
+    n_modes : int, optional
+        Number of shear modes of the pieces; default: by the scene, otherwise by the tolerance.
+    """
+    n_modes = n_modes or model.accuracy.shear_modes
+    load = patch.pressure.load if patch is not None else model.point.load
+    if model.grooves is not None:
+        return make_flank_contact(model, load, patch, n_modes)
+    law = model.friction
+    bond_sum = None
+    if law_has_trait(law.law, "bonds"):
+        law = model.bonds
+        bond_sum = make_bond_sum(law, choice)
+
+    # A single point follows the load of the scene and has no contact set.
+    if model.load_varies:
+        preload = float(model.point.evaluate(np.zeros(1))[0])
+        return contacts.make_pressed_contact(
+            law, preload, row, bond_sum=bond_sum, load=model.point.evaluate
+        )
+    if model.rig is not None and model.rig.friction.load_varies:
+        return _make_moving_contact(model, patch, law, row, bond_sum, n_modes)
+
+    modes = compute_point_shear_modes(model, patch, n_modes) if model.partial_slip else None
+    if model.side == "lower":
+        return make_lower_contact(model, patch, row, modes, bond_sum)
+    force = load
+    if modes is not None:
+        force = (patch.pressure.sigma_n * patch.pieces.interface.weight)[modes.points]
+    return contacts.make_bond_contact(law, force, row, modes, bond_sum)
+
+
+def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> contacts.Contact:
+    """Return the points of a patch whose contact set changes with heave and pitch of the upper piece.
+
+    The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
+    pieces. The shear modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so
+    that nodes that are open at first also count; with m modes they are exact for any weights.
+    """
+    weight = patch.pieces.interface.weight
+    force = patch.pressure.sigma_n * weight
+    compliance = patch.pieces.normal
+    spring = model.patch.loading.rotational_stiffness
+    if spring > 0:
+        compliance = compliance + np.outer(patch.x, patch.x) / spring
+    sets = contact_sets.ContactSets(
+        compliance, patch.x, patch.pressure.gap - compliance @ force, force > 0
+    )
+
+    shear = None
+    if model.partial_slip:
+        # An unstable patch could jump without a change of the drive, so it is rejected as under a constant load.
+        length = _find_length(law)
+        weakening = _find_weakening(law)
+        if weakening != 1:
+            _choose_modes(patch, law.static * force, length, 1, 1.0, weakening)
+        mean = force.sum() * weight / weight.sum()
+        limit = law.static * (force + mean * MIN_PRESSURE_FRACTION)
+        shear = _choose_modes(patch, limit, length, n_modes, model.accuracy.tolerance)
+
+    modes = model.rig.modes
+    still = np.zeros(modes.omega.size)
+    return contacts.make_pressed_contact(
+        law,
+        force,
+        row,
+        shear,
+        bond_sum,
+        sets=sets,
+        heave=still if modes.normal is None else np.asarray(modes.normal, float),
+        pitch=still if modes.pitch is None else np.asarray(modes.pitch, float),
+    )
+
+
+def _find_length(law) -> float:
+    """Return the length [m] over which a law reaches its friction limit; 0 for rigid friction."""
+    return getattr(law, "length", None) or law.bond_length or 0.0
+
+
+def _find_weakening(law) -> float:
+    """Return the ratio of static to kinetic friction of a law whose growth makes the friction in motion smaller."""
+    if not getattr(law, "has_growth", False):
+        return 1.0
+    return 1 / law.ratio if law.ratio > 0 else np.inf
+
+
+def _choose_modes(
+    patch, limit, length: float, n_modes: int | None, tolerance: float, weakening: float = 1.0
+) -> shear_modes.ShearModes:
+    """Return a number of shear modes of the pieces, by default as many as a part of the tolerance needs.
+
+    Parameters
+    ----------
+    patch : Patch
+        Patch with the shear compliance of its pieces.
+    limit : (m,) array
+        Friction limits of the nodes [N].
+    length : float
+        Length over which the force grows [m].
+    n_modes : int or None
+        Number of modes.
+    tolerance : float
+        Relative tolerance of the scene.
+    weakening : float
+        Ratio of static to kinetic friction.
+    """
+    compliance = patch.slip_compliance
+    if n_modes is not None:
+        return shear_modes.shear_modes(compliance, limit, length, n_modes, weakening)
+    return shear_modes.find_sufficient_modes(
+        compliance,
+        limit,
+        length,
+        shear_modes.N_SHEAR_MODES,
+        MODES_TOLERANCE_RATIO * tolerance,
+        weakening,
+    )
 
 
 def make_flank_contact(model, load: float, patch=None, n_modes: int | None = None):
@@ -65,10 +207,10 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     limit = f.static * force
     tolerance = model.accuracy.tolerance
-    length = getattr(law, "length", None) or f.bond_length
 
     # Coulomb's law yields at once; a length far below the slide at gross slip, sum(limit) / k_t,
     # replaces the jump.
+    length = _find_length(law)
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
@@ -77,29 +219,14 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         )
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
 
-    # Growth makes the friction in motion smaller: `weakening` is the static / kinetic coefficient.
-    weakening = 1.0
-    if getattr(law, "has_growth", False):
-        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
-
-    if n_modes is not None:
-        reduced = shear_modes.shear_modes(patch.slip_compliance, limit, length, n_modes, weakening)
-    else:
-        reduced = shear_modes.find_sufficient_modes(
-            patch.slip_compliance,
-            limit,
-            length,
-            shear_modes.N_SHEAR_MODES,
-            0.1 * tolerance,
-            weakening,
-        )
+    reduced = _choose_modes(patch, limit, length, n_modes, tolerance, _find_weakening(law))
 
     # The load of the grooves is distributed over the points as the pressure is.
     shares = force[reduced.points] / force.sum()
     return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
 
 
-def compute_groove_fields(patch, contact, snapshots) -> tuple:
+def compute_groove_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndarray]:
     """Return traction (f, m) [Pa] and slip (f, m) [m] at the nodes of a patch over grooves.
 
     Parameters
@@ -141,7 +268,7 @@ def make_bond_sum(law, choice) -> "contacts.BondSum | None":
     return contacts.BondSum(law, choice.reach(law.order), choice.merge)
 
 
-def compute_point_shear_modes(model, patch, n_modes: int | None = None):
+def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> shear_modes.ShearModes:
     """Return the shear modes of the contact points of a nonlocal law.
 
     If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
@@ -157,21 +284,21 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None):
         Number of modes; default: by the scene, otherwise by the tolerance.
     """
     law = model.bonds
-    sigma = patch.pressure.sigma_n
-    tolerance = 0.1 * model.accuracy.tolerance
     n_modes = n_modes or model.accuracy.shear_modes
-    if model.side != "lower":
-        return bond_shear_modes(patch, law, n_modes, tolerance)
-    # A single mode is computed first, because this rejects a patch that could jump at constant
-    # displacement.
-    bond_shear_modes(patch, law, 1, 1.0)
-    return bond_shear_modes(
-        patch,
-        law,
-        n_modes,
-        tolerance,
-        sigma=np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch)),
-    )
+    tolerance = MODES_TOLERANCE_RATIO * model.accuracy.tolerance
+
+    def compute() -> shear_modes.ShearModes:
+        """Compute the modes, for all runs with the same Patch."""
+        sigma = patch.pressure.sigma_n
+        if model.side == "lower":
+            # A single mode is computed first, because this rejects a patch that could jump at constant
+            # displacement.
+            bond_shear_modes(patch, law, 1, 1.0)
+            sigma = np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch))
+        return bond_shear_modes(patch, law, n_modes, tolerance, sigma=sigma)
+
+    key = ("shear modes", patch, law, model.side, n_modes, tolerance)
+    return store.get_or_compute(key, compute)
 
 
 def mean_loaded_pressure(patch) -> float:

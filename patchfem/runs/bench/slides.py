@@ -19,7 +19,7 @@ from ...points import contacts, slides
 from ...slip import fields
 from ..patch import jenkins_elements
 from . import averaged_law, shear
-from .engine import BenchEngine, BondListGuard, Method, has_changing_pressure
+from .engine import CLOSED_FORM, BenchEngine, BondListGuard, has_changing_pressure
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
@@ -100,7 +100,7 @@ def follow_path(task: SlideTask) -> SlideHistories:
     NotConverged
         If the force of a step has too large an error.
     """
-    if task.engine.method is not Method.CLOSED:
+    if task.engine.method != CLOSED_FORM:
         return _follow_by_points(task)
     histories = _climb_grooves(task) if task.model.grooves is not None else _slide_freely(task)
     if task.progress is not None:
@@ -120,19 +120,28 @@ def _slide_freely(task: SlideTask) -> SlideHistories:
     friction = task.model.friction
     moves = np.diff(task.slide)
     fraction = _find_limit_fraction(task.model, moves, np.diff(task.time))
-    limits = _FrictionLimits(task)
-    begin, end = limits.compute_resultants(np.sign(moves))
+    limits = {sign: _find_limits(task, sign) for sign in (-1.0, 1.0)}
+    begin = np.where(moves > 0, limits[1.0][:-1], limits[-1.0][:-1])
+    end = np.where(moves > 0, limits[1.0][1:], limits[-1.0][1:])
     force = np.append(0.0, fraction * end)
     work = fraction * (begin + end) / 2 * moves
 
     # At rest, a law that sticks keeps its force as far as the limit allows.
     rests = np.flatnonzero(moves == 0) if law_has_trait(friction.law, "set-valued") else ()
     for sample in rests:
-        limit = abs(force[sample])
+        before = force[sample]
+        limit = abs(before)
         if limit > 0 and task.model.load_varies:
-            limit = limits.compute_resultant(sample + 1, np.sign(force[sample]))
-        force[sample + 1] = np.clip(force[sample], -limit, limit)
-    tau = [limits.distribute(sample, force[sample]) for sample in task.frames]
+            limit = limits[np.sign(before)][sample + 1]
+        force[sample + 1] = np.clip(before, -limit, limit)
+
+    # The tractions of a frame are in proportion to the friction limits.
+    tau = []
+    for sample in task.frames:
+        sign = 1.0 if force[sample] >= 0 else -1.0
+        limit = limits[sign][sample]
+        ratio = force[sample] / limit if limit > 0 else 0.0
+        tau.append(ratio * _find_limit_tractions(task, sample, sign))
 
     # A force at the end of a rest is that of the motion that begins there.
     load = task.compute_loads()
@@ -153,58 +162,24 @@ def _find_limit_fraction(model, moves, durations) -> np.ndarray:
     return make_law(model.friction, 1.0).limit_fraction(moves, durations)
 
 
-class _FrictionLimits:
-    """Friction limits of a law without memory, at the samples of a path.
+def _find_limit_tractions(task: SlideTask, sample: int, direction: float) -> np.ndarray:
+    """Return the largest tractions (m,) [Pa] against a motion to +x (`direction` 1) or to -x (-1)."""
+    friction = task.model.friction
+    sigma = task.evaluate_pressure([sample])[0]
+    if task.patch is not None and law_has_trait(friction.law, "averaged"):
+        offset = task.slide[sample] if task.model.side == "lower" else 0.0
+        average = averaged_law.average_behind(task.model, task.patch, direction, offset)
+        sigma = np.where(sigma > 0, average, 0.0)
+    return sigma * (friction.static if friction.kinetic is None else friction.kinetic)
 
-    Parameters
-    ----------
-    task : SlideTask
-    """
 
-    def __init__(self, task: SlideTask):
-        friction = task.model.friction
-        self.task = task
-        self.coefficient = friction.static if friction.kinetic is None else friction.kinetic
-        self.changes = has_changing_pressure(task.model)
-        self._resultants: dict = {}
-
-    def compute_tractions(self, sample: int, direction: float) -> np.ndarray:
-        """Return the largest tractions (m,) [Pa] against a motion to +x (`direction` 1) or to -x (-1)."""
-        task = self.task
-        sigma = task.evaluate_pressure([sample])[0]
-        if task.patch is not None and law_has_trait(task.model.friction.law, "averaged"):
-            offset = task.slide[sample] if task.model.side == "lower" else 0.0
-            average = averaged_law.average_behind(task.model, task.patch, direction, offset)
-            sigma = np.where(sigma > 0, average, 0.0)
-        return self.coefficient * sigma
-
-    def compute_resultant(self, sample: int, direction: float) -> float:
-        """Return the largest force [N] against a motion to +x (`direction` 1) or to -x (-1)."""
-        key = (sample if self.changes else 0, direction)
-        if key not in self._resultants:
-            self._resultants[key] = float(self.compute_tractions(*key) @ self.task.weight)
-        return self._resultants[key]
-
-    def compute_resultants(self, directions) -> tuple:
-        """Return the largest forces (n,) [N] at the begin and at the end of each of n steps of given directions (n,)."""
-        if not self.changes:
-            sizes = [self.compute_resultant(0, direction) for direction in (-1.0, 1.0)]
-            limits = np.where(directions > 0, sizes[1], sizes[0])
-            return limits, limits
-        if not law_has_trait(self.task.model.friction.law, "averaged"):
-            limits = self.coefficient * self.task.compute_loads()
-            return limits[:-1], limits[1:]
-        steps = list(enumerate(directions.tolist()))
-        begin = [self.compute_resultant(step, direction) for step, direction in steps]
-        end = [self.compute_resultant(step + 1, direction) for step, direction in steps]
-        return np.array(begin), np.array(end)
-
-    def distribute(self, sample: int, force: float) -> np.ndarray:
-        """Return the tractions (m,) [Pa] of a force [N], in proportion to the friction limits."""
-        direction = 1.0 if force >= 0 else -1.0
-        limit = self.compute_resultant(sample, direction)
-        ratio = force / limit if limit > 0 else 0.0
-        return ratio * self.compute_tractions(sample, direction)
+def _find_limits(task: SlideTask, direction: float) -> np.ndarray:
+    """Return the largest forces (k,) [N] against a motion to +x (`direction` 1) or to -x (-1) at all samples."""
+    if not has_changing_pressure(task.model):
+        limit = float(_find_limit_tractions(task, 0, direction) @ task.weight)
+        return np.full(task.slide.size, limit)
+    samples = range(task.slide.size)
+    return np.array([_find_limit_tractions(task, k, direction) @ task.weight for k in samples])
 
 
 def find_rest_ends(model, slide) -> dict[int, float]:
@@ -254,7 +229,7 @@ def _climb_grooves(task: SlideTask) -> SlideHistories:
     else:
         speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
 
-        def find_flank(places, speed) -> tuple:
+        def find_flank(places, speed) -> tuple[np.ndarray, np.ndarray]:
             """Return the slope t of the flank and the friction ratio phi along it, at places [m] and speeds [m/s]."""
             t = grooves.slope(places)
             fraction = _find_limit_fraction(model, np.sqrt(1 + t**2) * speed, 1.0)
@@ -372,59 +347,29 @@ def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
     return (task.model.friction.bond_length or 0.0) * share
 
 
-def _make_contact(task: SlideTask) -> tuple:
+def _make_contact(task: SlideTask):
     """Return the contact points of a bench, and the JenkinsSet of pieces that are replaced by parallel elements, or None."""
     model = task.model
-    patch = task.patch
     friction = model.friction
     row = np.zeros(0)
-    load = float(task.evaluate_pressure([0])[0] @ task.weight)
+    has_points = model.grooves is not None or model.load_varies
+    if has_points or law_has_trait(friction.law, "bonds"):
+        return shear.make_points(model, task.patch, row, task.engine.choice), None
 
-    # Laws with state along the path: grooves, bonds, or a load that changes.
-    if model.grooves is not None:
-        modes = model.accuracy.shear_modes
-        return shear.make_flank_contact(model, load, patch, modes), None
-    if law_has_trait(friction.law, "bonds"):
-        return _make_bond_contact(task, load, row), None
-    if model.load_varies:
-        point = model.point
-        return contacts.make_pressed_contact(friction, load, row, load=point.evaluate), None
-
-    # A comparison run merges the springs of parallel elements.
+    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve; rigid pieces are one element of the
+    # law itself. A comparison run merges the springs of parallel elements.
     merge_springs = task.engine.springs
-
-    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
-        jenkins_set = jenkins_elements.elements(patch, friction.static, length)
+        jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
         springs = jenkins_set.stiffness, jenkins_set.yield_displacement
         if merge_springs is not None:
             springs = merge_springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
 
-    # Rigid pieces are one element of the law itself.
+    load = float(task.evaluate_pressure([0])[0] @ task.weight)
     element = make_law(friction, load).element(load)
     if merge_springs is not None:
         springs = merge_springs(*np.split(element.numbers[2:], 2))
         element = elastic_plastic.parallel_element(*springs)
     return contacts.make_contact([element], [row]), None
-
-
-def _make_bond_contact(task: SlideTask, load: float, row) -> "contacts.Contact":
-    """Return the points of bonds: at the nodes, at the points of shear modes, or a single one under a load [N]."""
-    model = task.model
-    patch = task.patch
-    law = model.bonds
-    bond_sum = shear.make_bond_sum(law, task.engine.choice)
-    if model.load_varies:
-        point = model.point
-        return contacts.make_pressed_contact(law, load, row, None, bond_sum, load=point.evaluate)
-    modes = None
-    if model.partial_slip:
-        modes = shear.compute_point_shear_modes(model, patch)
-    if model.side == "lower":
-        return shear.make_lower_contact(model, patch, row, modes, bond_sum)
-    if modes is None:
-        return contacts.make_bond_contact(law, load, row, None, bond_sum)
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return contacts.make_bond_contact(law, force[modes.points], row, modes, bond_sum)

@@ -15,8 +15,10 @@ from ...elasticity.elasticity import (
     Piece,
     interface_compliance,
 )
+from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 from . import store
+from .store import Key
 
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
 COUPLING_ROUND_OFF = 1e-7
@@ -36,13 +38,13 @@ class CondensedPair:
     - seconds: CPU seconds by name.
     """
 
-    grid: object
-    upper_grid: object
+    grid: "piece_meshes.Mesh"
+    upper_grid: "piece_meshes.Mesh"
     piece: Piece
     upper: Piece
     compliance: Compliance
     closing: np.ndarray
-    joint: object
+    joint: "mortar.Mortar | None"
     end_gap: np.ndarray
     seconds: dict[str, float]
 
@@ -70,11 +72,11 @@ class CondensedPair:
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
     @property
-    def meshes(self) -> tuple:
+    def meshes(self) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
         """Meshes of the lower and of the upper piece; the latter is None for identical pieces."""
         return self.grid, None if self.upper is self.piece else self.upper_grid
 
-    def forces(self, nodal) -> tuple:
+    def forces(self, nodal) -> tuple[np.ndarray, np.ndarray]:
         """Distribute interface forces (..., m) to the nodes of the lower and of the upper piece."""
         if self.joint is None:
             return nodal, nodal
@@ -183,7 +185,7 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
         )
 
 
-def _condensed_pair_key(patch_model, name: str, level: int) -> tuple:
+def _condensed_pair_key(patch_model, name: str, level: int) -> Key:
     """Return the cache key of the condensed pieces on one level of a shared mesh."""
     pieces = patch_model.pieces
     return (

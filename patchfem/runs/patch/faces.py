@@ -6,15 +6,30 @@ their Jenkins elements for the motion, and fields.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core import PatchfemError
 from ...friction import record
 from ...slip import fields as slip_fields
+from ...slip.shear_modes import JenkinsSet
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
 from . import jenkins_elements, mesh_levels, store
+from .press import Patches
+
+
+class PatchElements(NamedTuple):
+    """Parallel Jenkins elements of an interface.
+
+    - stiffness, yield_displacement (t,): [N/m] and [m].
+    - jenkins_set: the elements with their nodes; None for strips and for an unloaded patch.
+    """
+
+    stiffness: np.ndarray
+    yield_displacement: np.ndarray
+    jenkins_set: JenkinsSet | None = None
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -31,7 +46,7 @@ def solve_interface_patches(model) -> Iterator[Face]:
             )
 
 
-def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
+def solve_contact_on_meshes(interface, tolerance: float) -> Patches:
     """Solve the contact of an interface on its mesh and on coarser meshes.
 
     Runs with equal patches use one cached solution. The solution of a patch with files is cached
@@ -54,7 +69,7 @@ def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
         raise
 
 
-def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
+def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> PatchElements:
     """Return the parallel Jenkins elements of an interface with partial slip.
 
     An unloaded patch has a single element, which yields at once.
@@ -70,23 +85,21 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> t
 
     Returns
     -------
-    tuple
-        Stiffness (t,) [N/m], yield displacement (t,) [m], and the JenkinsSet (None for strips).
+    PatchElements
     """
     patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
     static = interface.numbers.static
     if not patch.pressure.load > 0:
-        return np.array([1 / patch.slip_compliance.mean()]), np.zeros(1), None
+        return PatchElements(np.array([1 / patch.slip_compliance.mean()]), np.zeros(1))
     length = record.make_law(interface.numbers, interface.load).element(interface.load).length
     if patch.strips is not None:
-        return *map(
-            np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))
-        ), None
+        strips = jenkins_elements.strip_elements(patch, static, length)
+        return PatchElements(*map(np.concatenate, zip(*strips)))
     jenkins_set = jenkins_elements.elements(patch, static, length)
-    return jenkins_set.stiffness, jenkins_set.yield_displacement, jenkins_set
+    return PatchElements(jenkins_set.stiffness, jenkins_set.yield_displacement, jenkins_set)
 
 
-def group_interfaces_with_coarse_mesh(model) -> list:
+def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:
     """Return the indices of the interfaces with a coarser mesh, grouped by distinct patch."""
     out = {}
     for face in solve_interface_patches(model):
@@ -95,7 +108,7 @@ def group_interfaces_with_coarse_mesh(model) -> list:
     return [tuple(numbers) for numbers in out.values()]
 
 
-def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
+def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ...]:
     """Return interfaces of a rig with frames of their slip and shear stress.
 
     Without elements or snapshots, an interface has only the fields of its static contact.
@@ -118,7 +131,7 @@ def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
         # Only an interface whose pieces deform in shear has slip that varies along x.
         jenkins_set = None
         if face.partial_slip and snapshots:
-            jenkins_set = make_patch_elements(law, model.accuracy.tolerance)[2]
+            jenkins_set = make_patch_elements(law, model.accuracy.tolerance).jenkins_set
 
         # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:

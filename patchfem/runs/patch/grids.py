@@ -15,6 +15,7 @@ import numpy as np
 
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
+from ...model.patch import PatchModel
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
 from .condensed import condense
@@ -25,7 +26,7 @@ from .values import contact_ends
 N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
-MAX_COLUMNS = 120
+MAX_GRID_COLUMNS = 120
 # Each of the following dicts has a value for a static patch (True) and for a patch in motion
 # (False), which gets fewer nodes, because every node slows down each time step.
 CELL_GROWTH = {
@@ -112,7 +113,7 @@ class BaseGrids(NamedTuple):
     contact: ContactExtent to which the grids are graded; None without a load.
     """
 
-    bodies: list
+    bodies: list[TensorGrid]
     contact: ContactExtent | None
 
 
@@ -175,7 +176,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
     return BaseGrids(make_grids(patch_model, layout), contact)
 
 
-def make_load_variants(patch_model) -> list:
+def make_load_variants(patch_model) -> list[PatchModel]:
     """Return the patch at the ends of the range of a varying load; [] if no load moves its edges."""
     load = patch_model.loading.load
     if patch_model.mesh.edge_motion != "load" or load is None:
@@ -202,7 +203,7 @@ def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -
 
 def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
     """Return whether columns at x (k,) [m] resolve the maxima on a wavy surface and the slip zones [m]."""
-    has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_COLUMNS
+    has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_GRID_COLUMNS
     if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
         return False
     return all(_resolves_span(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
@@ -304,7 +305,7 @@ def _make_point_bands(places, cell: float) -> Bands:
     return [(place, place, cell) for place in places]
 
 
-def _make_edge_bands(edge_positions: list, min_cell: float) -> Bands:
+def _make_edge_bands(edge_positions: list[tuple[float, ...]], min_cell: float) -> Bands:
     """Return the bands of short columns around the contact edges.
 
     If all contacts have equally many edges, each band covers the range over which its edge moves.
@@ -391,10 +392,10 @@ def _find_pressure_maxima(x, sigma) -> Pairs:
     return tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
 
 
-def make_grids(patch_model, layout: Layout) -> list:
+def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     """Return the grids of both pieces with the columns of a layout; one grid for identical pieces.
 
-    The columns are coarsened to MAX_COLUMNS if needed. The rows are as short as the columns at the
+    The columns are coarsened to MAX_GRID_COLUMNS if needed. The rows are as short as the columns at the
     interface, and also short at the inner face of the coating and at the holder.
 
     Parameters
@@ -409,8 +410,8 @@ def make_grids(patch_model, layout: Layout) -> list:
     list of TensorGrid
     """
     x = divide_into_columns(layout, patch_model.gap.jumps)
-    while x.size > MAX_COLUMNS + 1 and layout.bands:
-        layout = layout.scale_cells(x.size / MAX_COLUMNS)
+    while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
+        layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
         x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length

@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError, compute_allowed_error
+from ...core import PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
+from ...model.patch import PatchModel
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
 from ..results.patch_rows import MESH_MEASURES, TABLE, Measures, Values
 from .condensed import condense_on_same_meshes
 from .limits import extrapolate_to_zero_cell_length
-from .press import Patch, Patches, solve_patch_contact
+from .press import Estimate, Estimates, Patch, Patches, solve_patch_contact
 from .values import (
     compute_static_values,
     edge_cell_lengths,
@@ -51,32 +52,6 @@ UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 # Measures without a value where the pressure is unbounded.
 PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
-
-
-class Estimate(NamedTuple):
-    """Value and error estimate of a static measure.
-
-    - value: number.
-    - error: error estimate; None without a coarser mesh.
-    - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
-      that of the finest mesh.
-    """
-
-    value: float
-    error: float | None
-    is_extrapolated: bool = False
-
-    def to_measure(self, name: str) -> Measure:
-        """Convert the estimate to a Measure with the floor of the measure table."""
-        row = TABLE[name]
-        engine = patch_rows.FINEST_MESH_SOURCE
-        if self.is_extrapolated:
-            engine = patch_rows.EXTRAPOLATED_SOURCE
-        error = None if self.error is None else float(self.error)
-        return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
-
-
-Estimates = dict[str, Estimate]  # by the name of the measure
 
 
 def estimate_static_measures(
@@ -643,7 +618,7 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures
     return out
 
 
-def with_other_strip_count(patch_model) -> tuple:
+def with_other_strip_count(patch_model) -> tuple[PatchModel, float]:
     """Return the model with another number of strips, and the ratio of the strip widths.
 
     The number of strips is halved, or doubled if half as many strips would not extend to the load

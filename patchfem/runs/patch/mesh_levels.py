@@ -8,6 +8,7 @@ expensive (`solve_on_refined_meshes`).
 from functools import partial
 
 from ...core import NotConverged, Outcome
+from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
@@ -98,7 +99,7 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
     return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
 
 
-def make_given_meshes(patch_model) -> list:
+def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]]":
     """Return the meshes of a patch with prescribed element size or mesh file, from fine to coarse.
 
     The error follows from two coarser grids, or from the unstructured mesh with all edges halved. Meshes with few columns

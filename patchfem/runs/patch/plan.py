@@ -4,9 +4,11 @@ In: a `PatchModel` or a Model. Out: numbers of unknowns, stiffnesses in series, 
 the plan.
 """
 
+from collections.abc import Sequence
 from math import sqrt
 
 from ...formatting import format_length
+from ...mesh import pieces as piece_meshes
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..results.patch_rows import Values
@@ -25,7 +27,7 @@ MAX_FULL_CONTACT_TILT = 0.7
 StiffnessChain = dict[str, float | str]
 
 
-def _predict_finest_mesh(patch_model, tolerance: float) -> list:
+def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshes.Mesh | None]":
     """Return the meshes of the pieces on the expected finest level.
 
     A mesh file is not read; an automatic mesh takes its place.

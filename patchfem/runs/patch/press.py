@@ -20,11 +20,12 @@ from ...contact.press import (
     split_into_strips,
     strip_offsets,
 )
-from ...contact.strip_compliance import StripCompliance, WarmStart
-from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...contact.strip_compliance import StripCompliance
+from ...core import Compliance, ContactState, Measure, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
-from ...model.patch import PatchStrips
-from ..results.patch_rows import Arrays, Measures, Values
+from ...model.patch import PatchModel, PatchStrips
+from ..results import patch_rows
+from ..results.patch_rows import TABLE, Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -46,15 +47,41 @@ class Surface(NamedTuple):
     unloaded_gap: np.ndarray
 
 
+class Estimate(NamedTuple):
+    """Value and error estimate of a static measure.
+
+    - value: number.
+    - error: error estimate; None without a coarser mesh.
+    - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
+      that of the finest mesh.
+    """
+
+    value: float
+    error: float | None
+    is_extrapolated: bool = False
+
+    def to_measure(self, name: str) -> Measure:
+        """Convert the estimate to a Measure with the floor of the measure table."""
+        row = TABLE[name]
+        engine = patch_rows.FINEST_MESH_SOURCE
+        if self.is_extrapolated:
+            engine = patch_rows.EXTRAPOLATED_SOURCE
+        error = None if self.error is None else float(self.error)
+        return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
+
+
+Estimates = dict[str, Estimate]  # by the name of the measure
+
+
 class PointSolution(NamedTuple):
     """Contact solution on equally spaced points of a profile, which are finer than the mesh.
 
-    - measures: `measures.Estimate` by name, of the measures that the points resolve.
+    - measures: those of the measures that the points resolve.
     - surface: Surface of the finest refinement level.
     - intervals (k, 2): contact intervals [m].
     """
 
-    measures: dict
+    measures: Estimates
     surface: Surface
     intervals: np.ndarray
 
@@ -102,17 +129,17 @@ class Patch:
     - frames: frames of the interface (`Result.fields`); {} before the end of the run.
     """
 
-    model: object
+    model: PatchModel
     pair: CondensedPair
     pieces: Compliance
     pressure: ContactState
     state: StripsState
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
-    notes: tuple
+    notes: tuple[str, ...]
     seconds: Values
     averaging: float | None = None
-    step_variants: tuple = ()
+    step_variants: "tuple[tuple[float, Patch], ...]" = ()
     points: PointSolution | None = None
     measures: Measures | None = None
     frames: Arrays = field(default_factory=dict)
@@ -249,8 +276,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     def solve_gap(unloaded_gap) -> Patch:
         """Solve the contact problem for an unloaded gap (m,) [m]."""
         begin = perf_counter()
-        warm_start = WarmStart(start)
-        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, warm_start=warm_start)
+        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, start=start)
         times = seconds | {"press": perf_counter() - begin}
         return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
 
@@ -270,7 +296,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     return replace(patch, step_variants=tuple(variants))
 
 
-def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
+def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple[np.ndarray, np.ndarray]:
     """Return the two changes (m,) [m] of the gap that put a node on either side of a step.
 
     The worn depth of the node belongs to a gap at half the height of the step. On the higher side
@@ -287,7 +313,7 @@ def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
         shift = np.broadcast_to(side * half_steps, worn.shape).copy()
         shift[..., node] += worn[..., neighbour] - worn[..., node]
         shifts.append(shift)
-    return tuple(shifts)
+    return shifts[0], shifts[1]
 
 
 def make_patch(
@@ -295,7 +321,7 @@ def make_patch(
     pair: CondensedPair,
     gap,
     contact: SolvedContact,
-    notes: tuple,
+    notes: tuple[str, ...],
     seconds: Values,
 ) -> Patch:
     """Assemble the Patch record of a solved contact.
@@ -374,28 +400,28 @@ class ContactForceSolver:
     - model: PatchModel.
     - bare: compliance of the pieces without asperity layer.
     - gap (m,): unloaded gap [m].
-    - warm_start: contact set and matrix factors of the previous solution.
+    - contact_set (m,): nodes in contact of the previous solution, (s, m) for strips; None before the first one.
     """
 
-    model: object
+    model: PatchModel
     bare: Compliance
     gap: np.ndarray
-    warm_start: WarmStart = field(default_factory=WarmStart)
+    contact_set: np.ndarray | None = None
 
     def start_from_forces(self, force) -> None:
         """Start the next solution from the contact set of given nodal forces."""
-        self.warm_start.contact_set = np.asarray(force) > 0
+        self.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
         """Return the contact forces [N] for worn depth [m] and softening [m/N], (m,) each, or (s, m) for strips."""
         added = np.atleast_2d(softening) if softening.any() else None
-        state = solve_contact(self.model, self.bare, self.gap + worn, added, self.warm_start).state
-        return state.force.reshape(np.shape(worn))
+        gap = self.gap + worn
+        force = solve_contact(self.model, self.bare, gap, added, self.contact_set).state.force
+        self.contact_set = force > 0
+        return force.reshape(np.shape(worn))
 
 
-def solve_contact(
-    patch_model, pieces: Compliance, gap, added=None, warm_start=None
-) -> SolvedContact:
+def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) -> SolvedContact:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
@@ -411,8 +437,8 @@ def solve_contact(
         Unloaded gap [m].
     added : (s, m) ndarray, optional
         What each strip adds to the diagonal of its compliance [m/N].
-    warm_start : WarmStart, optional
-        Results of a similar solution; those of this one are written.
+    start : (s, m) ndarray of bool, optional
+        Nodes in contact of a similar solution, from which the search starts.
 
     Returns
     -------
@@ -425,7 +451,7 @@ def solve_contact(
     offsets = strip_offsets(patch_model.pieces.width, count)
 
     strips = StripModel(
-        StripCompliance(strip.normal, added, warm_start),
+        StripCompliance(strip.normal, added),
         StripLayout(pieces.interface.x, strip.weight, offsets),
         None if skin is None else make_skin_law(patch_model),
     )
@@ -441,7 +467,7 @@ def solve_contact(
         roll=roll,
     )
 
-    state = press_strips(strips, gap, holder)
+    state = press_strips(strips, gap, holder, start)
     pressure = state.pressure
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     if strips.is_smooth:

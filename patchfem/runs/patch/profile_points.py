@@ -13,6 +13,7 @@ import numpy as np
 
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
+from ...contact.edges import ContactEdge
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
     PointCompliance,
@@ -26,23 +27,23 @@ from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model import profile
+from ...model.patch import PatchPiece
 from ...model.pieces import make_elastic_layers
+from ..results.patch_rows import Values
 from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
-    Estimate,
-    Estimates,
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
     increase_error_by_peak_error,
 )
-from .press import PointSolution, Surface
+from .press import Estimate, Estimates, PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
 # Largest number of points of a level; more would exceed the CPU time of a patch.
-MAX_POINTS = 60_000
+MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
 MAX_WORK = 2.5e7
 MIN_POINTS = 500  # Smallest number of points of the coarsest level.
@@ -51,7 +52,7 @@ END_CELL_RATIO = 1e-4
 MIDDLE_CELL_RATIO = 1 / 30  # The same ratio in the middle of the interface.
 CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
 CONTACT_TOL = 3e-8  # Largest relative residual at which the contact problem counts as solved.
-MAX_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
+MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
 CORNER_LENGTH_RATIO = 1e-3
 # Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
@@ -76,7 +77,7 @@ class PointLevel(NamedTuple):
     force: np.ndarray
     surface: Surface
     intervals: np.ndarray
-    values: dict
+    values: Values
     resolution: Resolution
     n_iterations: int
     has_corner_peak: bool
@@ -140,7 +141,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     patch_model : PatchModel
         Patch with a profile, without strips.
     meets_tolerance : callable
-        Function of a PointSolution that ends the refinement. MAX_POINTS and MAX_WORK end it as
+        Function of a PointSolution that ends the refinement. MAX_PROFILE_POINTS and MAX_WORK end it as
         well.
 
     Returns
@@ -173,13 +174,13 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 def _count_first_level_points(patch_model) -> int:
     """Return the number of points of the coarsest refinement level."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
-    return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
+    return max(MIN_POINTS, min(round(n_samples / 4), MAX_PROFILE_POINTS // 4))
 
 
 def _is_next_level_expensive(level: PointLevel) -> bool:
     """Return whether the next level would exceed the largest number of points or the largest work."""
     count = level.force.size
-    return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
+    return 2 * count > MAX_PROFILE_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
 def _combine_refinement_series(
@@ -240,13 +241,15 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     return FreeEnds(x, *changes)
 
 
-def _distinct_pieces(patch_model) -> list:
+def _distinct_pieces(patch_model) -> list[tuple[PatchPiece, int]]:
     """Return the distinct pieces of a patch as pairs (piece, multiplicity)."""
     pieces = patch_model.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
-def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
+def make_point_compliances(
+    patch_model, ends: FreeEnds, count: int
+) -> tuple[PointCompliance, PointCompliance]:
     """Return the normal and the tangential compliance of equally spaced points.
 
     Parameters
@@ -260,7 +263,7 @@ def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
 
     Returns
     -------
-    tuple of PointCompliance
+    normal, tangential : PointCompliance
     """
     length = patch_model.pieces.length
     width = patch_model.pieces.width * patch_model.pieces.pairs
@@ -275,10 +278,11 @@ def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
     for wave, change in zip(waves, (ends.normal, ends.tangential)):
         modes, sizes = smooth_modes(ends.x, change, x)
         out.append(PointCompliance(x, length / count * width, wave, modes, sizes / width))
-    return tuple(out)
+    normal, tangential = out
+    return normal, tangential
 
 
-def _row_depths(piece, layout: Layout) -> tuple:
+def _row_depths(piece, layout: Layout) -> tuple[np.ndarray, int]:
     """Return the depths [m] of the element rows of a piece and the number of rows in the coating."""
     height = piece.height
     coating = piece.thickness
@@ -377,7 +381,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     )
 
 
-def _contact_intervals(active, contact_edges: list, length: float) -> np.ndarray:
+def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) -> np.ndarray:
     """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool.
 
     An interval ends at a contact edge between two points, or at an end of the interface.
@@ -402,7 +406,7 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
 
     problem = patch_problem(x, gap - offset, loading.load, moment, loading.rotational_stiffness)
     force, n_iterations = solve_by_gradients(
-        normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
+        normal, problem, CONTACT_TOL, MAX_CONTACT_ITERATIONS, initial_force
     )
 
     # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).

@@ -10,9 +10,11 @@ from dataclasses import replace
 from ...contact.press import NEGLECTED_SHEAR_NOTE
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
+from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
+from ..results.patch_rows import Measures
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .measures import add_strip_count_errors, note_on_plane_state
@@ -28,7 +30,7 @@ MAX_SMALL_STRAIN = 0.02
 MIN_COUPLING_RATIO = 0.02
 
 
-def make_piece_meshes_of_run(model) -> tuple:
+def make_piece_meshes_of_run(model) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
     """Return the meshes of the lower and the upper piece of a model, as in a run.
 
     The upper one is None if the pieces are identical.
@@ -39,7 +41,7 @@ def make_piece_meshes_of_run(model) -> tuple:
         return solve_with_coarser(model.patch, model.accuracy.tolerance)[0].pair.meshes
 
 
-def static_measures(model, patch, coarse) -> dict:
+def static_measures(model, patch, coarse) -> Measures:
     """Return the measures of a solved patch with the floors of their errors.
 
     Values and errors are those of `Patch.measures`; only strips add the error due to their number. The floor of a
@@ -86,16 +88,14 @@ def make_static_result(inputs: RunInputs) -> Result:
     if pressure.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     return Result(
-        plan=inputs.plan,
-        outcome=pressure.outcome,
-        measures=static_measures(inputs.plan.model, patch, inputs.coarse),
-        response=None,
-        window=None,
-        patch=patch,
-        fields=collect_rest_frame(patch),
-        seconds=inputs.seconds,
-        warnings=warnings,
-        extra={},
+        inputs.plan,
+        pressure.outcome,
+        static_measures(inputs.plan.model, patch, inputs.coarse),
+        inputs.seconds,
+        warnings,
+        inputs.notes,
+        patch,
+        collect_rest_frame(patch),
     )
 
 

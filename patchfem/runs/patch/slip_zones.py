@@ -6,14 +6,17 @@ errors of friction work and friction force relative to the tolerance.
 
 import numpy as np
 
+from ...contact.edges import ContactEdge
 from ...core import Measure
 from ...response.errors import convergence_errors
 from ...response.rows import error_floor
 from ...slip.shear_modes import JenkinsSet
 from .jenkins_elements import elements
 
+Zone = tuple[float, float]  # start and end [m]
 
-def find_slip_zones(patch, slip, ends: list) -> tuple:
+
+def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
     """Return the zones (start, end) [m] that slip at a given displacement amplitude.
 
     The yield displacement is interpolated linearly between nodes. At a contact edge between two
@@ -56,7 +59,7 @@ def find_slip_zones(patch, slip, ends: list) -> tuple:
     return tuple(out)
 
 
-def _yielding_intervals(x, yield_displacement, amplitude: float) -> list:
+def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
     """Return the intervals of x [m] in which the yield displacement is below an amplitude."""
     is_yielding = yield_displacement < amplitude
     starts = np.flatnonzero(is_yielding & ~np.append(False, is_yielding[:-1]))

@@ -7,22 +7,26 @@ the same patch. The least recently used result is discarded beyond MAX_ENTRIES.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, TypeVar
 
 # Largest number of cached results. A patch has about seven of them with its measures and elements,
 # and its meshes have four to nine.
 MAX_ENTRIES = 64
 
-_RESULTS: dict = {}  # Results from the least to the most recently used one.
+Key = tuple[Any, ...]  # plain values, the first one naming the kind of the result
+Result = TypeVar("Result")
+
+_RESULTS: dict[Key, Any] = {}  # Results from the least to the most recently used one.
 
 
-def get_or_compute(key: tuple, make: Callable):
+def get_or_compute(key: Key, make: Callable[[], Result]) -> Result:
     """Return the cached result of a key; compute and cache it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
     store_result(key, result)
     return result
 
 
-def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
+def get_or_compute_in_sweep(patch_model, key: Key, make: Callable[[], Result]) -> Result:
     """Return the result of a key, cached only if other cases of a sweep may use it.
 
     Parameters
@@ -37,7 +41,7 @@ def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
     return get_or_compute(key, make) if can_share_results(patch_model) else make()
 
 
-def store_result(key: tuple, result) -> None:
+def store_result(key: Key, result) -> None:
     """Cache a result as the most recently used one.
 
     Beyond MAX_ENTRIES the least recently used result is discarded.
@@ -53,7 +57,7 @@ def clear_cache() -> None:
     _RESULTS.clear()
 
 
-def content_key(patch_model) -> tuple:
+def content_key(patch_model) -> Key:
     """Return a cache key that is equal for patch models with equal contents."""
     gap = patch_model.gap
     mesh = patch_model.mesh

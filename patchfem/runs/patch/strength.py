@@ -58,7 +58,7 @@ def min_von_mises_ratio(poisson: float, plane: str) -> float:
     return sqrt(3) / 2 * (1 - 2 * poisson) / sqrt(1 - poisson + poisson**2)
 
 
-def note_on_yielding_faces(patch_model, peak: float) -> dict:
+def note_on_yielding_faces(patch_model, peak: float) -> dict[Strength, str]:
     """Return notes on the surface materials that yield under a given pressure.
 
     Parameters

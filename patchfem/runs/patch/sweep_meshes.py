@@ -14,14 +14,15 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...mesh.grading import Layout
-from ...model.patch import SharedMeshes
+from ...model.patch import PatchModel, SharedMeshes
 from . import grids, mesh_levels
 from .condensed import CondensedPair, cache_condensed_pairs, condense
 from .press import solve_patch_contact
+from .store import Key
 
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
 # selected.
-MAX_CASES = 48
+MAX_LAYOUT_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
 MAX_LAYOUT_SEARCHES = 4
@@ -35,7 +36,7 @@ MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
 MAX_CELL_RATIO = 2.0
 
 
-def geometry_key(patch_model) -> tuple:
+def geometry_key(patch_model) -> Key:
     """Return a hashable key of everything on which the meshes and the compliance depend.
 
     Patches that may share meshes have equal keys; load and surface shapes do not matter.
@@ -115,7 +116,7 @@ def name_shared_meshes(levels) -> SharedMeshes:
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def select_distinct_patches(patches) -> tuple:
+def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
     """Select the patches that differ most from each other, by farthest-point selection.
 
     The patches are compared by load and surface shape. The result does not depend on their order.
@@ -128,7 +129,7 @@ def select_distinct_patches(patches) -> tuple:
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= MAX_CASES:
+    if len(keys) <= MAX_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
     scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
@@ -138,7 +139,7 @@ def select_distinct_patches(patches) -> tuple:
     coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
     selected = [int(np.argmin(coordinates.sum(axis=1)))]
     distances = np.full(len(keys), np.inf)
-    while len(selected) < MAX_CASES:
+    while len(selected) < MAX_LAYOUT_CASES:
         distances = np.minimum(
             distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
         )
@@ -167,7 +168,7 @@ def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
 
 
-def _make_common_layout(cases: list, has_intermediate_cases: bool) -> Layout | None:
+def _make_common_layout(cases: list[PatchModel], has_intermediate_cases: bool) -> Layout | None:
     """Return column layouts of the coarsest grids merged for all patches; None on failure.
 
     Parameters
@@ -261,7 +262,9 @@ def _interpolate_bands(layouts: list[Layout]) -> grids.Bands:
     return bands
 
 
-def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list[CondensedPair]:
+def _refine_until_tolerance_is_met(
+    cases: list[PatchModel], bodies, tolerance: float
+) -> list[CondensedPair]:
     """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters

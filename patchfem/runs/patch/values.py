@@ -257,7 +257,7 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
     return _find_ends(patch, 0, edges.SetFactor(patch.pieces.normal, patch.active))
 
 
-def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list:
+def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
     """Return the contact edges of one strip; `pressed` is the factor of its nodes in contact."""
     x = patch.x
     state = patch.state
@@ -287,7 +287,9 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list:
     return edges.snap_to_steps(ends, x, gap, jumps)
 
 
-def _full_stick_stiffness(normal, tangential, coupling, active, ends: list) -> float:
+def _full_stick_stiffness(
+    normal, tangential, coupling, active, ends: list[edges.ContactEdge]
+) -> float:
     """Return the tangential contact stiffness [N/m] in full stick of the nodes in contact.
 
     Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear

@@ -1,16 +1,20 @@
-"""Warnings and notes of a run on its friction law.
+"""Warnings and notes of a bench or a rig on its friction law.
 
-In: a model, its histories and measures. Out: lists of sentences.
+In: the `LawFacts` of a run. Out: sentences. LAW_WARNINGS and LAW_NOTES are their tables: each entry is a condition on the
+facts with its sentence and, if there is one, the remedy with its value.
 """
 
+from collections.abc import Iterator
+from itertools import chain
 from math import ceil, log2
+from typing import NamedTuple
 
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length
 from ...friction.bonds import parameters
 from .patch_rows import Measures
-from .result import Advice
+from .result import Advice, Settings
 
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
@@ -28,148 +32,203 @@ MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning propo
 MAX_PROPOSED_HARMONICS = 500
 
 
-def note_on_groove_slope(model, patch) -> list[str]:
-    """Return a list with a note on grooves under pieces that are compliant in shear.
+class LawFacts(NamedTuple):
+    """What a run shows of its friction law.
 
-    All points take the slope of the grooves at the displacement of the holders. The note reports
-    how far a point may be from this displacement.
+    - model, patch: Model, and solved Patch or None.
+    - measures: measures by name.
+    - outcome: how the motion ended; a bounded motion may creep.
+    - speed: peak speed [m/s].
+    - force_ratio: largest ratio of friction force to mu_s N; None if the load varies.
+    - created, exchanged: energy that the law created, and integral of the absolute friction power [J].
+    - settings: Settings of the run.
     """
-    if model.grooves is None or not model.partial_slip:
-        return []
-    limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
-    max_lag = float((patch.slip_compliance @ limit).max())
-    return [
-        f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
-        "and are the same for all points; a point at its friction limit slides by up to "
-        f"{format_length(max_lag, 3)} less than "
-        f"the holders, which is {max_lag / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
-        "point is in proportion to the total load"
-    ]
+
+    model: object
+    patch: object
+    measures: Measures
+    outcome: Outcome
+    speed: float
+    force_ratio: float | None
+    created: float
+    exchanged: float
+    settings: Settings
 
 
-def warn_of_bonds(model, speed: float, measures: Measures, outcome: Outcome) -> list[str]:
-    """Return warnings on a bond law whose bonds break before they form, creep, or start with an infinite traction.
+def list_law_warnings(facts: LawFacts) -> list[str]:
+    """Return the warnings of a run on its friction law."""
+    return list(chain.from_iterable(find(facts) for find in LAW_WARNINGS))
 
-    Parameters
-    ----------
-    model : Model
-        Model of a bench or a rig.
-    speed : float
-        Peak speed [m/s].
-    measures : dict
-        Measures by name.
-    outcome : Outcome
-        How the motion ended; a bounded motion may creep.
+
+def list_law_notes(facts: LawFacts) -> list[str]:
+    """Return the notes of a run on its friction law."""
+    return list(chain.from_iterable(find(facts) for find in LAW_NOTES))
+
+
+def _warn_of_infinite_traction(facts: LawFacts) -> Iterator[str]:
+    """Warn of initial bonds whose traction is infinite at first, because the order is negative.
+
+    Bonds that form later carry at most the fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
     """
-    if not law_has_trait(model.friction.law, "bonds"):
-        return []
-    law = model.bonds
-    warnings = []
-
-    # The traction of the initial bonds is infinite at first if the order is negative. Bonds that form later carry at
-    # most the fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
-    if law.order < 0 and law.initial != 0:
-        warnings.append(
+    law = find_bonds(facts.model)
+    if law is not None and law.order < 0 and law.initial != 0:
+        yield (
             "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
             "friction peaks depend on the time step; set initial_bonds = 0"
         )
 
-    forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
-    if forming_ratio > MAX_FORMING_RATIO:
+
+def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
+    """Warn of bonds that slide by a part of their length while they form."""
+    law = find_bonds(facts.model)
+    if law is None or law.reading != "report":
+        return
+    ratio = parameters.growth_path_ratio(law, facts.speed)
+    if ratio > MAX_FORMING_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
         max_growth_path = law.ratio / (
-            1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2
+            1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / facts.speed**2
         )
-        warnings.append(
-            f"at the peak speed of {speed:.3g} m/s a bond slides by {forming_ratio:.2g} of its length while it forms (limit "
+        yield (
+            f"at the peak speed of {facts.speed:.3g} m/s a bond slides by {ratio:.2g} of its length while it forms (limit "
             f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
-            "friction.slip_growth = "
-            f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
+            f'friction.slip_growth = "{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
         )
 
-    # The drift of a bounded motion (Dahl's creep) is a property of the law, not of the joint.
-    drift = measures.get("drift_per_cycle")
-    is_bounded = outcome in (Outcome.STEADY, Outcome.STUCK) and law.reading == "stretch"
-    if drift is None or drift.error is None or not is_bounded:
-        return warnings
-    if abs(drift.value) > drift.error + 1e-2 * law.length:
-        warnings.append(
+
+def _warn_of_creep(facts: LawFacts) -> Iterator[str]:
+    """Warn of the drift of a bounded motion (Dahl's creep), which is a property of the law, not of the joint."""
+    law = find_bonds(facts.model)
+    drift = facts.measures.get("drift_per_cycle")
+    is_bounded = facts.outcome in (Outcome.STEADY, Outcome.STUCK)
+    if law is None or law.reading != "stretch" or drift is None or drift.error is None:
+        return
+    if is_bounded and abs(drift.value) > drift.error + 1e-2 * law.length:
+        yield (
             f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
             "in each cycle creep under a force with a nonzero mean"
         )
-    return warnings
 
 
-def note_on_growth(model, peak: float | None) -> list[str]:
-    """Return notes on the effects of growing bonds.
-
-    peak: largest ratio of friction force to mu_s N in the run; None if the load varies.
-    """
-    law = model.bonds if law_has_trait(model.friction.law, "bonds") else None
-    if law is None or not law.has_growth:
-        return []
-    if law.reading == "report" and law.initial == 0:
-        return []
-
-    # In the reading of the report, growth changes only the bonds that form later.
-    if law.reading == "report":
-        return [
-            "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
-            "of later bonds grows"
-        ]
-
-    # In the other reading, bonds of a short length pull harder as the length grows.
-    notes = []
-    if law.order > 1:
-        notes.append(
-            f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
-            "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
-            "friction.order <= 1 to keep friction near mu_s N"
+def _warn_of_created_energy(facts: LawFacts) -> Iterator[str]:
+    """Warn if the law of the 1985 report has created energy."""
+    friction = facts.model.friction
+    if friction is None or friction.reading != "report":
+        return
+    if facts.created > MAX_CREATED_FRACTION * facts.exchanged:
+        percent = 100 * facts.created / facts.exchanged
+        yield (
+            f"the law as printed in the report created {facts.created:.3g} J, which is {percent:.2g} % of the work "
+            'exchanged; with friction.reading = "stretch" no energy is created'
         )
 
-    if peak is not None and peak > 1 + MIN_EXCESS_RATIO:
-        notes.append(
-            f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "
-            "bonds that formed while the bond length was small then break later; to keep the friction force at "
-            'or below mu_s N, set friction.reading = "report" and friction.order <= 0'
+
+def _warn_of_kept_pressure(facts: LawFacts) -> Iterator[str]:
+    """Warn that bonds of the printed law keep the pressure at which they formed, on a bench whose load varies."""
+    model = facts.model
+    if model.rig is None and model.load_varies and model.friction.reading == "report":
+        yield (
+            "in the law as printed in the report, a bond keeps the pressure at which it formed, "
+            "so while the load falls the friction force may exceed mu_s N; set friction.reading "
+            '= "stretch" to avoid this'
         )
-    return notes
 
 
-def warn_of_work_check(
-    values: Measures, steps: int | None, harmonics: int | None = None
-) -> list[str]:
-    """Return a list with a warning if sampled friction work differs from that in the energies.
+def _warn_of_work_check(facts: LawFacts) -> Iterator[str]:
+    """Warn if the sampled friction work differs from that in the energies.
 
     The trapezoidal rule for the samples is of second order. A difference below the error of the
     rule may be small by chance, so that the larger of both is used.
-
-    Parameters
-    ----------
-    values : dict
-        Measures by name.
-    steps, harmonics : int or None
-        Steps per cycle and number of harmonics of the run; None for an engine without them.
     """
-    check = values.get("work_check")
+    check = facts.measures.get("work_check")
     if check is None or check.value is None or check.value <= MAX_WORK_CHECK:
-        return []
+        return
     ratio = max(check.value, check.error or 0.0) / MAX_WORK_CHECK
+    steps = facts.settings.steps_per_cycle
     # One more halving of the time step is proposed, because in a motion with stick the difference
     # of the two works is of second order in the step only on average.
     halvings = 1 + ceil(log2(ratio) / 2)
-    if harmonics:
-        remedy = advise_harmonics(harmonics).text
+    if facts.settings.harmonics:
+        remedy = advise_harmonics(facts.settings.harmonics).text
     elif steps and halvings > MAX_PROPOSED_HALVINGS:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     elif steps:
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
     else:
         remedy = 'compare with a run with accuracy.method = "march"'
-    return [
+    yield (
         f"work_check is {check.value:.2g} (limit {MAX_WORK_CHECK:g}): the friction work computed from the samples by the "
         f"trapezoidal rule differs from the friction work in the energy balance; {remedy}"
-    ]
+    )
+
+
+def _note_on_growth(facts: LawFacts) -> Iterator[str]:
+    """Note the effects of growing bonds."""
+    law = find_bonds(facts.model)
+    if law is None or not law.has_growth:
+        return
+
+    # In the reading of the report, growth changes only the bonds that form later.
+    if law.reading == "report":
+        if law.initial:
+            yield (
+                "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
+                "of later bonds grows"
+            )
+        return
+
+    # In the other reading, bonds of a short length pull harder as the length grows.
+    if law.order > 1:
+        yield (
+            f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
+            "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
+            "friction.order <= 1 to keep friction near mu_s N"
+        )
+    if (facts.force_ratio or 0.0) > 1 + MIN_EXCESS_RATIO:
+        yield (
+            f"the friction force reaches {facts.force_ratio:.3g} times mu_s N: the bond length grows during the run, and "
+            "bonds that formed while the bond length was small then break later; to keep the friction force at "
+            'or below mu_s N, set friction.reading = "report" and friction.order <= 0'
+        )
+
+
+def _note_on_groove_slope(facts: LawFacts) -> Iterator[str]:
+    """Note on grooves under pieces that are compliant in shear.
+
+    All points take the slope of the grooves at the displacement of the holders. The note reports
+    how far a point may be from this displacement.
+    """
+    model = facts.model
+    if model.grooves is None or not model.partial_slip:
+        return
+    patch = facts.patch
+    limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    max_lag = float((patch.slip_compliance @ limit).max())
+    yield (
+        f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
+        "and are the same for all points; a point at its friction limit slides by up to "
+        f"{format_length(max_lag, 3)} less than "
+        f"the holders, which is {max_lag / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
+        "point is in proportion to the total load"
+    )
+
+
+LAW_WARNINGS = (
+    _warn_of_infinite_traction,
+    _warn_of_slow_forming,
+    _warn_of_creep,
+    _warn_of_kept_pressure,
+    _warn_of_created_energy,
+    _warn_of_work_check,
+)
+LAW_NOTES = (_note_on_growth, _note_on_groove_slope)
+
+
+def find_bonds(model):
+    """Return the parameters of a law with bonds; None for other laws."""
+    friction = model.friction
+    has_bonds = friction is not None and law_has_trait(friction.law, "bonds")
+    return model.bonds if has_bonds else None
 
 
 def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
@@ -181,23 +240,3 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
     n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
     return Advice.set_key("accuracy.harmonics", n_proposed)
-
-
-def warn_of_created_energy(model, created: float, exchanged: float) -> list[str]:
-    """Return a list with a warning if the law of the 1985 report has created energy.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench or a rig.
-    created, exchanged : float
-        Energy created, and integral of the absolute friction power [J].
-    """
-    if model.friction is None or model.friction.reading != "report":
-        return []
-    if created <= MAX_CREATED_FRACTION * exchanged:
-        return []
-    return [
-        f"the law as printed in the report created {created:.3g} J, which is {100 * created / exchanged:.2g} % of the work "
-        'exchanged; with friction.reading = "stretch" no energy is created'
-    ]

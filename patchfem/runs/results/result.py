@@ -5,9 +5,10 @@ the numerical settings of the run.
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +22,7 @@ from .patch_rows import Arrays, Measures, Values
 N_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
 # Change of slip / largest change; above it, a node without friction limit slips.
 MIN_SLIP_FRACTION = 1e-2
-ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
-# Entries of `Result.extra` that are settings, with the names under which they are shown.
-SHOWN_SETTINGS = {
-    "engine": "engine",
-    "map": "map",
-    "steps": "steps_per_cycle",
-    "steps_per_cycle": "steps_per_cycle",
-    "harmonics": "harmonics",
-    "shear_modes": "shear_modes",
-    "elements": "elements",
-    "quadrature": "quadrature",
-    "window": "window_cycles",
-}
+TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 # Folder of an absolute path at the start of a remark.
 _FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
 
@@ -86,30 +75,121 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunInputs:
-    """Inputs of a run: plan, solved patch, callbacks and whether to estimate errors.
+    """Inputs of a run: plan, pressed interfaces, callbacks and whether to estimate errors.
 
     - plan: Plan to run.
-    - patch: solved patch of [contact], or None.
-    - coarse: the patch on coarser meshes; None for a missing one.
+    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
     - seconds: CPU seconds by step of the run; the run adds its own.
-    - warnings: sentences on the scene and the patch.
+    - warnings, notes: sentences on the scene and the patch.
     - say, progress: callbacks for a line of text and for the completed fraction, or None.
     - estimate: whether to estimate the errors from coarser runs.
-    - stiffer: rig and patch with a stiffer joint (`joint.FreeRig`), if a joint was subtracted from the
-      modes; else None.
-    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
+    - stiffer: rig and patch with a stiffer joint, if a joint was subtracted from the modes; else None.
     """
 
     plan: object
-    patch: object
-    coarse: tuple
+    faces: tuple
     seconds: Values
     warnings: list[str]
-    say: Callable | None
-    progress: Callable | None
-    estimate: bool
+    notes: list[str]
+    say: Callable[[str], None] | None = None
+    progress: Callable[[float], None] | None = None
+    estimate: bool = True
     stiffer: object = None
-    faces: tuple = ()
+
+    @property
+    def patches(self) -> Sequence:
+        """Patch of the table [contact] on its meshes, from fine to coarse; None for a missing one."""
+        has_table = self.plan.model.patch is not None
+        return self.faces[0].patches if has_table else (None, None, None)
+
+    @property
+    def patch(self):
+        """Patch of the table [contact] on its finest mesh; None without that table."""
+        return self.patches[0]
+
+    @property
+    def coarse(self) -> Sequence:
+        """Patch of the table [contact] on coarser meshes."""
+        return self.patches[1:]
+
+    @property
+    def has_error_meshes(self) -> bool:
+        """Whether each patch on whose mesh the motion depends is solved on a coarser mesh too."""
+        rig = self.plan.model.rig
+        moves = rig is not None and (rig.friction.load_varies or rig.friction.strips_slide_apart)
+        return all(face.patches[1] is not None for face in self.faces if face.partial_slip or moves)
+
+
+class Settings(NamedTuple):
+    """Numerical settings that a run used, each None if its engine does not have it.
+
+    - engine: name of the engine.
+    - map: "shooting" if the steady motion was found by Newton's method on the map of a period.
+    - steps_per_cycle, harmonics: resolution in time.
+    - shear_modes, elements: number of shear modes or of parallel elements of the pieces.
+    - quadrature: summation method for bonds.
+    - window_cycles: cycles of the window.
+    """
+
+    engine: str | None = None
+    map: str | None = None
+    steps_per_cycle: int | None = None
+    harmonics: int | None = None
+    shear_modes: int | None = None
+    elements: int | None = None
+    quadrature: str | None = None
+    window_cycles: int | None = None
+
+
+class SteadyData(NamedTuple):
+    """Regime and stability of a periodic motion, and the response curve of which it is the largest.
+
+    - regime: name of the motion, such as "stick-slip".
+    - multipliers (m,): Floquet multipliers.
+    - residual: change over a period relative to the motion; NaN if unknown.
+    - curve: columns of the response curve by name (`steady.curves.tabulate_curve`); None for a single frequency.
+    """
+
+    regime: str
+    multipliers: np.ndarray
+    residual: float = np.nan
+    curve: Arrays | None = None
+
+
+class MotionData(NamedTuple):
+    """What a run knows of its motion beside measures and histories, each empty or None if there is nothing.
+
+    - period: period of the drive [s].
+    - energies: energies [J] and counters by name.
+    - step_runs: `coarser.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
+    - levels: `levels.Level` of each drive level.
+    - events: stick-slip Events.
+    - decay: DecayCurve of a release.
+    - spectra: Spectra under a random drive.
+    - steady: SteadyData of a periodic motion.
+    """
+
+    period: float | None = None
+    energies: Values = MappingProxyType({})
+    step_runs: tuple = ()
+    levels: tuple = ()
+    events: object = None
+    decay: object = None
+    spectra: object = None
+    steady: SteadyData | None = None
+
+
+class WearHistory(NamedTuple):
+    """States of wear, of which some have frames before those of the last cycle.
+
+    - columns: measures over the cycles of wear (j,) by name.
+    - n_frames: number of states with a frame.
+    - period: time of a cycle [s].
+    """
+
+    columns: Arrays
+    n_frames: int
+    period: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,12 +199,13 @@ class Result:
     - plan: Plan that was run.
     - outcome: how the run ended.
     - measures: Measure by name.
-    - response, window: stored histories, and those of the last cycles; None without motion.
+    - seconds: CPU seconds by step of the run.
+    - warnings, notes: sentences.
     - patch: solved patch, or None.
     - fields: arrays (frame, x) by name, with `time`.
-    - seconds: CPU seconds by step of the run.
-    - warnings: sentences.
-    - extra: engine, steps, notes and other data for the report.
+    - response, window: stored histories, and those of the last cycles; None without motion.
+    - settings, motion: Settings and MotionData.
+    - wear: WearHistory of a patch, or None.
     - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
     - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
     - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
@@ -133,13 +214,16 @@ class Result:
     plan: object
     outcome: Outcome
     measures: Measures
-    response: object
-    window: object
-    patch: object
-    fields: Arrays
     seconds: Values
     warnings: list[str]
-    extra: dict
+    notes: list[str] = field(default_factory=list)
+    patch: object = None
+    fields: Arrays = field(default_factory=dict)
+    response: object = None
+    window: object = None
+    settings: Settings = field(default_factory=Settings)
+    motion: MotionData = field(default_factory=MotionData)
+    wear: WearHistory | None = None
     findings: tuple[Finding, ...] = ()
     faces: tuple = ()
     yielding_faces: dict = field(default_factory=dict)
@@ -273,52 +357,21 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
         moved[1] = 0.0
-    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else ROUND_OFF
+    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
     slips = moved > min_fraction * max(moved.max(), 1e-300)
     if rule.limit is not None and not rule.starts_at_rest:
-        slips[1] = np.abs(tau[1]) >= (1 - ROUND_OFF) * rule.limit
+        slips[1] = np.abs(tau[1]) >= (1 - TRACTION_ROUND_OFF) * rule.limit
     return np.where(active, np.where(slips, 2, 1), 0).astype(np.int8)
 
 
-def can_estimate_mesh_error(model, patch, coarse) -> bool:
-    """Return whether the mesh error of a motion can be estimated.
+def collect_used_settings(result) -> dict[str, str | float]:
+    """Return the `Settings` that a run used by name, and the resolution of its patches.
 
-    This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench or a rig.
-    patch : Patch or None
-        The patch on its finest mesh; None for a single point ([normal]).
-    coarse : sequence
-        Patches on coarser meshes; None for a missing one.
-    """
-    if patch is None or coarse[0] is not None:
-        return True
-    return not (
-        model.partial_slip
-        or model.load_varies
-        or (model.rig is not None and model.rig.friction.strips_slide_apart)
-    )
-
-
-def collect_used_settings(result) -> dict:
-    """Return a dict of the numerical settings that a run used.
-
-    These are the engine, the steps per cycle or the harmonics, the cycles of the window, shear modes
-    or elements of the pieces, the summation method for bonds, nodes and strips of the patch, and
-    the averaging length [m] of its profile. map: "shooting" if the steady motion was found by Newton's
-    method on the map of a period.
+    These are the nodes of each interface, the strips of the patch, and the averaging length [m] of its profile.
     """
     patch = result.patch
-
-    # Settings that the engine does not have are left out; the others are names or counts.
-    settings = {}
-    for key, name in SHOWN_SETTINGS.items():
-        value = result.extra.get(key)
-        if value is not None:
-            settings[name] = value if isinstance(value, str) else int(value)
+    used = result.settings._asdict()
+    settings = {name: value for name, value in used.items() if value is not None}
 
     # Resolution of the pressed interfaces.
     for face in result.faces:
@@ -341,34 +394,24 @@ def engine_by_measure(result) -> dict[str, str]:
     """
     engines = {}
     for name, measure in result.measures.items():
-        engine = measure.engine or result.extra.get("engine", "")
+        engine = measure.engine or result.settings.engine
         if engine and measure.value is not None:
             engines[name] = engine
     return engines
 
 
-def shorten_file_names(texts, path: Path) -> list[str]:
+def shorten_file_names(texts: Iterable[str], path: Path) -> list[str]:
     """Shorten absolute file names and rewrite powers of ten in remarks.
 
     path: path of the scene; file names become relative to its folder.
     """
-    return make_file_name_shortener(path)(texts)
-
-
-def make_file_name_shortener(path: Path) -> Callable[[Iterable[str]], list[str]]:
-    """Return a function that shortens file names in remarks on the scenes of one folder."""
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
-
-    def shorten(texts) -> list[str]:
-        """Shorten absolute file names and rewrite powers of ten in remarks."""
-        short_texts = []
-        for text in texts:
-            for prefix in prefixes:
-                text = text.replace(prefix, "")
-            if text.startswith("/"):
-                text = _FOLDER_OF_PATH.sub("", text, count=1)
-            short_texts.append(rewrite_powers_of_ten(text))
-        return short_texts
-
-    return shorten
+    short_texts = []
+    for text in texts:
+        for prefix in prefixes:
+            text = text.replace(prefix, "")
+        if text.startswith("/"):
+            text = _FOLDER_OF_PATH.sub("", text, count=1)
+        short_texts.append(rewrite_powers_of_ten(text))
+    return short_texts

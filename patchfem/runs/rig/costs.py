@@ -9,6 +9,7 @@ over which a law forgets, and from the events of friction elements.
 
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,6 @@ MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps wer
 # an error of 2e-4 of the motion of a slipping joint.
 MAX_MERGES = 4
 MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
-# Largest phase [rad] of the fastest vibration in a time interval
-MAX_INTERVAL_PHASE = 2.0
 # Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
     "steps_per_cycle",
@@ -101,12 +100,16 @@ def find_interface_load(model: Model, interface) -> float:
     return model.nominal_load if interface.load is None else interface.load
 
 
-@lru_cache(8)
-def estimate_element_count_and_stiffness(model: Model) -> tuple:
-    """Estimate the number of friction elements and the largest stiffness in stick [N/m].
+class ElementSizes(NamedTuple):
+    """Number of friction elements of a rig, and the largest stiffness of one in stick [N/m]; 0 for rigid elements."""
 
-    A rigid element has no spring and counts with stiffness 0.
-    """
+    count: int
+    max_stiffness: float
+
+
+@lru_cache(8)
+def estimate_elements(model: Model) -> ElementSizes:
+    """Estimate the number of friction elements and the largest stiffness in stick."""
     count = 0
     max_stiffness = 0.0
     for interface in model.rig.friction.interfaces:
@@ -126,69 +129,60 @@ def estimate_element_count_and_stiffness(model: Model) -> tuple:
                 n_elements = round(patch.pieces.length / patch.uniform_element_size) + 1
         count += n_elements
         max_stiffness = max(max_stiffness, stiffness if stiffness < inf else 0.0)
-    return count, max_stiffness
-
-
-def count_intervals_by_cause(model: Model) -> tuple:
-    """Return the numbers of time intervals per cycle due to vibration and due to events.
-
-    The rows of a recorded drive count as events.
-    """
-    modes = model.rig.modes
-    drive = model.rig.drive.signal
-    count, stiff = estimate_element_count_and_stiffness(model)
-    n_interfaces = len(modes.interfaces)
-    damping = float(np.linalg.norm(modes.damping_matrix, 2))
-    inverse_mass = (
-        float((np.asarray(modes.interfaces) ** 2).sum(axis=1).max(initial=0.0)) / modes.mass
-    )
-    rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max()) ** 2 + stiff * inverse_mass)
-    n_rows = _count_rows_per_cycle(model)
-    quick = find_max_frequency_ratio(drive)
-    vibration = max(rate * drive.period, 2 * pi * quick) / MAX_INTERVAL_PHASE
-    events = 2 * max(count, n_interfaces) * quick + 2 + n_rows
-    return vibration, events
-
-
-def _count_rows_per_cycle(model: Model) -> float:
-    """Return the number of rows of a recorded drive per cycle, 0 for other drives."""
-    drive = model.rig.drive.signal
-    return 0.0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
+    return ElementSizes(count, max_stiffness)
 
 
 def estimate_hybrid_steps(model: Model) -> float:
     """Estimate the number of steps per cycle of the engine `hybrid`."""
     rig = model.rig
     modes = rig.modes
-    period = rig.drive.signal.period
-    vibration, events = count_intervals_by_cause(model)
-    n_rows = _count_rows_per_cycle(model)
-    events = events - n_rows if rig.friction.interfaces else 0.0
-    damping = float(np.abs(modes.damping_matrix).sum(axis=1).max())
-    shortest = find_max_frequency_ratio(rig.drive.signal)
+    drive = rig.drive.signal
+    period = drive.period
+    mobility = float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
+
+    # The fastest vibration of the modes, also with stuck interfaces, and the tones of the drive.
+    count, stiffness = estimate_elements(model)
+    damping = float(np.linalg.norm(modes.damping_matrix, 2))
+    stuck_square = float(modes.omega.max()) ** 2 + stiffness * mobility
+    fastest = damping / 2 + sqrt(damping**2 / 4 + stuck_square)
+    max_tone = find_max_frequency_ratio(drive)
+    phase = max(fastest * period, 2 * pi * max_tone)
+
+    # Each element slips twice per oscillation; the rows of a record set the steps without tones.
+    events = 0.0
+    if rig.friction.interfaces:
+        events = 2 * max(count, len(modes.interfaces)) * max_tone + 2
+    n_rows = 0.0 if drive.segments else len(drive.breaks) / rig.drive.cycles
+    n_tones = max_tone
     if model.load_varies:
-        shortest = max(shortest, model.point.frequency * period)
+        n_tones = max(n_tones, model.point.frequency * period)
 
     # The explicit method follows the fastest decay of a law.
-    rate = 0.0
-    for interface in rig.friction.interfaces:
-        keys = interface.numbers
-        load = find_interface_load(model, interface)
-        limit = keys.static * load
-        inverse_mass = float((modes.interfaces**2).sum(axis=1).max()) / modes.mass
-        if keys.reference_speed:
-            slope = limit / keys.reference_speed * inverse_mass
-            rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
-        elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
-            length = keys.bond_length or limit / keys.stiffness
-            speed = 4 * rig.displacement_scale / period
-            rate = max(rate, speed / min(length, keys.slip_growth or inf))
-        rate = max(rate, ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * inverse_mass)
+    rate = max(
+        [_estimate_decay_rate(model, one, mobility) for one in rig.friction.interfaces] or [0.0]
+    )
+    rate += float(np.abs(modes.damping_matrix).sum(axis=1).max())
     return (
-        max(n_rows or MIN_STEPS * shortest, STEPS_PER_PHASE * (vibration * MAX_INTERVAL_PHASE))
-        + (rate + damping) * period / MAX_STEP_RELAXATION_TIMES
+        max(n_rows or MIN_STEPS * n_tones, STEPS_PER_PHASE * phase)
+        + rate * period / MAX_STEP_RELAXATION_TIMES
         + STEPS_PER_EVENT * events
     )
+
+
+def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
+    """Estimate the fastest rate [1/s] at which a law forgets, on a mass of the given inverse [1/kg]."""
+    rig = model.rig
+    keys = interface.numbers
+    limit = keys.static * find_interface_load(model, interface)
+    rate = ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * mobility
+    if keys.reference_speed:
+        slope = limit / keys.reference_speed * mobility
+        rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
+    elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
+        length = keys.bond_length or limit / keys.stiffness
+        speed = 4 * rig.displacement_scale / rig.drive.signal.period
+        rate = max(rate, speed / min(length, keys.slip_growth or inf))
+    return rate
 
 
 def _estimate_stiff_fraction(model: Model, limit: float) -> float:
@@ -224,7 +218,7 @@ def estimate_hybrid_seconds(model: Model) -> float:
 
 def estimate_march_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
-    count = estimate_element_count_and_stiffness(model)[0]
+    count = estimate_elements(model).count
     n_interfaces = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (

@@ -9,6 +9,7 @@ same amplitudes (`slip.mesh_correction`).
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,7 +39,9 @@ NO_LOOP_REASON = (
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
 MAX_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
-AMPLITUDES_PER_DECADE = 16  # Number of amplitudes per decade at which the mesh error is computed.
+MESH_AMPLITUDES_PER_DECADE = (
+    16  # Number of amplitudes per decade at which the mesh error is computed.
+)
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
@@ -221,8 +224,21 @@ def _spread_elements(stiffness, slide) -> tuple:
     return spread_elements(stiffness[order], slide[order])
 
 
-def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stiffer=None) -> tuple:
-    """Estimate the mesh errors of frequency and damping ratio of a mode.
+class DecayMeshErrors(NamedTuple):
+    """Mesh errors of a decay curve.
+
+    - errors (2, k): of frequency [Hz] and damping ratio [1]; 0 where they are unknown.
+    - reason: why they are unknown; "" if they are known.
+    """
+
+    errors: np.ndarray
+    reason: str = ""
+
+
+def estimate_decay_mesh_errors(
+    model, patch, coarse, amplitudes, find_mode, stiffer=None
+) -> DecayMeshErrors:
+    """Estimate the mesh errors of frequency and damping ratio of a mode; they are 0 for patches without partial slip.
 
     Parameters
     ----------
@@ -237,21 +253,15 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
         Function of a LawGroup that returns the index of the mode.
     stiffer : joint.FreeRig, optional
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
-
-    Returns
-    -------
-    tuple
-        Errors (2, k) [Hz, 1], and the reason why they are unknown, or "". Unknown errors are 0, as
-        are those of patches without partial slip.
     """
     rig = model.rig
-    zero_errors = np.zeros((2, len(amplitudes)))
+    unknown = DecayMeshErrors(np.zeros((2, len(amplitudes))))
     if not (model.partial_slip or rig.friction.has_partial_slip):
-        return zero_errors, ""
+        return unknown
 
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
-        return zero_errors, UNSUPPORTED_CONTACTS[moves.index(True)]
+        return unknown._replace(reason=UNSUPPORTED_CONTACTS[moves.index(True)])
 
     # Static loops on both meshes differ by what the mesh resolves, unlike decays (module docstring).
     try:
@@ -265,14 +275,16 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
             )[1:3],
         )
     except NotConverged as reason:
-        return zero_errors, str(reason)
+        return unknown._replace(reason=str(reason))
     except PatchfemError:
-        return zero_errors, NO_LOOP_REASON
+        return unknown._replace(reason=NO_LOOP_REASON)
 
     known = np.isfinite(error).all(axis=0)
     if not known.any():
-        return zero_errors, NO_STATIC_CURVE_REASON
-    return _interpolate_over_amplitude(amplitudes, amplitudes[known], error[:, known]), ""
+        return unknown._replace(reason=NO_STATIC_CURVE_REASON)
+    return DecayMeshErrors(
+        _interpolate_over_amplitude(amplitudes, amplitudes[known], error[:, known])
+    )
 
 
 def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarray:
@@ -284,7 +296,7 @@ def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarra
 
 def estimate_stuck_mode_mesh_errors(
     amplitude, frequency: float, model, patch, coarse, stiffer=None
-) -> tuple:
+) -> DecayMeshErrors:
     """Estimate the mesh errors of frequency and damping ratio of a mode with stuck interfaces.
 
     Parameters
@@ -301,7 +313,7 @@ def estimate_stuck_mode_mesh_errors(
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
-    at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
+    at = np.logspace(low, high, 2 + int(MESH_AMPLITUDES_PER_DECADE * (high - low)))
     errors, reason = estimate_decay_mesh_errors(
         model,
         patch,
@@ -310,7 +322,7 @@ def estimate_stuck_mode_mesh_errors(
         lambda laws: _find_nearest_mode(model.rig.modes, laws, frequency),
         stiffer,
     )
-    return _interpolate_over_amplitude(amplitude, at, errors), reason
+    return DecayMeshErrors(_interpolate_over_amplitude(amplitude, at, errors), reason)
 
 
 def describe_unknown_mesh_error(reason: str, coarser_runs: list) -> str:

@@ -59,7 +59,7 @@ from .solution import (
 
 LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
-MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
+N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
@@ -255,7 +255,7 @@ class LumpedEvaluator(RunEvaluator):
 
         # Before the last cycles the distances are equal, unless the run omits this part.
         even = choose_samples_per_cycle(drive, cycles)
-        count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, MAX_EARLY_SAMPLES // max(cycles, 1)))
+        count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, N_EARLY_SAMPLES // max(cycles, 1)))
         if not self.numerics.whole:
             first = window_start
             count = 0

@@ -12,6 +12,7 @@ from ...points import time_march
 from ...slip import fields
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
+from ..results.patch_rows import Arrays
 from ..results.result import (
     N_FRAMES,
     SlipRule,
@@ -21,7 +22,7 @@ from ..results.result import (
 )
 
 
-def collect_interface_fields(model, numerics, patch, solution) -> dict:
+def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     """Collect the fields of the interface at the output frames of the last cycle.
 
     Parameters
@@ -57,7 +58,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     reduction = getattr(solution.contact, "reduction", None)
     is_march = isinstance(snapshots[0], time_march.Snapshot)
     rule = SlipRule()
-    has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
+    has_node_bonds = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
     has_points = is_march and snapshots[0].forces.size > 1
 
     if model.partial_slip and model.grooves is not None:
@@ -78,7 +79,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
-def _collect_varying_load_fields(patch, solution) -> dict:
+def _collect_varying_load_fields(patch, solution) -> Arrays:
     """Collect the fields of an interface under varying normal load at the output frames.
 
     The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.

@@ -1,6 +1,6 @@
 """Amplitude above which friction does not limit a mode with negative damping.
 
-In: a `postprocessing.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
+In: a `rig.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
 largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
@@ -23,13 +23,13 @@ NO_INTERFACE_NOTE = (
     "of such a mode"
 )
 NO_CYCLE_NOTE = (
-    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_AMPLITUDE_RATIO:g} and "
-    f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
+    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_CYCLE_RATIO:g} and "
+    f"{limit_cycles.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
     "damping coefficient"
 )
 NO_SMALLER_CYCLE_NOTE = (
     f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_SLIDING_RATIO:g} and "
-    f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
+    f"{limit_cycles.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
 )
 UNSUPPORTED_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '

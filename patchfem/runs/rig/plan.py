@@ -19,7 +19,7 @@ from .numerics import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
-RESONANCE_TOL = 0.02
+RESONANT_DRIVE_TOL = 0.02
 # Smallest ratio of link stiffness to modal stiffness at which the link holds the block nearly at
 # rest.
 MIN_STIFF_LINK_RATIO = 10.0
@@ -168,7 +168,7 @@ def find_drive_and_knee(model: Model) -> dict:
         or rig.drive.force
         or rig.modes.omega.size != 1
         or not rig.structure.lists_modes
-        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANCE_TOL
+        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANT_DRIVE_TOL
     ):
         return {}
     knee = compute_dimensionless_groups(model).get("knee")

@@ -1,43 +1,98 @@
 """Run of a rig: solution with refined numerical settings, and completion of its result.
 
-In: the inputs of a run, i.e. its plan and its Patch. Out: a Result. `run_refined` solves the run
-with finer and finer settings until its measures meet the tolerance; `run_rig` completes it by the
-functions of `postprocessing`.
+In: the inputs of a run, i.e. its plan and its pressed interfaces. Out: a Result. `run_refined` solves the run with finer and
+finer settings until its measures meet the tolerance; `run_rig` completes it.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...response.coarser import CoarserRuns, ComparisonRuns
-from ...response.errors import absolute_change, add_errors
-from ...response.reasons import find_missing_unbounded
+from ...model.rig import MAX_TRAVEL
+from ...response import reasons, stationary
+from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun
+from ...response.decay_curve import DecayCurve
+from ...response.errors import absolute_change, add_errors, add_run_error_estimates
+from ...response.measures import Measures
+from ...response.outcome import judge_outcome, remove_errors
 from ...response.rows import AMPLITUDE, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
-from ..results.result import Result, RunInputs
-from . import bond_lists, levels, postprocessing
+from .. import refine
+from ..patch import faces
+from ..results.result import MotionData, Result, RunInputs, Settings
+from ..results.travel import check_pieces_overlap
+from . import bond_lists, decays, flutter, levels
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
-from .engines import ENGINES
+from .engines import ENGINES, describe_balance_error, list_runs_with_other_modes
+from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
-from .motion_warnings import collect_notes, collect_warnings
+from .motion_warnings import collect_remarks
 from .numerics import Numerics, choose_numerics
-from .postprocessing import CoupledRun
-from .runner import Runner
 from .solution import Solution, compute_peak_frequency
-from .solve import refuse_long_run
+from .solve import Runner, refuse_long_run
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
-MIN_STEP_SHARE = 0.5  # Smallest share of the steps in an error that smaller steps reduce.
+# Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
+MIN_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
 # tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
 MAX_REFINED_WORK = 1e8
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CoupledRun:
+    """Run of a rig whose Result is completed step by step.
+
+    - inputs: plan and pressed interfaces of the run.
+    - numerics, solution: settings and Solution of the engine.
+    - measures: measures by name.
+    - step_runs: `StepRun` of the run and of its runs with fewer steps, from fine to coarse.
+    - outcome: Outcome, or None before `complete_measures`.
+    - decay: decay curve of a release, or None.
+    - notes: sentences on the decay and on limit cycles.
+    """
+
+    inputs: RunInputs
+    numerics: Numerics
+    solution: Solution
+    measures: Measures
+    step_runs: tuple[StepRun, ...] = ()
+    outcome: Outcome | None = None
+    decay: DecayCurve | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def model(self):
+        """Model of the run."""
+        return self.inputs.plan.model
+
+    @property
+    def patch(self):
+        """Patch of the table [contact] with its static solution; None without that table."""
+        return self.inputs.patch
+
+    @property
+    def drive(self):
+        """Drive at which the measures are evaluated."""
+        return self.solution.drive or self.model.rig.drive.signal
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the rig has friction."""
+        return self.model.friction is not None
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether the errors of the measures are known."""
+        is_solved = self.solution.outcome is not Outcome.NOT_CONVERGED
+        return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
 
 
 def run_rig(inputs: RunInputs) -> Result:
@@ -46,7 +101,7 @@ def run_rig(inputs: RunInputs) -> Result:
     Parameters
     ----------
     inputs : RunInputs
-        Plan, Patch with its coarser mesh, and callbacks of the run.
+        Plan, pressed interfaces and callbacks of the run.
 
     Raises
     ------
@@ -68,37 +123,49 @@ def run_rig(inputs: RunInputs) -> Result:
     run = run_refined(inputs, numerics)
 
     # The reasons of missing values depend on the outcome, so that they come after it.
+    tolerance = model.accuracy.tolerance
     if run.solution.levels and run.has_friction:
-        run = postprocessing.add_onset_level(run)
-    run = postprocessing.add_outcome_and_errors(run)
-    run = postprocessing.add_missing_value_reasons(run)
+        onset = levels.measure_onset_level(rig, run.solution, tolerance)
+        run = replace(run, measures=run.measures | {"onset_level": onset})
+    run = complete_measures(run)
     if rig.drive.kind == "free" and run.has_errors:
-        run = postprocessing.add_decay_curve(run)
+        run = _add_decay_curve(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
-        run = postprocessing.add_flutter_amplitude(run)
+        measures, notes = flutter.compute_flutter_amplitude(run)
+        run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
-    warnings = collect_warnings(run)
-    notes = [*collect_notes(run), *run.notes]
-    measures = set_final_floors(run.measures, model.accuracy.tolerance)
+    settings = _collect_settings(run)
+    warnings, notes = collect_remarks(run, settings)
+    notes = [*inputs.notes, *notes, *run.notes]
+    measures = set_final_floors(run.measures, tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
-        measures = find_missing_unbounded(measures)
+        measures = reasons.find_missing_unbounded(measures)
+    if rig.drive.waveform.is_random:
+        notes += stationary.warn_if_short(measures, run.solution.window)
 
     solution = run.solution
     fields = {}
     if inputs.patch is not None:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
+    moved = ()
+    if model.has_interface_patches:
+        snapshots = [one for one in solution.snapshots if isinstance(one, ElementSnapshot)]
+        moved = faces.add_slip_fields(model, inputs.faces, snapshots)
     return Result(
-        plan=inputs.plan,
-        outcome=postprocessing.find_final_outcome(run),
-        measures=measures,
-        response=solution.response,
-        window=solution.window,
-        patch=inputs.patch,
-        fields=fields,
-        seconds=inputs.seconds,
-        warnings=[*inputs.warnings, *warnings],
-        extra=postprocessing.collect_summary_data(run, measures, notes),
+        inputs.plan,
+        _find_final_outcome(run),
+        measures,
+        inputs.seconds,
+        [*inputs.warnings, *warnings],
+        notes,
+        inputs.patch,
+        fields,
+        solution.response,
+        solution.window,
+        settings,
+        _collect_motion(run),
+        faces=moved,
     )
 
 
@@ -110,13 +177,13 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     that is coarse in time, so that they need not be repeated: their errors are estimated once.
 
     The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
-    `response.errors.convergence_error`, plus `Engine.min_relative_error` of the value (`add_errors`).
-    Afterwards `postprocessing.add_outcome_and_errors` adds the errors that the run itself shows.
+    `response.errors.convergence_error`, plus MIN_RELATIVE_ERROR of the value (`add_errors`).
+    Afterwards `complete_measures` adds the errors that the run itself shows.
 
     Parameters
     ----------
     inputs : RunInputs
-        Plan, Patch with its coarser mesh, and callbacks of the run.
+        Plan, pressed interfaces and callbacks of the run.
     numerics : Numerics
         Numerical settings of the first run.
     """
@@ -124,64 +191,49 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     engine = ENGINES[numerics.engine]
     size = model.rig.displacement_scale
     runner = Runner(inputs, numerics)
-    solution = runner.solve(numerics)
-    inputs.seconds.update({"march": solution.seconds} | (solution.prepare or {}))
+    first = runner.solve(numerics)
+    inputs.seconds.update({"march": first.seconds} | (first.prepare or {}))
 
     # On a belt, the window must contain a complete stick-slip period, which the first run shows.
-    n_cycles = _count_slip_period_cycles(model, numerics, solution)
+    n_cycles = _count_slip_period_cycles(model, numerics, first)
     if n_cycles > numerics.window:
         numerics = replace(numerics, window=n_cycles)
-        solution = runner.solve(numerics)
-
-    if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution)
-        return CoupledRun(inputs, numerics, solution, measures)
+        first = runner.solve(numerics)
+    if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
+        measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
+        return CoupledRun(inputs, numerics, first, measures)
 
     space_runs = [
-        *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
-        *engine.list_runs_with_other_modes(model, numerics),
+        *engine.list_space_runs(model, numerics, inputs.patch, inputs.coarse[0], first),
+        *list_runs_with_other_modes(model, numerics),
     ]
     space_runs += _list_joint_runs(inputs, space_runs)
-    space_errors = runner.estimate_errors(space_runs, solution)
+    space_errors = runner.estimate_errors(space_runs, first)
 
-    excesses = []  # Largest ratio of an error due to the steps to the allowed error, of each run.
-    while True:
-        time_runs = engine.coarser_in_time(model, numerics)
+    def solve(numerics: Numerics, coarser: CoupledRun | None) -> CoupledRun:
+        """Solve the rig with finer settings than before, and estimate the errors."""
+        solution = first
+        if coarser is not None:
+            # This run has twice the steps of the one before, with which it is compared.
+            runner.solutions[coarser.numerics] = coarser.solution
+            runner.add_error_seconds(coarser.solution.seconds)
+            solution = runner.solve(numerics)
+            inputs.seconds["march"] = solution.seconds
+        time_runs = engine.list_time_runs(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
-        coarser_runs = [*time_runs, *space_runs]
-        step_runs = runner.list_step_runs(numerics, solution, coarser_runs)
+        step_runs = runner.list_step_runs(numerics, solution, time_runs)
+        step_values = [run.values for run in step_runs]
         measures = add_errors(
-            solution.values,
-            errors,
-            [run.values for run in step_runs],
-            min_relative_error=engine.min_relative_error,
-            size=size,
+            solution.values, errors, step_values, min_relative_error=MIN_RELATIVE_ERROR, size=size
         )
-
         if solution.levels or model.rig.drive.kind == "free":
+            coarser_runs = [*time_runs, *space_runs]
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
+        return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
-        run = CoupledRun(inputs, numerics, solution, measures)
-        if not time_runs or _is_finest(run):
-            break
-        # The run ends where two runs with smaller steps have not reduced the largest error, as those of some lists of
-        # bonds, which depend on the steps.
-        excesses.append(_find_step_excess(run))
-        if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
-            break
-
-        # A run with twice the steps is compared with this one.
-        runner.solutions[numerics] = solution
-        runner.error_seconds += solution.seconds
-        numerics = numerics.finer()
-        solution = runner.solve(numerics)
-        inputs.seconds["march"] = solution.seconds
-
-    if runner.error_seconds:
-        inputs.seconds["error"] = runner.error_seconds
-    measures |= compute_peak_frequency(solution, runner.solutions.values())
-    solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
-    return replace(run, solution=solution, measures=measures)
+    run = refine.refine(solve, numerics, _judge)
+    peak = compute_peak_frequency(run.solution, runner.solutions.values())
+    return replace(run, measures=run.measures | peak)
 
 
 def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> ComparisonRuns:
@@ -214,29 +266,28 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
-def _find_step_excess(run: CoupledRun) -> float:
-    """Return the largest ratio of error to allowed error of the measures whose error is mainly that of the steps.
+def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
+    """Decide whether a run is repeated with smaller steps, after runs with given excesses.
 
-    The errors are those of the completed run. If the run takes too much time (MAX_REFINED_WORK), the displacement alone
-    counts. The result is 0 if no measure needs smaller steps.
+    It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
+    depend on the steps. In a run that takes too much time (MAX_REFINED_WORK), the displacement alone counts.
     """
+    if _is_finest(run):
+        return refine.Verdict(0.0)
     nodes = max(1 if run.patch is None else run.patch.x.size, run.solution.book.get("strips", 0.0))
     work = run.numerics.steps * run.numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_WORK
 
+    tolerance = run.model.accuracy.tolerance
+    measures = set_final_floors(complete_measures(run).measures, tolerance)
+    if work > MAX_REFINED_WORK:
+        measures = {AMPLITUDE: measures[AMPLITUDE]}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if run.numerics.local else "steps"
-    run = postprocessing.add_missing_value_reasons(postprocessing.add_outcome_and_errors(run))
-    tolerance = run.model.accuracy.tolerance
-    ratios = [0.0]
-    for name, measure in set_final_floors(run.measures, tolerance).items():
-        counts = name == AMPLITUDE or work <= MAX_REFINED_WORK
-        if counts and measure.causes is not None and measure.error:
-            share = measure.causes.parts.get(axis, 0.0) / measure.error
-            if share > MIN_STEP_SHARE:
-                ratios.append(measure.error_ratio(tolerance))
-    return max(ratios)
+    excess = refine.find_worst_measure(measures, tolerance, [axis]).excess
+    has_stalled = len(excesses) > 1 and excess >= excesses[-2]
+    return refine.Verdict(excess, None if not excess or has_stalled else run.numerics.finer())
 
 
 def _is_finest(run: CoupledRun) -> bool:
@@ -246,7 +297,8 @@ def _is_finest(run: CoupledRun) -> bool:
         return 0.01 * numerics.local < MIN_STEP_ERROR
     steps = numerics.steps * 2
     return (
-        "steps_per_cycle" in numerics.pinned
+        not ENGINES[numerics.engine].has_steps
+        or "steps_per_cycle" in numerics.pinned
         or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
         or bond_lists.is_bond_list_too_long(run.model, numerics, run.solution.book)
@@ -279,3 +331,130 @@ def _add_level_errors(
     if solution.levels:
         level_results = levels.add_level_errors(solution.levels, used_runs, solutions)
     return replace(solution, levels=level_results, coarser=tuple(pairs))
+
+
+# ---- completion
+
+
+def complete_measures(run: CoupledRun) -> CoupledRun:
+    """Return the run with its outcome, all error estimates of its measures, and the reasons of missing values.
+
+    The errors that the run itself shows (`Solution.run_errors`) are added to the errors from coarse
+    runs. A motion that grows has no errors. The outcome is NOT_CONVERGED if the error of the energy
+    balance is too large.
+    """
+    solution = run.solution
+    model = run.model
+    rig = model.rig
+    if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
+        message = solution.message or text
+        solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
+        run = replace(run, solution=solution)
+
+    measures = add_run_error_estimates(run.measures, solution.run_errors)
+    if not run.has_errors:
+        measures = remove_errors(measures)
+    outcome, steady = judge_outcome(
+        solution,
+        measures,
+        model.accuracy.tolerance,
+        run.drive,
+        rig.drive.levels.cycles,
+        find_decay_rate(rig.modes),
+    )
+
+    # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
+    # program.
+    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
+        outcome = Outcome.GROWS
+    # A growing motion has no final values, so the errors of its measures are unknown.
+    if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
+        measures = remove_errors(measures)
+    measures |= steady
+
+    window = solution.window
+    is_rigid = run.has_friction and model.sticks_rigidly
+    measures |= reasons.find_invalid(measures, window, run.drive, outcome, is_rigid=is_rigid)
+    other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
+    measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
+    return replace(run, outcome=outcome, measures=measures)
+
+
+def _add_decay_curve(run: CoupledRun) -> CoupledRun:
+    """Return a released run with its decay curve, including mesh errors.
+
+    A note says where the mesh error is unknown.
+    """
+    model = run.model
+    solution = run.solution
+    run = replace(run, decay=decays.compute_decay_curve(solution))
+    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
+    if run.decay is None or not has_partial_slip:
+        return run
+
+    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
+    decay = run.decay
+    coarse = run.inputs.coarse[0]
+    found = decays.estimate_stuck_mode_mesh_errors(
+        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, run.inputs.stiffer
+    )
+    frequency_error, damping_error = found.errors
+    decay = decay._replace(
+        frequency_error=np.fmax(decay.frequency_error, frequency_error),
+        damping_error=np.fmax(decay.damping_error, damping_error),
+    )
+    if not found.reason:
+        return replace(run, decay=decay)
+    coarser = ENGINES[run.numerics.engine].list_space_runs(
+        model, run.numerics, run.patch, coarse, solution
+    )
+    note = decays.describe_unknown_mesh_error(found.reason, coarser)
+    return replace(run, decay=decay, notes=(note,))
+
+
+def _find_final_outcome(run: CoupledRun) -> Outcome:
+    """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
+    outcome = run.outcome
+    for face in run.inputs.faces:
+        slide = face.slide(run.solution.response)
+        outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
+    return outcome
+
+
+def _collect_settings(run: CoupledRun) -> Settings:
+    """Return the numerical settings of a run."""
+    solution = run.solution
+    numerics = run.numerics
+    settings = solution.settings._replace(engine=numerics.engine, window_cycles=numerics.window)
+    if ENGINES[numerics.engine].has_steps:
+        settings = settings._replace(steps_per_cycle=numerics.steps)
+    if solution.bond_summation is not None:
+        settings = settings._replace(quadrature=solution.bond_summation.engine)
+
+    # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
+    reduced = getattr(solution.contact, "reduction", None)
+    if reduced is None:
+        return settings
+    size = int(np.size(reduced.stiffness))
+    if hasattr(reduced, "yield_displacement"):
+        return settings._replace(elements=size)
+    return settings._replace(shear_modes=size)
+
+
+def _collect_motion(run: CoupledRun) -> MotionData:
+    """Return period, energies, levels, events, spectra and steady motion of a run."""
+    solution = run.solution
+    drive = run.model.rig.drive
+    spectra = None
+    if drive.waveform.is_random:
+        spectra = stationary.compute_spectra(solution.window, drive.signal)
+    return MotionData(
+        run.drive.period,
+        solution.book,
+        run.step_runs,
+        levels.convert_to_scene_units(run.model.rig, solution.levels),
+        solution.log,
+        run.decay,
+        spectra,
+        solution.periodic,
+    )

@@ -15,6 +15,7 @@ from ...response.measures import Measures, Values, compute_harmonic, measure_hal
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.rows import AMPLITUDE, STEADY_AMPLITUDE
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
+from ..results.result import Settings, SteadyData
 
 Fields = dict[str, Any]  # fields of a record by name
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
@@ -53,7 +54,8 @@ class Solution:
     - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
     - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
     - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
-    - extra: further data of the result.
+    - settings: Settings of an engine that only it knows.
+    - periodic: SteadyData of a periodic motion, or None.
     """
 
     values: Values
@@ -81,7 +83,8 @@ class Solution:
     drive: SineDrive | None = None
     peak_error: float = np.nan
     tail: object = None
-    extra: Fields = field(default_factory=dict)
+    settings: Settings = field(default_factory=Settings)
+    periodic: SteadyData | None = None
 
 
 def find_travel(rig) -> float:

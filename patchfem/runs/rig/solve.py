@@ -1,12 +1,26 @@
-"""Solution of a rig by the engine of its numerical settings.
+"""Runs of a rig with several numerical settings, and their progress.
 
-In: a Model, its Numerics and its Patch. Out: a Solution. `engines` lists what each engine can
-compute.
+In: the inputs of a run. Out: the Solution for given settings, and error estimates from coarse runs.
+Each coarse run is solved only once.
 """
 
+from dataclasses import replace
+from time import process_time
+
+from ...response.coarser import ComparisonRuns, SourceErrors, StepRun, estimate_errors
+from ..results.result import N_FRAMES, RunInputs
 from . import bond_lists, costs, event_to_event, march
+from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
+
+# Expected ratio of the steps of a run and its coarse runs to those of the run.
+COARSE_RUNS_RATIO = 2.0
+SOLVERS = {
+    "hybrid": event_to_event.run_from_event_to_event,
+    "march": march.march_in_time,
+    "harmonic": steady.solve_steady_motion,
+}
 
 
 def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -24,18 +38,9 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
-
-    Returns
-    -------
-    Solution
     """
-    if numerics.engine == "hybrid":
-        run = event_to_event.run_from_event_to_event
-    elif numerics.engine == "march":
-        run = march.march_in_time
-    else:
-        run = steady.solve_steady_motion
-    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
+    solution = SOLVERS[numerics.engine](model, numerics, patch, frames, say, progress)
+    return replace_output_by_gauge(model, solution)
 
 
 def refuse_long_run(model, numerics) -> None:
@@ -44,3 +49,114 @@ def refuse_long_run(model, numerics) -> None:
         costs.refuse_long_hybrid_run(model)
     elif numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
+
+
+class Runner:
+    """Solver of a rig with several numerical settings, which stores the solutions of coarse runs.
+
+    Parameters
+    ----------
+    inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
+    numerics : Numerics
+        Settings of the first run.
+
+    Attributes
+    ----------
+    solutions : dict
+        Solution of each coarse run by its Numerics.
+    cpu_seconds : dict
+        CPU time of each run [s] by its Numerics.
+    """
+
+    def __init__(self, inputs: RunInputs, numerics: Numerics):
+        self.inputs = inputs
+        self.model = inputs.plan.model
+        self.solutions: dict[Numerics, Solution] = {}
+        self.cpu_seconds: dict[Numerics, float] = {}
+        # Steps per cycle of all runs: expected and completed ones; and the largest reported fraction.
+        self._expected_steps = numerics.steps * (COARSE_RUNS_RATIO if inputs.estimate else 1.0)
+        self._steps_done = 0.0
+        self._shown = 0.0
+
+    def solve(self, numerics: Numerics) -> Solution:
+        """Solve the rig with the given settings, and with all fields."""
+        has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
+        return self._solve(
+            self.model, numerics, self.inputs.patch, N_FRAMES * has_fields, self.inputs.say
+        )
+
+    def _solve_coarse_run(self, numerics: Numerics) -> Solution:
+        """Solve the rig with coarser settings, and without fields."""
+        model = self.model
+        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
+        if numerics.other_rig is not None:
+            model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
+        if numerics.stiffer_joint:
+            stiffer, (patch, *_) = self.inputs.stiffer[:2]
+            model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
+        # The decay curve needs histories from the start of the run.
+        needs_whole = model.rig.drive.kind == "free"
+        return self._solve(model, replace(numerics, whole=needs_whole), patch)
+
+    def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
+        """Solve a rig, and count its CPU time and steps."""
+        begin = process_time()
+        report = self._make_callback(numerics.steps)
+        solution = solve_rig(model, numerics, patch, frames, say, report)
+        self.cpu_seconds[replace(numerics, whole=False)] = process_time() - begin
+        self._steps_done += numerics.steps
+        return solution
+
+    def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
+        """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
+        errors, seconds = estimate_errors(
+            self._solve_coarse_run, solution.values, runs, self.solutions
+        )
+        self.add_error_seconds(seconds)
+        return errors
+
+    def add_error_seconds(self, seconds: float) -> None:
+        """Add the time of a comparison run [s] to that of the run."""
+        self.inputs.seconds["error"] = self.inputs.seconds.get("error", 0.0) + seconds
+
+    def list_step_runs(
+        self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns
+    ) -> list[StepRun]:
+        """Return a StepRun of the run and of each run with fewer steps, from fine to coarse.
+
+        If no coarse run has fewer steps, the list contains only the run itself.
+
+        Parameters
+        ----------
+        numerics : Numerics
+            Settings of the run.
+        solution : Solution
+            Solution of the run.
+        time_runs : list of CoarserRuns
+            Runs that are coarser in time, which are already solved.
+        """
+        pairs = [(numerics, solution)]
+        if time_runs and time_runs[0].source == "steps":
+            pairs += [(run, self.solutions[run]) for run in time_runs[0].runs]
+        step_runs = []
+        for settings, run in pairs:
+            seconds = self.cpu_seconds.get(replace(settings, whole=False), run.seconds)
+            step_runs.append(StepRun(settings.steps, seconds, run.values))
+        return step_runs
+
+    def _make_callback(self, steps: float):
+        """Return the progress callback of a run with given steps per cycle; None without one for all runs.
+
+        The completed fraction of all runs is weighted by their steps and never decreases.
+        """
+        if self.inputs.progress is None:
+            return None
+
+        def report(fraction: float) -> None:
+            """Convert the completed fraction of one run to that of all runs, and report it."""
+            expected = max(self._expected_steps, self._steps_done + steps)
+            self._shown = max(self._shown, (self._steps_done + fraction * steps) / expected)
+            self.inputs.progress(self._shown)
+
+        return report

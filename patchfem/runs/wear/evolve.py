@@ -22,7 +22,13 @@ from ...disk.atomic_write import write_atomically
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
 from ..patch.measures import with_other_strip_count, with_static_measures
-from ..patch.press import make_contact_force_function, nodal_areas, solve_patch_contact
+from ..patch.press import (
+    Patch,
+    Patches,
+    make_contact_force_function,
+    nodal_areas,
+    solve_patch_contact,
+)
 from ..patch.values import compute_static_values
 from ..rig import numerics
 from .slip import (
@@ -80,15 +86,19 @@ class WornPatch:
     - stopped: reason why the computation ended early; "" if it did not.
     """
 
-    patch: object
-    coarse: tuple
+    patch: Patch
+    coarse: Patches
     state: WearState
     moments: tuple[WearMoment, ...]
     depths: tuple[np.ndarray, ...]
-    stripped: tuple | None
+    stripped: tuple[Patch, np.ndarray] | None
     frame_error: float
     seconds: float
     stopped: str
+
+
+# State of the wear after the last jump, and the history of all jumps
+History = tuple[WearState, tuple[WearMoment, ...]]
 
 
 class _UnboundedMotion(Exception):
@@ -169,7 +179,7 @@ def make_worn_model(model, patch, depth):
 
 
 def compute_wear(
-    model, patch, coarse, progress=None, initial: tuple | None = None, store=None
+    model, patch, coarse, progress=None, initial: "History | None" = None, store=None
 ) -> WornPatch:
     """Compute the wear of a patch over all cycles of a model with [wear].
 
@@ -390,7 +400,7 @@ def _add_earlier_wear(model, patch):
     return solve_patch_contact(model.patch, patch.pair, depth)
 
 
-def _make_initial_state(model, patch, problem: WearProblem, motion: _SlipPathFunction) -> tuple:
+def _make_initial_state(model, patch, problem: WearProblem, motion: _SlipPathFunction) -> History:
     """Return the initial wear state and the initial history of a patch.
 
     They contain the wear of an earlier run only.
@@ -430,7 +440,7 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     )
 
 
-def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
+def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
     """Repeat the jumps of a run on another mesh or with another number of strips.
 
     The slip paths are interpolated. Returns the worn patch and its worn depth [m].
@@ -497,7 +507,9 @@ def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None
     )
 
 
-def save_wear_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
+def save_wear_state(
+    path: Path, key: str, state: WearState, moments: tuple[WearMoment, ...]
+) -> None:
     """Write a wear state and its history to a file, which is replaced atomically.
 
     Parameters
@@ -532,7 +544,7 @@ def make_missing_state_error(path: Path) -> PatchfemError:
     )
 
 
-def load_wear_state(path: Path, key: str) -> tuple:
+def load_wear_state(path: Path, key: str) -> History:
     """Read a wear state and its history from a file.
 
     Raises

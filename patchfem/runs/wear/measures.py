@@ -16,6 +16,7 @@ from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
 from ..results.patch_rows import TABLE, WORN_SOURCE, Arrays, Measures, Values
+from ..results.result import WearHistory
 from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
@@ -64,7 +65,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
 
-    notes = [*result.extra.get("notes", []), *_note_on_earlier_run(model)]
+    notes = [*result.notes, *_note_on_earlier_run(model)]
     if "worn_through_cycle" in worn:
         notes += _note_on_worn_through_coating(model, evolved)
         if result.outcome not in UNBOUNDED_OUTCOMES:
@@ -76,7 +77,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
             *_warn_of_worn_depth(model, evolved),
             *_warn_of_friction_table(model, evolved),
         ],
-        extra=result.extra | {"wear": _collect_wear_history(evolved), "notes": notes},
+        notes=notes,
     )
 
 
@@ -439,8 +440,8 @@ def _add_wear_frames(result, evolved):
     for name, field in motion.items():
         zeros = np.zeros((n_states, *np.shape(field)[1:]))
         fields[name] = np.concatenate([wear.get(name, zeros), field])
-    shown = {"period": period, "states": n_states}
-    return replace(result, fields=fields, extra=result.extra | {"wear_shown": shown})
+    history = WearHistory(_collect_wear_history(evolved), n_states, period)
+    return replace(result, fields=fields, wear=history)
 
 
 def _select_stored_moments(moments) -> np.ndarray:

@@ -16,6 +16,7 @@ from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
 from ..patch.press import nodal_areas
+from ..results.patch_rows import Values
 from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve
 
@@ -26,7 +27,7 @@ UNBOUNDED_OUTCOMES = (
     Outcome.NOT_CONVERGED,
 )
 MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
-MAX_FRAMES = 800  # Largest number of interface frames per cycle.
+MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
 # Ratio of the error due to reversals between samples to the mean change of the path if only every
 # third sample is used.
 REVERSAL_ERROR_FACTOR = 1.5
@@ -45,7 +46,7 @@ class CycleSlip(NamedTuple):
 
     path: np.ndarray
     error: float
-    values: dict | None = None
+    values: Values | None = None
     outcome: Outcome | None = None
 
 
@@ -133,7 +134,7 @@ def choose_frame_count(tolerance: float) -> int:
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_CYCLE_FRAMES))
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
@@ -169,7 +170,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     return follow(model, patch, frames)
 
 
-def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
+def compute_point_slip_path(model, window, values: Values) -> tuple[float, float]:
     """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
 
     The path is weighted with the load. The error comes from differences between cycles.
@@ -271,7 +272,7 @@ def _collect_rig_frames(model, settings, patch, solution) -> _NodeFrames:
     return _NodeFrames(frames["holder_slide"], load, frames["slip"], frames["shear_stress"], True)
 
 
-def _slip_amplitude_change(values: dict, cycle: _Cycle) -> float:
+def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
     """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
     A mode that still beats causes this difference.

@@ -37,5 +37,5 @@ How to add a key
    key that changes no result and causes no sentence; such a key needs a remark (`add_remark`) in its rules. `patchfem
    run` prints remarks, `patchfem plan` does not.
 
-A key that is removed gets a row in `removed.REMOVED_NAMES` with the version that removed it and what to use instead.
+A key that is removed gets a row in `removed.toml` with the version that removed it and what to use instead.
 """

@@ -4,13 +4,11 @@ In the texts of SELECTORS and NEEDS, blanks separate words. A word "a" is one ke
 of them or both, and "a+b|c" means that `a` and `b` describe together what `c` describes alone.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ... import effects
 from . import contact, tables
@@ -194,7 +192,7 @@ def find_choices(table: Table) -> TableChoices:
     return choices
 
 
-def iterate_tables(table: Table, table_key: str = "") -> Iterator[tuple[str, Any]]:
+def iterate_tables(table: Table, table_key: str = "") -> Iterator[tuple[str, Table]]:
     """Yield (dotted key, table) for a table and all tables inside it."""
     yield table_key, table
     for name, key in list_keys(type(table)).items():

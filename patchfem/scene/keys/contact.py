@@ -26,6 +26,7 @@ from .types import (
     quantity,
     whole_number,
 )
+from .values import TomlValue
 
 Piece = Literal["upper", "lower"]
 LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
@@ -56,7 +57,7 @@ class Material(Table):
     ) = Field(None, alias="yield")
 
 
-def find_material(value: object) -> object:
+def find_material(value: TomlValue | Material) -> Material:
     """Return the Material of a name; raise ValueError for an unknown name and for other values."""
     if isinstance(value, Material):
         return value
@@ -158,7 +159,7 @@ class Holder(Table):
     )
 
 
-def require_convex_radius(value: object) -> object:
+def require_convex_radius(value: TomlValue) -> TomlValue:
     """Return the radius of a crown; raise ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
@@ -357,7 +358,7 @@ class Contact(Table):
     grooves: Grooves | None = None
 
     @property
-    def shapes(self) -> dict:
+    def shapes(self) -> dict[str, Table]:
         """Tables of the gap shapes that the scene contains, by name; the key `on` of a table names the piece."""
         tables = {name: getattr(self, name) for name in _list_shape_names()}
         return {name: table for name, table in tables.items() if table is not None}

@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, get_args, get_origin
+from typing import NamedTuple, get_args, get_origin
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from ..lines import split_key
 from . import quantities
 from .contact import MATERIAL_REQUIREMENT, Material
 from .tables import Structure, Tables
-from .types import Key, Table, advise_on_name, list_keys
+from .types import Key, KeyType, KeyValue, Table, advise_on_name, list_keys
+from .values import TomlTable, TomlValue
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
 # Beginnings of requirements that do not tell what a key is.
@@ -53,7 +55,7 @@ def find_key(dotted_key: str) -> Key | None:
     return key
 
 
-def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[str, Any]:
+def validate_value(key: str, value: TomlValue, ignored: Iterable[str] = ()) -> dict[str, KeyValue]:
     """Validate a value of a key.
 
     Parameters
@@ -84,10 +86,10 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
 
 
 def validate_values(
-    model: type[Table], values: dict[str, Any]
-) -> tuple[dict[str, Any], Sequence[Any]]:
+    model: type[Table], values: TomlTable
+) -> tuple[dict[str, KeyValue], Sequence[ErrorDetails]]:
     """Return the valid ones of the plain values of a table by attribute, and the errors of pydantic on the others."""
-    valid: dict[str, Any] = {}
+    valid: dict[str, KeyValue] = {}
     try:
         model.model_validate(values, context=valid)
     except ValidationError as caught:
@@ -154,7 +156,7 @@ def describe_missing_key(key: Key | None, path: str) -> str:
     return f"{needed} ({re.split('[;:] ', key.record.meaning)[0]})"
 
 
-def _describe_array_requirement(types: tuple) -> str:
+def _describe_array_requirement(types: tuple[KeyType, ...]) -> str:
     """Return what an array of numbers without unit requires."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
@@ -163,12 +165,12 @@ def _describe_array_requirement(types: tuple) -> str:
     return f"{'' if _is_open_array(types) else 'two '}whole numbers are needed, such as [1, 2]"
 
 
-def _is_open_array(types: tuple) -> bool:
+def _is_open_array(types: tuple[KeyType, ...]) -> bool:
     """Return whether the types of a key describe an array of any length."""
     return any(... in get_args(part) for part in types)
 
 
-def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
+def describe_error(key: Key, error: ErrorDetails, value: TomlValue, path: str) -> str:
     """Return the message for a validation error of pydantic.
 
     Parameters
@@ -219,7 +221,7 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
     return f"{needed or 'another value is needed'}, not {format_for_message(value)}"
 
 
-def format_for_message(value: Any) -> str:
+def format_for_message(value: TomlValue) -> str:
     """Return a value as a message shows it, cut after MAX_SHOWN_CHARACTERS characters."""
     if isinstance(value, bool):
         return str(value).lower()

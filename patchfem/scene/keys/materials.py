@@ -6,8 +6,6 @@ A scene may write a name in any spelling: case, blanks, hyphens and underscores 
 ('Ti-6Al-4V', 'Inconel 718', '316L')
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Sequence

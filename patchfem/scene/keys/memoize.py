@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from functools import wraps
+from typing import Any
 
 # Number of results of one function at which its cache is emptied.
-MAX_CACHED_RESULTS = 1024
+MAX_CACHED_QUANTITIES = 1024
 
 
-def memoize(function: Callable) -> Callable:
+def memoize(function: Callable[..., Any]) -> Callable[..., Any]:
     """Cache the results of a function by the identity of its first argument.
 
     The first argument and the result must be frozen, and the other arguments hashable. Equal tables are not looked for,
@@ -19,7 +20,7 @@ def memoize(function: Callable) -> Callable:
     def call_cached(frozen, *others):
         entry = results.get((id(frozen), *others))
         if entry is None:
-            if len(results) >= MAX_CACHED_RESULTS:
+            if len(results) >= MAX_CACHED_QUANTITIES:
                 results.clear()
             # The entry keeps the object alive; otherwise another object could get the same id.
             entry = (frozen, function(frozen, *others))

@@ -12,6 +12,8 @@ from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
 from functools import cache, lru_cache
 from pathlib import Path
 
+from .values import TomlValue
+
 _KINDS = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # Factors to SI by unit for each kind of quantity; the first unit of each kind is its SI unit.
 UNIT_FACTORS: dict[str, dict[str, float]] = {kind: row["units"] for kind, row in _KINDS.items()}
@@ -31,7 +33,7 @@ _MAX_SHOWN_CHARACTERS = 60  # largest length of a wrong quantity in a message
 _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 
-def parse_quantity(text: object, kind: str) -> float:
+def parse_quantity(text: TomlValue, kind: str) -> float:
     """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
 
     Raises ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
@@ -53,7 +55,7 @@ def parse_quantity(text: object, kind: str) -> float:
         raise ValueError(f"'{words}' is {error}; {describe_requirement(kind)}") from None
 
 
-def read_percentage(value: object) -> object:
+def read_percentage(value: TomlValue) -> TomlValue:
     """Return a percentage such as "0.2 %" as a number, correctly rounded, and any other value unchanged."""
     is_short = isinstance(value, str) and len(value) <= _MAX_CHARACTERS
     match = re.fullmatch(PERCENTAGE_PATTERN, value) if is_short else None
@@ -112,7 +114,7 @@ def normalize_unit(unit: str) -> str:
     return " ".join(unit.split())
 
 
-def _describe_non_text(value: object, kind: str) -> str:
+def _describe_non_text(value: TomlValue, kind: str) -> str:
     """Return the message about a value that is not a string."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     reason = "a bare number without a unit" if is_number else "not a quantity"

@@ -6,9 +6,9 @@ and the reference of keys are made from it. `scene.rules` says which keys need o
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from ...effects import LAWS, MAX_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
@@ -41,6 +41,7 @@ from .types import (
     require_magnitude,
     whole_number,
 )
+from .values import TomlValue
 
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
@@ -523,7 +524,7 @@ class Drive(Table):
 
     @field_validator("levels", mode="before")
     @classmethod
-    def _read_forces(cls, value: Any, info: Any) -> Any:
+    def _read_forces(cls, value: TomlValue, info: ValidationInfo) -> TomlValue:
         """Read the levels of a force drive: write each force in SI as if it were an acceleration."""
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value

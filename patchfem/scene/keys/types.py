@@ -7,14 +7,31 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
-from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args, get_origin
 from unicodedata import category
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Strict,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+)
 from pydantic.types import AllowInfNan
-from pydantic_core import core_schema
+from pydantic_core import CoreSchema, core_schema
 
 from .quantities import EXAMPLE_QUANTITIES, find_si_unit, parse_quantity, read_percentage
+from .values import TomlValue
+
+# Type of a key: a class, a union or a Literal, with its marks as Annotated.
+KeyType: TypeAlias = type | UnionType
+# Value of a key that was read, in SI; None where the scene has none.
+KeyValue: TypeAlias = "str | int | float | bool | Table | tuple[KeyValue, ...] | None"
 
 # Largest magnitude of a value in SI; its fourth power, and products with
 # that, stay within double precision.
@@ -48,10 +65,12 @@ class Check:
     - function: function of the value that returns the checked value or raises ValueError.
     """
 
-    make_schema: Callable
-    function: Callable
+    make_schema: Callable[..., CoreSchema]
+    function: Callable[[Any], Any]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
+    def __get_pydantic_core_schema__(
+        self, source: KeyType, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         return self.make_schema(self.function, handler(source))
 
 
@@ -98,7 +117,7 @@ def require_magnitude(
     return value
 
 
-def quantity(kind: str, **limits: float) -> Any:
+def quantity(kind: str, **limits: float) -> KeyType:
     """Return the type of a key that holds a quantity.
 
     Parameters
@@ -126,7 +145,7 @@ def quantity(kind: str, **limits: float) -> Any:
     ]
 
 
-def number(**limits: float) -> Any:
+def number(**limits: float) -> KeyType:
     """Return the type of a key that holds a finite number, also in percent; limits as in `quantity`."""
     return Annotated[
         float,
@@ -138,12 +157,12 @@ def number(**limits: float) -> Any:
     ]
 
 
-def whole_number(low: int, high: int) -> Any:
+def whole_number(low: int, high: int) -> KeyType:
     """Return the type of a key that holds a whole number from `low` to `high`."""
     return Annotated[int, Strict(), Field(ge=low, le=high)]
 
 
-def array(kind: Any, least: int = 1, most: int | None = None) -> Any:
+def array(kind: KeyType, least: int = 1, most: int | None = None) -> KeyType:
     """Return the type of a key that holds an array.
 
     Parameters
@@ -180,7 +199,7 @@ class KeyRecord:
     required: str = ""
 
 
-def key(kind: Any, meaning: str, required: str = "") -> Any:
+def key(kind: KeyType, meaning: str, required: str = "") -> KeyType:
     """Return the type of a key with its documentation.
 
     Parameters
@@ -193,7 +212,7 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
     return Annotated[kind, KeyRecord(meaning, required)]
 
 
-def optional(kind: Any, meaning: str, required: str = "") -> Any:
+def optional(kind: KeyType, meaning: str, required: str = "") -> KeyType:
     """Return the type of a key that may be left out, with its documentation; its value is None then.
 
     Parameters
@@ -243,7 +262,9 @@ class Table(BaseModel):
     has_name: ClassVar[bool] = False
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
+    def __get_pydantic_core_schema__(
+        cls, source: KeyType, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         if _OUTER_TABLE.get() is not None:
             return core_schema.no_info_plain_validator_function(cls._validate_inner)
         token = _OUTER_TABLE.set(cls)
@@ -253,23 +274,25 @@ class Table(BaseModel):
             _OUTER_TABLE.reset(token)
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, schema: Any, handler: Callable) -> dict:
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         is_inner = schema["type"] == "function-plain"
         return {TABLE_WORD: cls.__name__} if is_inner else handler(schema)
 
     @classmethod
-    def _validate_inner(cls, value: Any) -> Any:
+    def _validate_inner(cls, value: TomlValue | Table) -> Table:
         return value if isinstance(value, cls) else cls.model_validate(value)
 
     @field_validator("*", mode="after")
     @classmethod
-    def _collect_value(cls, value: Any, info: Any) -> Any:
+    def _collect_value(cls, value: KeyValue, info: ValidationInfo) -> KeyValue:
         if info.context is not None:
             info.context[info.field_name] = value
         return value
 
 
-def build_table(model: type[Table], values: dict[str, Any]) -> Any:
+def build_table(model: type[Table], values: dict[str, KeyValue]) -> Table:
     """Build a table from values by attribute; the values are not validated.
 
     It does what `model_construct` does in a fraction of the time: the defaults are shared, since they are frozen.
@@ -286,7 +309,7 @@ def build_table(model: type[Table], values: dict[str, Any]) -> Any:
 
 
 @cache
-def _find_default_values(model: type[Table]) -> dict[str, Any]:
+def _find_default_values(model: type[Table]) -> dict[str, KeyValue]:
     optional = {name: key for name, key in model.model_fields.items() if not key.is_required()}
     return {name: key.get_default(call_default_factory=True) for name, key in optional.items()}
 
@@ -300,7 +323,7 @@ def advise_on_name(written_name: str, names: Iterable[str]) -> str:
     return f"{question}use one of {', '.join(known)}"
 
 
-def iterate_annotation_parts(annotation: Any) -> Iterator[Any]:
+def iterate_annotation_parts(annotation: KeyType) -> Iterator[Any]:
     """Yield all parts of an annotation: types, metadata such as Kind, values of a Literal."""
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
         yield part
@@ -341,11 +364,8 @@ class Key:
         self.accepts_value = self.inner is None or self.inner.has_name or bool(literals)
         self.kind = next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
         self.names_file = FILE_MARK in marks
-        self.record = next(filter(_is_record, field.metadata), KeyRecord(""))
-
-
-def _is_record(mark: Any) -> bool:
-    return isinstance(mark, KeyRecord)
+        records = [mark for mark in field.metadata if isinstance(mark, KeyRecord)]
+        self.record = next(iter(records), KeyRecord(""))
 
 
 @cache

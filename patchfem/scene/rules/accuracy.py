@@ -1,8 +1,6 @@
 """Rules of [accuracy]: numerical settings that a scene fixes must have an effect on its run."""
 
-from __future__ import annotations
-
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
@@ -139,7 +137,7 @@ def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
     return unused
 
 
-def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatures) -> str:
+def _find_reason_without_effect(setting: str, accuracy: Accuracy, motion: MotionFeatures) -> str:
     """Return why a setting has no effect on the laws and patches of a motion, or "" if it has an effect."""
     trait = SETTING_SCOPES[setting].trait
     laws = [joint.law for joint in motion.joints]

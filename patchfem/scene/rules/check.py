@@ -3,8 +3,6 @@
 A rule sees the tables as far as they could be read and is silent about values that are missing.
 """
 
-from __future__ import annotations
-
 from ...effects import law_has_trait
 from .accuracy import check_quadrature, check_settings
 from .contact import check_patches

@@ -1,13 +1,11 @@
 """Rules of [drive]: keys that its kind and its waveform need, exclude or do not use."""
 
-from __future__ import annotations
-
 from ...effects import find_waveform
 from .facts import TableFacts
 from .scene_draft import SceneDraft
 
 # Smallest number of cycles in a run; a shorter one does not reach the first peak of the drive.
-MIN_CYCLES = 0.25
+MIN_DRIVE_CYCLES = 0.25
 
 
 def check_drive(draft: SceneDraft) -> None:
@@ -52,12 +50,12 @@ def check_length(draft: SceneDraft, kind: str) -> None:
         return
     drive = TableFacts(draft, "drive", draft.tables.drive)
     advice = "the run must last at least a quarter of a cycle"
-    if drive.cycles < MIN_CYCLES:
+    if drive.cycles < MIN_DRIVE_CYCLES:
         drive.add_mistake(
-            "cycles", f"{advice}: cycles >= {MIN_CYCLES} is needed, not {drive.cycles:g}"
+            "cycles", f"{advice}: cycles >= {MIN_DRIVE_CYCLES} is needed, not {drive.cycles:g}"
         )
-    elif drive.duration * drive.frequency < MIN_CYCLES:
-        shortest = MIN_CYCLES / drive.frequency
+    elif drive.duration * drive.frequency < MIN_DRIVE_CYCLES:
+        shortest = MIN_DRIVE_CYCLES / drive.frequency
         drive.add_mistake(
             "duration",
             f"{advice}: duration >= {shortest:g} s is needed, not {drive.duration:g} s",

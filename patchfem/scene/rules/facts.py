@@ -1,7 +1,5 @@
 """A table of a scene as its rules see it: values, what was written, and where mistakes are reported."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 from ..keys.types import Table

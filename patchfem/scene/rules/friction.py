@@ -1,7 +1,5 @@
 """Rules of [friction] and of the law of an interface."""
 
-from __future__ import annotations
-
 from ...effects import law_has_trait, law_takes_key
 from ..keys.tables import Friction
 from .facts import TableFacts

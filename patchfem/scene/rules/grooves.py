@@ -1,7 +1,5 @@
 """Rules of [contact.grooves] and [normal.grooves]: their slope and their motion."""
 
-from __future__ import annotations
-
 from math import pi
 
 from .facts import TableFacts

@@ -1,8 +1,6 @@
 """Features that each solver (engine) supports, and why accuracy.method cannot run a scene."""
 
-from __future__ import annotations
-
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ...effects import (
     Waveform,
@@ -15,7 +13,8 @@ from ...effects import (
     needs_bond_list,
     suggest_laws,
 )
-from ..keys.tables import Interface, Tables
+from ..keys.contact import Contact
+from ..keys.tables import Drive, Friction, Interface, Tables
 from .scene_draft import SceneDraft
 from .view import TableView
 
@@ -27,7 +26,7 @@ class Joint(NamedTuple):
     - compliance: key of the compliance that allows partial slip; "" if the patch slips as a whole.
     """
 
-    law: Any
+    law: Friction
     compliance: str
 
 
@@ -50,7 +49,7 @@ class MotionFeatures(NamedTuple):
     strips_yaw: bool
     spring: str
     waveform: Waveform
-    drive: Any = None
+    drive: Drive | None = None
     lower_shape: str = ""
 
     @property
@@ -215,13 +214,13 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     )
 
 
-def find_compliance_key(law: Any, tables: Tables) -> str:
+def find_compliance_key(law: Friction, tables: Tables) -> str:
     """Return the key that allows partial slip of the patch under a law, or "" if there is none."""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
 
 
-def list_lower_shapes(contact: Any, table_key: str = "contact") -> list[str]:
+def list_lower_shapes(contact: Contact | None, table_key: str = "contact") -> list[str]:
     """List the keys that place a gap shape on the lower piece, such as `contact.crown.on`."""
     shapes = contact.shapes if contact is not None else {}
     return [f"{table_key}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]

@@ -1,7 +1,5 @@
 """Keys that a table lacks, that exclude one another or that have no meaning, as `keys.choices` states them."""
 
-from __future__ import annotations
-
 from ...effects import name_laws_with_key
 from ..keys.choices import (
     EQUAL_LENGTHS,

@@ -7,7 +7,7 @@ PIECE_NAMES = ("upper", "lower")
 END_KEYS = ("chamfer", "end_radius")
 # Smallest end, or difference of lengths, as a fraction of the length of a piece; a smaller
 # one is smaller than any element.
-MIN_END_FRACTION = 1e-5
+MIN_PIECE_END_FRACTION = 1e-5
 
 
 def find_piece_length(contact: TableView, name: str) -> float:
@@ -33,7 +33,7 @@ def check_outlines(patch: TableFacts) -> None:
         _check_piece(patch, name)
     lengths = [find_piece_length(patch, name) for name in PIECE_NAMES]
     written = [name for name in PIECE_NAMES if patch.has(f"{name}.length")]
-    if written and 0 < abs(lengths[0] - lengths[1]) < MIN_END_FRACTION * max(lengths):
+    if written and 0 < abs(lengths[0] - lengths[1]) < MIN_PIECE_END_FRACTION * max(lengths):
         patch.add_mistake(
             f"{written[-1]}.length",
             f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference is less than 1e-5 of the length: "
@@ -55,7 +55,7 @@ def _check_piece(patch: TableFacts, name: str) -> None:
                 f"{end} m at each end leaves no flat face on a piece that is {length} m long; {key} must be less than "
                 "length/2"
             )
-        elif end < MIN_END_FRACTION * length:
+        elif end < MIN_PIECE_END_FRACTION * length:
             sentence = f"{end} m is less than 1e-5 of the length {length} m: leave this key out"
         elif end + thickness >= height:
             sentence = f"{end} m and a coating of {thickness} m do not fit into the height {height} m of the piece"

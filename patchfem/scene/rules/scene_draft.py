@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
 
 from ...exceptions import PatchfemError
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
-from ..keys.types import build_table
+from ..keys.types import Table, build_table
+from ..keys.values import TomlTable, TomlValue
 from ..lines import find_line, number_items_from_one
 from .view import TableView
 
@@ -52,7 +52,7 @@ class SceneDraft:
     - read_before: id of a plain table of `raw` -> the table that it gives, which need not be read again.
     """
 
-    def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
+    def __init__(self, path: str, lines: dict[str, int], raw: TomlTable) -> None:
         self.path = path
         self.lines = dict(lines)
         self.raw = raw
@@ -61,7 +61,7 @@ class SceneDraft:
         self.tables = build_table(Tables, {})
         self._values = TableView(self.tables)
         self.remarks: list[str] = []
-        self.read_before: dict[int, Any] = {}
+        self.read_before: dict[int, Table] = {}
         # Keys that an unknown key probably means; they are not reported as missing.
         self.suggested_keys: set[str] = set()
         # Keys (order, line of text); a dict lists each mistake only once.
@@ -83,7 +83,7 @@ class SceneDraft:
         """Return whether the scene contains a key or table, even if its value is invalid."""
         return self.written_value(key) is not None
 
-    def written_value(self, key: str) -> Any:
+    def written_value(self, key: str) -> TomlValue | None:
         """Return the value at a dotted key as the user wrote it, or None if there is none."""
         return find_value(self.raw, key)
 
@@ -154,7 +154,7 @@ class SceneDraft:
         self._mistakes.setdefault((order, f"{location}: {printable}"))
 
 
-def find_value(value: Any, key: str) -> Any:
+def find_value(value: TomlValue | None, key: str) -> TomlValue | None:
     """Return the value at a dotted key of nested tables, or None if there is none."""
     for piece in _split_at_dots(key):
         if isinstance(value, dict):

@@ -1,7 +1,5 @@
 """Rules of [structure]: the rig is described once, masses exist, participations are possible."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,11 +20,6 @@ NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-# What describes a rig of masses in a scene with [contact].
-MODES_ADVICE = (
-    "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for each mode a "
-    "[[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
-)
 
 
 def check_structure(draft: SceneDraft) -> None:

@@ -1,16 +1,18 @@
 """Combinations of effects that a scene may contain but no run can compute: the table SUPPORT.
 
-Each row names two or more features and says what to do instead; LIMITS.md lists the rows and defines the features. A
-feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of the patch
-of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can compute stands
-in `methods`.
+Each row of support.toml names two or more features and says what to do instead; LIMITS.md lists the rows and defines the
+features. A feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of
+the patch of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can compute
+stands in `methods`.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from functools import cache, cached_property, reduce
-from itertools import chain, repeat
+from itertools import repeat
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...effects import (
@@ -38,11 +40,10 @@ from .methods import (
 )
 from .scene_draft import SceneDraft
 from .structure import find_instrument_key
-from .view import wrap_value
+from .view import ViewValue, wrap_value
 
 # Features of the whole scene: their rows are tried once, also where no law could be read.
 SCENE_FEATURES = ("wear", "structure.measured=stuck", "sensor apart from the output")
-SINGLE_SUMS = "use 'auto', 'direct' or 'truncated'"
 SUMS = ("direct", "truncated", "merged")  # methods of accuracy.quadrature that sum single bonds
 
 
@@ -81,7 +82,7 @@ class Joint(TableFacts):
         self.instrument_key = find_instrument_key(draft)
         self.wave = find_waveform(draft.tables.drive)
 
-    def find_key_value(self, key: str) -> Any:
+    def find_key_value(self, key: str) -> ViewValue:
         """Return the value of a key of the scene, or of the patch of the joint if it begins with "patch"."""
         table, *names = key.split(".")
         return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
@@ -302,136 +303,26 @@ def find_feature(name: str) -> Feature:
     return Feature(lambda j: j.find_key_value(key), shown_key)
 
 
-AT_OUTPUT = "give `accelerometer` and `gauge` the value of `output`"
-ONLY_MODES = "only modes can be measured with the joint: leave `measured` out"
-WITHOUT_JOINT = (
-    "the joint has no single stiffness to subtract from the modes: give the modes without the joint"
-)
-STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
-# Features that no run supports together, by what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
-# mistake is reported at the key of the first feature. Only the first row that applies is reported at a key. If the advice of
-# one row also removes the cause of another row, it stands before that row.
-COMBINATIONS = {
-    "out": (
-        "patch.strips, law of an averaged pressure",
-        "patch.holder.tangential_stiffness, grooves",
-        "spread of the bonds, interface",
-        "patch.grooves, interface",
-    ),
-    "either": (
-        "structure.stiffening, changing load",
-        "structure.bonded.wavelength, changing load",
-        "patch.strips, changing load",
-        "patch.strips, strips that slip together, partial slip",
-        "grooves, patch.strips, mode with yaw",
-        "grooves, patch.strips, partial slip",
-        "normal.amplitude, grooves",
-        "mode with heave or pitch, grooves",
-        "structure.stiffening, grooves",
-        "structure.bonded.wavelength, grooves",
-    ),
-    suggest_laws("varying-load"): (
-        "law for a constant load, changing load",
-        "normal.amplitude, bench, law with memory for a constant pressure",
-    ),
-    "recursion": (
-        "sum over all stretched bonds, changing load",
-        "sum over all stretched bonds, normal.amplitude, bench",
-        "sum over all bonds, grooves",
-    ),
-    "stiff": ("law that sticks rigidly, partial slip, changing load",),
-    "linear": (
-        "patch.asperities.law=exponential, changing load",
-        "patch.asperities.law=hertz, changing load",
-    ),
-    "shapes": (
-        "shape on the lower piece, changing load",
-        "shape on the lower piece, law without bonds, rig",
-        "shape on the lower piece, law without bonds, partial slip",
-        "shape on the lower piece, bench, law with memory but without bonds",
-        "shape on the lower piece, interface",
-        "shape on the lower piece, grooves",
-    ),
-    "use 'auto' or 'merged'": ("accuracy.quadrature=recursion, sum over all bonds",),
-    "use 'recursion' or 'auto'": (
-        "named method of the sum, sum by recursion, partial slip",
-        "named method of the sum, rig, sum by recursion, shape on the lower piece",
-        "named method of the sum, grooves",
-    ),
-    SINGLE_SUMS: (
-        "accuracy.quadrature=merged, bench, patch that slips as a whole, normal.amplitude",
-    ),
-    f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
-        "law without elements, partial slip",
-    ),
-    "give bond_length in place of stiffness": (
-        "bonds of a given stiffness, changing load",
-        "bonds of a given stiffness, normal.amplitude",
-        "bonds of a given stiffness, grooves",
-        "bonds of a given stiffness, patch.approach",
-    ),
-    "raise static or leave out {compliance}": ("no friction, partial slip",),
-    "put all shapes on one piece": ("shapes on different pieces",),
-    "add [contact.strips], whose strips slide independently": (
-        "mode with yaw, rig, patch without strips",
-    ),
-    "use [contact] in place of [normal]": ("mode with heave or pitch, single contact point",),
-    "set initial_bonds = 0 or use order >= 0": ("bonds that no force can move, partial slip",),
-    "{joints_advice}": (
-        "mode with yaw, patch.strips, rig, law for one interface",
-        "law for one interface, several interfaces",
-        "law for one interface, patch of an interface",
-    ),
-    f"leave out {{compliance}}, or {suggest_laws('shear')}": (
-        "law for rigid pieces, partial slip",
-    ),
-    "kinetic": ("kinetic below static, partial slip",),
-    "{grooves_advice}": ("law for flat faces, grooves",),
-    "leave `harmonics` out: the steady motion is found without it": (
-        "accuracy.harmonics, accuracy.method=harmonic, grooves",
-    ),
-    "leave `harmonics` out: the steady motion of all interfaces is found without it": (
-        "accuracy.harmonics, accuracy.method=harmonic, several interfaces",
-    ),
-    "give contact.load instead": ("patch.approach, interface",),
-    "leave out [wear] or {compliance}": ("wear, patch.strips, partial slip",),
-    "leave out [wear] or leave out wear.start": ("wear, patch.strips, wear.start",),
-    "leave out [wear] or the amplitude": ("wear, rig, normal.amplitude",),
-    "leave out [wear] or describe a single interface by [friction] and [normal]": (
-        "wear, structure.interface",
-    ),
-    "leave out [wear] or {heave_key}": ("wear, mode with heave or pitch",),
-    "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
-    "a [normal] contact has no area, so its wear has no depth: use [contact]": (
-        "wear, grooves, load on a point",
-    ),
-    "put all shapes on the upper piece": ("wear, patch.strips, shape on the lower piece",),
-    f"{STEADY_ADVICE} kind 'base' or 'force'": ("wear, rig, drive.kind=free",),
-    f"{STEADY_ADVICE} waveform 'sine'": ("wear, rig, drive other than a sine",),
-    "use 'auto', 'exact' or 'march'": ("wear, rig, accuracy.method=harmonic",),
-    ONLY_MODES: (
-        "structure.measured=stuck, structure.masses",
-        "structure.measured=stuck, structure.reduced",
-    ),
-    WITHOUT_JOINT: (
-        "structure.measured=stuck, structure.bonded.wavelength",
-        "structure.measured=stuck, contact.grooves",
-        "structure.measured=stuck, normal.grooves",
-        "structure.measured=stuck, normal.amplitude",
-        "structure.measured=stuck, mode with heave or pitch",
-        "structure.measured=stuck, mode with yaw",
-        "structure.measured=stuck, patches of interfaces",
-    ),
-    AT_OUTPUT: (
-        "sensor apart from the output, structure.travel",
-        "sensor apart from the output, structure.stiffening",
-        "sensor apart from the output, drive.kind=free",
-        "sensor apart from the output, levels or sweep in time",
-    ),
+# What names in braces in the advice of support.toml stand for.
+LAW_ADVICE = {
+    "{laws_with_pieces}": suggest_laws("pieces", "shear"),
+    "{laws_with_shear}": suggest_laws("shear"),
+    "{laws_with_varying_load}": suggest_laws("varying-load"),
 }
-SUPPORT = tuple(
-    chain.from_iterable(zip(rows, repeat(instead)) for instead, rows in COMBINATIONS.items())
-)
+
+
+def _read_rows() -> tuple[tuple[str, str], ...]:
+    """Return the features of each row of support.toml, and what to do instead."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    for name, advice in LAW_ADVICE.items():
+        text = text.replace(name, advice)
+    rows = []
+    for instead, features in tomllib.loads(text).items():
+        rows += zip(features, repeat(instead))
+    return tuple(rows)
+
+
+SUPPORT = _read_rows()
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TypeAlias
 
-from ..keys.types import Table
+from ..keys.types import KeyValue, Table
+
+# Value of a key as rules see it.
+ViewValue: TypeAlias = "str | int | float | bool | TableView | tuple[ViewValue, ...]"
 
 
 class _Unknown(float):
@@ -20,7 +23,7 @@ class _Unknown(float):
     def __getattr__(self, name: str) -> _Unknown:
         return self
 
-    def __getitem__(self, name: object) -> _Unknown:
+    def __getitem__(self, name: str) -> _Unknown:
         return self
 
 
@@ -38,16 +41,16 @@ class TableView:
     def __init__(self, table: Table | None) -> None:
         self.table = table
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> ViewValue:
         value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds the value without this method
         return value
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> ViewValue:
         return getattr(self, name)
 
 
-def wrap_value(value: Any) -> Any:
+def wrap_value(value: KeyValue) -> ViewValue:
     """Wrap a value for the rules: a table becomes a TableView, and None becomes UNKNOWN_VALUE."""
     if value is None:
         return UNKNOWN_VALUE

@@ -9,7 +9,7 @@ from .depth_map import UNWORN_LIMIT
 from .fit import Fit, evaluate, fit_unworn
 from .model import MAX_GAIN_CHANGE, Model
 from .place import Place, find_place, order
-from .raster import MIN_HEIGHTS, Raster, fill_gaps
+from .raster import MIN_TRACE_HEIGHTS, Raster, fill_gaps
 from .statistics import (
     TINY,
     find_mirror_finish,
@@ -82,7 +82,7 @@ def align(
         return _refuse(first, second)
     state = model.refine_place()
     model.keep_common(state)
-    if model.known.sum() < MIN_HEIGHTS:
+    if model.known.sum() < MIN_TRACE_HEIGHTS:
         return _refuse(first, second)
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
@@ -112,7 +112,7 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
         stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
     model = Model(own, other, place, stride)
     count = model.known.sum()
-    return model if count >= max(MIN_HEIGHTS, MIN_COMMON * model.known.size) else None
+    return model if count >= max(MIN_TRACE_HEIGHTS, MIN_COMMON * model.known.size) else None
 
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
@@ -212,7 +212,7 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
     fields = [fill_gaps(model.draw(column)) for column in columns]
     depth, waves = (subtract_local_level(field, unworn) for field in fields)
     use = unworn & np.isfinite(depth)
-    if use.sum() < MIN_HEIGHTS:
+    if use.sum() < MIN_TRACE_HEIGHTS:
         return 0.0, MAX_GAIN_ERROR
     use &= waves <= np.median(waves[use])
     waves = np.where(use, waves - waves[use].mean(), 0.0)

@@ -14,7 +14,7 @@ from .statistics import (
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
-MIN_SIDE = (
+MIN_PART_SIDE = (
     4  # side of the smallest changed part of scans; a smaller one may be an error of interpolation
 )
 MIN_RUN = 9  # the same of traces, where an error of interpolation at a kink spreads over 7 samples and one on each side
@@ -23,11 +23,11 @@ MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth count
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
 N_PARTS = 60  # parts of the trace whose means show a shallow track
-FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
+SHALLOW_FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
 # Smallest height of a shallow track in standard deviations; 2 % of random walks have a deeper one.
-MIN_STEP = 8.0
+MIN_TRACK_HEIGHT = 8.0
 
 
 def find_changed(depth, noise) -> np.ndarray:
@@ -69,7 +69,7 @@ def find_changed(depth, noise) -> np.ndarray:
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
-    side = MIN_SIDE
+    side = MIN_PART_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)
         shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
@@ -117,10 +117,10 @@ class ShallowTrack(NamedTuple):
 def find_shallow_track(depth) -> ShallowTrack:
     """Find a track in the means of 60 parts, by the likelihood ratio of a box beside a cubic datum."""
     if depth.size < 2 * N_PARTS:
-        return ShallowTrack(slice(0), MIN_STEP * float(depth.std()))
+        return ShallowTrack(slice(0), MIN_TRACK_HEIGHT * float(depth.std()))
     edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
     means = np.add.reduceat(depth, edges[:-1]) / np.diff(edges)
-    boxes = make_boxes(DATUM_DEGREE, FLANK_PARTS, MIN_TRACK_PARTS)
+    boxes = make_boxes(DATUM_DEGREE, SHALLOW_FLANK_PARTS, MIN_TRACK_PARTS)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
     best = int(np.argmax(heights))
@@ -129,8 +129,8 @@ def find_shallow_track(depth) -> ShallowTrack:
     spread = float(np.sqrt(residual @ residual / freedom * estimate_correlation(residual)))
     middle = (boxes.spans == (N_PARTS // 3, 2 * N_PARTS // 3)).all(axis=1)
     # A track of this depth is found although its own error may lower it by two deviations.
-    limit = (MIN_STEP + 2.0) * spread / float(boxes.sizes[middle][0])
-    if heights[best] < MIN_STEP * spread:
+    limit = (MIN_TRACK_HEIGHT + 2.0) * spread / float(boxes.sizes[middle][0])
+    if heights[best] < MIN_TRACK_HEIGHT * spread:
         return ShallowTrack(slice(0), limit)
     first, stop = boxes.spans[best]
     return ShallowTrack(slice(edges[first], edges[stop]), limit)

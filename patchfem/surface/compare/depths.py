@@ -18,10 +18,10 @@ MIN_TILES = 6  # smallest number of tiles that show these errors
 MIN_FREEDOM = (
     3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
 )
-MIN_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
+MIN_DATUM_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
 MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
 MEDIAN_VARIANCE = 1.57  # variance of a median relative to that of a mean, of normal errors
-MAX_NOISE_RATIO = 4.0  # noise relative to the median above which a depth cannot be the largest
+MAX_DEPTH_NOISE = 4.0  # noise relative to the median above which a depth cannot be the largest
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
@@ -132,7 +132,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
         use = unworn[tile]
-        if use.sum() >= MIN_TILE_HEIGHTS:
+        if use.sum() >= MIN_DATUM_TILE_HEIGHTS:
             parts = [values[tile][use].mean() for values in (depth, *base)]
             tiles.append((use.sum(), *parts))
     counts, means, *centers = np.array(tiles).T if tiles else np.zeros((2 + len(base), 1))
@@ -188,7 +188,7 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
         Mask in the shape of the depths of the places that are as deep but for the noise.
     """
     n_axes = depths.depth.ndim
-    is_sure = depths.noise < MAX_NOISE_RATIO * depths.noise_level
+    is_sure = depths.noise < MAX_DEPTH_NOISE * depths.noise_level
     if (is_sure & depths.worn).any():
         is_sure &= depths.worn
     smooth = ndimage.median_filter(depths.depth, MEDIAN_SIZE[n_axes])

@@ -13,8 +13,8 @@ from .statistics import (
     solve_biweight_step,
 )
 
-MAX_CYCLES = 6  # number of alternations between the fit and the choice of the worn heights
-MAX_STEPS = 15  # number of biweight steps in a cycle
+MAX_FIT_CYCLES = 6  # number of alternations between the fit and the choice of the worn heights
+MAX_BIWEIGHT_STEPS = 15  # number of biweight steps in a cycle
 # Change of the depths, in standard deviations, below which the steps have converged.
 STEP_TOL = 1e-3
 MIN_UNWORN = 50  # smallest number of heights that are not worn
@@ -70,8 +70,8 @@ def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
     """
     fit = None
     worn = np.zeros(int(model.known.sum()), bool)
-    for _ in range(MAX_CYCLES):
-        for _ in range(MAX_STEPS):
+    for _ in range(MAX_FIT_CYCLES):
+        for _ in range(MAX_BIWEIGHT_STEPS):
             depth = model.compute_depth(state)
             sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
             jacobian = model.compute_jacobian(state)[:, free]

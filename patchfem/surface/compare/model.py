@@ -40,10 +40,10 @@ MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
 N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
-MIN_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
+MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
 MIN_DETERMINANT = 1e-3  # smallest determinant of the places of tiles that show a datum
 MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
-MIN_END_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
+MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
 MAX_AGREEING_DISTANCE = (
     5.0  # distance from a datum, in its smallest scale, within which heights agree
 )
@@ -198,7 +198,7 @@ class Model:
         """Return the state with the datum of some terms on which the unworn heights lie."""
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
         parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
-        tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_TILE_HEIGHTS]
+        tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
         state = state.copy()
         base = self.datum[:n_terms, self.known].T
@@ -252,7 +252,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     has_end = np.zeros(near.size, bool)
     for end in ends:
         at_end = agrees[:, np.isin(thin, end)]
-        has_end |= at_end.sum(axis=1) > MIN_END_FRACTION * at_end.shape[1]
+        has_end |= at_end.sum(axis=1) > MIN_AGREEING_FRACTION * at_end.shape[1]
     grown = np.round((relative < -MIN_GROWN_DISTANCE).mean(axis=1), 1)
     return datums[near[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
 

@@ -7,12 +7,14 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..areal import Areal, fill_nearest, find_scan_spikes
-from ..profile import MAX_SAMPLES, Profile, remove_spikes
+from ..profile import MAX_TRACE_SAMPLES, Profile, remove_spikes
 
-MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
-MIN_SIDE = 16  # smallest number of points along each side of a scan
+MIN_TRACE_HEIGHTS = 40  # smallest number of heights of a trace that is compared
+MIN_SCAN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
-MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
+MAX_PLACE_UNEVENNESS = (
+    0.1  # largest distance from even places, in steps, of a trace that is not resampled
+)
 
 
 class Raster(NamedTuple):
@@ -57,11 +59,11 @@ def fill_gaps(z) -> np.ndarray:
 def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Profile | Areal:
     """Mark spikes, dust and saturated heights as missing; raise PatchfemError if too few heights are left."""
     if isinstance(surface, Areal):
-        if min(surface.z.shape) < MIN_SIDE:
+        if min(surface.z.shape) < MIN_SCAN_SIDE:
             rows, columns = surface.z.shape
             raise PatchfemError(
                 f"compare: {surface.source}: {rows} x {columns} heights; a comparison of scans needs at least "
-                f"{MIN_SIDE} along each side"
+                f"{MIN_SCAN_SIDE} along each side"
             )
         is_bad = find_scan_spikes(surface)
     else:
@@ -69,9 +71,9 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
     is_bad = is_bad | _find_saturated(surface.z)
     z = surface.z if keep_spikes else np.where(is_bad, np.nan, surface.z)
     count = np.isfinite(z).sum()
-    if count < MIN_HEIGHTS:
+    if count < MIN_TRACE_HEIGHTS:
         raise PatchfemError(
-            f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_HEIGHTS}"
+            f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_TRACE_HEIGHTS}"
         )
     return replace(surface, z=z)
 
@@ -103,11 +105,13 @@ def make_raster(surface: Profile | Areal) -> Raster:
     median = float(np.median(distances))
     step = np.ptp(x) / round(np.ptp(x) / median)
     places = (x - x[0]) / step
-    if np.abs(places - np.rint(places)).max() > MAX_UNEVEN:
-        step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_SAMPLES)
+    if np.abs(places - np.rint(places)).max() > MAX_PLACE_UNEVENNESS:
+        step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_TRACE_SAMPLES)
     grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
     z = np.interp(grid, x, surface.z[known])
     after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
     nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
-    is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (nearest > MAX_UNEVEN * step)
+    is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (
+        nearest > MAX_PLACE_UNEVENNESS * step
+    )
     return Raster(np.where(is_missing, np.nan, z), x[:1], np.array([step]))

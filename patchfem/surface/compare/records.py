@@ -11,61 +11,12 @@ import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import SIDE, Quantity
+from ..quantity import SIDE, Quantity, read_definitions
 
 if TYPE_CHECKING:
     from .depth_map import DepthMap
 
-# Unit and definition of each quantity of a comparison.
-DEFINITIONS = {
-    "shift": ("m", "x of a feature in the second trace minus its x in the first"),
-    "scale": ("1", "length of the second trace divided by that of the first"),
-    "gain": (
-        "1",
-        "factor by which the heights of the second surface were divided; 1 if no other gain of the instrument shows",
-    ),
-    "significance": (
-        "1",
-        "agreement of both surfaces at this place, in standard deviations of that at all other places",
-    ),
-    "common_length": ("m", "length that both traces show"),
-    "common_area": ("m2", "area that both scans show"),
-    "worn_depth_mean": ("m", "lost area or volume divided by the size of the common part"),
-    "worn_depth_max": ("m", "largest depth"),
-    "worn_depth_max_at": ("m", "x in the second trace of the largest depth"),
-    "worn_depth_max_x": ("m", "x in the first scan of the largest depth"),
-    "worn_depth_max_y": ("m", "y in the first scan of the largest depth"),
-    "worn_area": ("m2", "area lost in the common part, per unit of width"),
-    "grown_area": ("m2", "area above the first trace in the common part"),
-    "worn_depth_within": ("m", "mean depth of the longest track: lost area divided by its width"),
-    "worn_from_before": ("m", "x in the first trace at which the longest track begins"),
-    "worn_to_before": ("m", "x in the first trace at which the longest track ends"),
-    "worn_from_after": ("m", "x in the second trace at which the longest track begins"),
-    "worn_to_after": ("m", "x in the second trace at which the longest track ends"),
-    "amplitude_ratio": ("1", "rms of the waves from 60 to 110 um after wear divided by before"),
-    "slope_ratio": (
-        "1",
-        "rms slope of the waves up to 110 um after wear divided by before, at the same step; with the noise of both",
-    ),
-    "hidden_wear": ("m", "largest mean wear that an even or wedge-shaped loss may hide"),
-    "worn_volume": ("m3", "volume lost in the common part"),
-    "grown_volume": ("m3", "volume above the first scan in the common part"),
-    "worn_share": ("1", "worn area divided by the area of the common part"),
-    "shift_x": ("m", "x of a feature in the second scan minus its x in the first"),
-    "shift_y": ("m", "y of a feature in the second scan minus its y in the first"),
-    "rotation": ("rad", "rotation of the second scan about the middle of the first, anticlockwise"),
-    "from": ("m", "x in the second trace at which the track begins"),
-    "to": ("m", "x in the second trace at which the track ends"),
-    "width": ("m", "width of the track"),
-    "depth_mean": ("m", "lost area divided by width"),
-    "depth_floor": ("m", "mean depth of the deepest part that is a fifth of the width long"),
-    "area_gross": ("m2", "area lost in the track"),
-    "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
-    "area_net": ("m2", "lost area less pile-up"),
-    "Ra": ("m", "mean of the absolute heights of the roughness profile"),
-    "Rq": ("m", "root mean square of the heights of the roughness profile"),
-    "slope": ("m m-1", "root mean square slope of the roughness profile"),
-}
+DEFINITIONS = read_definitions("comparison")
 
 
 class Finding(NamedTuple):

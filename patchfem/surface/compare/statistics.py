@@ -9,7 +9,7 @@ from ..profile import robust_deviation
 
 BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
-MIN_SIDE = 20  # smallest number of depths on one side of zero that shows their scale
+MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
 FALSE_POSITIVE_RATE = 1e-3
 # Mean square of normal values of variance one that lie within UNWORN_LIMIT.
@@ -31,7 +31,11 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
         Quantile of the sizes on one side, which that of normal values scales. More than this fraction of
         them must be unchanged.
     """
-    sides = [np.abs(side) for side in (depth[depth > 0], depth[depth < 0]) if side.size >= MIN_SIDE]
+    sides = [
+        np.abs(side)
+        for side in (depth[depth > 0], depth[depth < 0])
+        if side.size >= MIN_SIDE_DEPTHS
+    ]
     if not sides:
         return max(robust_deviation(depth), TINY) if depth.size else TINY
     smallest = min(float(np.quantile(side, fraction)) for side in sides)

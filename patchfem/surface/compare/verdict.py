@@ -8,8 +8,10 @@ from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
 from .tops import CONTROL, find_worn_tops
 
-MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
-MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
+MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
+MIN_LOST_DEVIATIONS = (
+    4.0  # standard deviations of lost material that is reported beside as much growth
+)
 
 
 def find_sure_loss(depths: DepthMap) -> float:
@@ -61,9 +63,9 @@ def judge_change(
     """
     if area > SIDE * error and lost > CONTROL * grown:
         return "worn" if area > sure_loss * error else "scar_or_drift"
-    is_grown = grown > MIN_GROWTH * grown_error
+    is_grown = grown > MIN_GROWN_DEVIATIONS * grown_error
     if is_grown and grown > CONTROL * max(lost, 0.0):
         return "grown"
-    if is_grown and lost > MIN_LOSS * error:
+    if is_grown and lost > MIN_LOST_DEVIATIONS * error:
         return "worn_and_grown"
     return "no_wear"

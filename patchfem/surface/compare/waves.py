@@ -23,7 +23,7 @@ CUTOFF_TO_DEVIATION = 0.187
 RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
-MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
+MIN_WAVE_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
 POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
@@ -55,7 +55,7 @@ def compare_waves(
     for end in ends:
         kept &= np.abs(np.arange(kept.size) - end) > BAND[1] / step
     length = kept.sum() * step
-    if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
+    if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_WAVE_STEPS:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.

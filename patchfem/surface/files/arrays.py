@@ -14,7 +14,9 @@ from .content import DAMAGED, Content
 from .table import Table
 from .units import HEADER_EXAMPLE, shorten
 
-MIN_ROWS = 8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
+MIN_MATRIX_ROWS = (
+    8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
+)
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 
 
@@ -35,7 +37,7 @@ def read_mat(content: Content) -> Table:
     by_name = {name.lower(): array for name, array in arrays.items()}
     height = next((name for name in HEIGHT_NAMES if name in by_name), None)
     if not height or "x" not in by_name:
-        tables = {name: array for name, array in arrays.items() if len(array) >= MIN_ROWS}
+        tables = {name: array for name, array in arrays.items() if len(array) >= MIN_MATRIX_ROWS}
         return _read_columns(path, tables)
 
     columns = {name: by_name[name].ravel() for name in "xy" if name in by_name}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core import Missing, PatchfemError
+from ...disk.open_with_timeout import open_for_reading
 from ...inputs.damage import refuse_damage
 
 MIB = 2**20  # number of bytes in a mebibyte
@@ -46,7 +47,7 @@ def fetch(path) -> Content:
     """
     try:
         file_path = Path(path)
-        with open(file_path, "rb") as file:
+        with open_for_reading(file_path) as file:
             content = _read_limited(file_path, file_path.suffix, file)
     except FileNotFoundError:
         raise Missing(f"{path}: there is no such file") from None

@@ -15,9 +15,9 @@ from ...inputs.tables import NUMBER_PATTERN
 from .units import HEADER_EXAMPLE, ROLES, parse_length_unit
 
 MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought
-MAX_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
+MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 MAX_NAME = 80  # largest number of characters in the name of a column with its unit
-MAX_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
+MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
 COMMENT = ("#", "%", "//")
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was not measured
@@ -62,7 +62,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
     named: dict[int, tuple[int, list[Column]]] = {}  # lines of names by their number of cells
     facts = {}
     number = 0
-    for number, line in islice(lines, MAX_LINES):
+    for number, line in islice(lines, MAX_HEADER_LINES):
         is_comment = line.lstrip().startswith(COMMENT)
         text = line.strip(" \n\t#%/") if is_comment else line.strip()
         cells, delimiter = split_cells(text)
@@ -78,7 +78,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         found = [_parse_column(cell) for cell in cells]
         if any(column.role for column in found):
             is_other = any(re.search("[:=]", column.name) for column in found)
-            if not 1 < len(found) <= MAX_COLUMNS or is_other:
+            if not 1 < len(found) <= MAX_HEIGHT_COLUMNS or is_other:
                 continue
             start = number
             columns = found

@@ -7,12 +7,14 @@ files it reads matrices with their masks, and refuses traces and dates that it d
 """
 
 import io
+from math import prod
 
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ...inputs.packed import count_zip_bytes, refuse_large_content
 from .content import Content
-from .table import Table
+from .table import Table, refuse_many_heights
 from .units import HEADER_EXAMPLE, shorten
 
 
@@ -27,6 +29,8 @@ def read_instrument(content: Content) -> Table:
     if content.data.startswith(b"PK"):
         kind = "a zip file; unpack it if it contains a text; X3P is such a format"
         remedy = f"unpack a text that it contains, or {remedy}"
+        size = count_zip_bytes(io.BytesIO(content.data))
+        refuse_large_content(path, size, "export a smaller part of the scan")
     try:
         # The import takes two seconds.
         import SurfaceTopography
@@ -43,6 +47,8 @@ def read_instrument(content: Content) -> Table:
         channel = reader.default_channel
         if channel.physical_sizes is None:
             raise ValueError("the file does not give the size of the scan")
+        # A packed file may state far more heights than it has bytes.
+        refuse_many_heights(path, prod(channel.nb_grid_pts))
         topography = channel.topography()
         unit = topography.unit
         if unit is not None:
@@ -55,6 +61,8 @@ def read_instrument(content: Content) -> Table:
             steps = np.divide(topography.physical_sizes, z.shape)
             x, y = (np.arange(count) * step for count, step in zip(z.shape, steps))
             columns = {"x": x, "y": y, "z": z.T}
+    except PatchfemError:
+        raise
     except Exception as error:  # a damaged file leads to any kind of exception in a library
         reason = shorten(f"{type(error).__name__}: {error}", 120)
         raise PatchfemError(

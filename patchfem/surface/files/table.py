@@ -16,9 +16,9 @@ from .units import (
     shorten,
 )
 
-MAX_POINTS = 50_000_000  # largest number of heights
+MAX_HEIGHTS = 50_000_000  # largest number of heights
 MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
-MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
+MIN_TRACE_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
 # Fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
 FAULT_FRACTION = 0.01
 MIN_ROUNDED = 10  # smallest number of positions that show whether they are even but for rounding
@@ -31,7 +31,7 @@ DIGIT_TOL = (
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
 EVEN_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.
-ROUND_OFF = 1e-9
+POSITION_ROUND_OFF = 1e-9
 MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
 
 
@@ -79,10 +79,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         always state their units.
     """
     size = table.columns["z"].size
-    if size > MAX_POINTS:
-        raise PatchfemError(
-            f"{table.path}: {size} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
-        )
+    refuse_many_heights(table.path, size)
     if units is not None and table.are_units_fixed:
         table = table.add_note("the file states its own units; the units that you gave are ignored")
         units = None
@@ -115,6 +112,14 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)
+
+
+def refuse_many_heights(path, count: int) -> None:
+    """Raise PatchfemError if a surface has more heights than memory should hold."""
+    if count > MAX_HEIGHTS:
+        raise PatchfemError(
+            f"{path}: {count} heights, more than {MAX_HEIGHTS:.0e}; export a part of the scan"
+        )
 
 
 def _convert_column(table: Table, role: str, given: str | None) -> Table:
@@ -163,7 +168,7 @@ def _fill_raster(table: Table) -> Table:
 
     # Scattered points would leave nearly all cells of a grid empty.
     count = rows.size * columns.size
-    if count > max(MAX_CELLS_PER_POINT * z.size, 16) or count > MAX_POINTS:
+    if count > max(MAX_CELLS_PER_POINT * z.size, 16) or count > MAX_HEIGHTS:
         raise PatchfemError(
             f"{table.path}: {z.size} points with {columns.size} different x and {rows.size} different y do "
             "not fill a grid; export the scan as a grid, or one trace of two columns"
@@ -184,7 +189,7 @@ def _fill_raster(table: Table) -> Table:
 def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct positions of points (k,) but for round-off, and the index of each point (n,)."""
     positions, index = np.unique(values, return_inverse=True)
-    is_new = np.diff(positions, prepend=-np.inf) > ROUND_OFF * np.ptp(values)
+    is_new = np.diff(positions, prepend=-np.inf) > POSITION_ROUND_OFF * np.ptp(values)
     return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
@@ -254,7 +259,7 @@ def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, .
 
     Raises PatchfemError for a tiny length, and for such heights in units from a header, which have no other source.
     """
-    if length < MIN_LENGTH:
+    if length < MIN_TRACE_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )

@@ -24,7 +24,7 @@ from .table import Table
 from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
-MAX_UNEVEN = 1e-6
+MAX_STEP_UNEVENNESS = 1e-6
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -138,9 +138,9 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether numbers (n,) increase by equal steps, within MAX_UNEVEN of the first step."""
+    """Return whether numbers (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
+    return bool(steps[0] > 0 and np.ptp(steps) < MAX_STEP_UNEVENNESS * steps[0])
 
 
 def _read_rows(

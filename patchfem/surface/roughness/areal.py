@@ -5,6 +5,7 @@ Missing heights give no point, no slope, no cell of the area and no pair of heig
 
 import numpy as np
 
+from ..quantity import read_definitions
 from .parameters import compute_core, compute_moments
 
 DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
@@ -12,30 +13,7 @@ DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 2517
 MIN_LENGTH_STEPS = 2.0
 N_RAYS = 360  # number of directions in which the autocorrelation is followed
 RAY_POINTS = 4  # number of points on a ray per raster step
-
-
-# Unit and definition of the parameters of a scan.
-AREAL = {
-    "Sa": ("m", "mean of the absolute heights about the reference surface"),
-    "Sq": ("m", "root mean square of the heights about the reference surface"),
-    "Ssk": ("1", "skewness: mean cube of the heights over Sq^3"),
-    "Sku": ("1", "kurtosis: mean fourth power of the heights over Sq^4, 3 for a Gaussian surface"),
-    "Sp": ("m", "height of the highest point above the reference surface"),
-    "Sv": ("m", "depth of the lowest point below the reference surface"),
-    "Sz": ("m", "height from the lowest to the highest point"),
-    "Sdq": ("1", "root mean square gradient, from the slopes along x and along y"),
-    "Sdr": ("1", "developed area divided by projected area, minus one"),
-    "Sal": ("m", "shortest distance at which the autocorrelation falls to 0.2"),
-    "Str": ("1", "Sal divided by the longest distance at which it falls to 0.2; 1 if isotropic"),
-    "Sk": ("m", "core height: drop of the line through the flattest 40 % of the Abbott curve"),
-    "Spk": ("m", "reduced peak height: triangle on the base Smr1 with the volume above the core"),
-    "Svk": (
-        "m",
-        "reduced valley depth: triangle on the base 1 - Smr2 with the volume below the core",
-    ),
-    "Smr1": ("1", "fraction of the area above the core"),
-    "Smr2": ("1", "fraction of the area above the bottom of the core"),
-}
+AREAL = read_definitions("areal")
 
 
 def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float | str]:

@@ -10,19 +10,17 @@ from ..areal import Areal, level
 from ..profile import Profile
 
 CIRCLE = "circle"
-MIN_HEIGHTS = 10  # smallest number of heights that determine a circle
+MIN_CIRCLE_HEIGHTS = 10  # smallest number of heights that determine a circle
 
 
 def parse_form_option(text: str) -> int | str:
     """Parse the option that names the form to subtract: 1 (a line or a plane), or circle."""
-    text = text.strip()
-    if text == "1":
-        return 1
-    if text == CIRCLE:
-        return CIRCLE
+    form = {"1": 1, CIRCLE: CIRCLE}.get(text.strip())
+    if form is not None:
+        return form
     raise PatchfemError(
         f"the form '{text}' is not possible; use 1 (a line or a plane) or {CIRCLE} (of a trace); polynomials "
-        "were removed in 2.0"
+        "were removed in patchfem 1.2"
     )
 
 
@@ -36,14 +34,14 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
         return level(surface), "plane" if is_scan else "line"
     if is_scan:
         raise PatchfemError(
-            f"{surface.source}: the form of a scan is its plane; cylinders were removed in 2.0, so "
+            f"{surface.source}: the form of a scan is its plane; cylinders were removed in patchfem 1.2, so "
             "evaluate one line of the scan with --form circle"
         )
 
     known = ~surface.missing
-    if known.sum() < MIN_HEIGHTS:
+    if known.sum() < MIN_CIRCLE_HEIGHTS:
         raise PatchfemError(
-            f"{surface.source}: {known.sum()} heights; a circle needs at least {MIN_HEIGHTS}"
+            f"{surface.source}: {known.sum()} heights; a circle needs at least {MIN_CIRCLE_HEIGHTS}"
         )
     from scipy.optimize import least_squares
 

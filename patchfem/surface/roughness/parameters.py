@@ -6,9 +6,13 @@ None.
 
 import numpy as np
 
+from ..quantity import read_definitions
+
 # Smallest number of samples in a trace; fewer give neither a spectrum nor a curvature.
-MIN_SAMPLES = 16
-ROUND_OFF = 1e-12  # largest heights of a straight line after levelling, relative to those before
+MIN_TRACE_SAMPLES = 16
+HEIGHT_ROUND_OFF = (
+    1e-12  # largest heights of a straight line after levelling, relative to those before
+)
 MIN_HEIGHT_FRACTION = 0.10  # smallest height of hills and dales that count, relative to Rz
 MIN_WIDTH_FRACTION = 0.01  # smallest width of hills and dales that count, relative to the section
 MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
@@ -17,35 +21,8 @@ MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 WITHOUT_INTERVAL = ("t", "sk", "ku")
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
-# Unit and definition of the parameters of a profile, whose names begin with P or R.
-PROFILE = {
-    "a": ("m", "mean of the absolute heights"),
-    "q": ("m", "root mean square of the heights"),
-    "p": ("m", "height of the highest peak"),
-    "v": ("m", "depth of the deepest valley"),
-    "z": ("m", "height from the deepest valley to the highest peak"),
-    "t": ("m", "height from the deepest valley to the highest peak of the whole trace"),
-    "sk": ("1", "skewness: mean cube of the heights over the cube of their root mean square"),
-    "ku": ("1", "kurtosis: mean fourth power of the heights over that of their root mean square"),
-    "Sm": (
-        "m",
-        "mean length of a hill with the neighbouring dale, without those lower than 10 % of the height "
-        "from the deepest valley to the highest peak, or narrower than 1 % of the cut-off",
-    ),
-    "dq": ("1", "root mean square of the slope between neighbouring samples"),
-    "k": ("m", "core height: drop of the line through the flattest 40 % of the Abbott curve"),
-    "pk": ("m", "reduced peak height: triangle on the base Mr1 with the area above the core"),
-    "vk": ("m", "reduced valley depth: triangle on the base 1 - Mr2 with the area below the core"),
-    "Mr1": ("1", "fraction of the surface above the core"),
-    "Mr2": ("1", "fraction of the surface above the bottom of the core"),
-}
-# The same of the waves of the levelled trace.
-WAVES = {
-    "band_amplitude": (
-        "m",
-        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
-    ),
-}
+PROFILE = read_definitions("profile")
+WAVES = read_definitions("waves")
 
 
 def compute_parameters(z, step: float, section: float | None = None) -> dict[str, float | None]:

@@ -18,7 +18,7 @@ from ...formatting import format_length
 from ..areal import level
 from ..profile import Profile, remove_spikes, resample_evenly
 from .filter import filter_surface
-from .parameters import MIN_SAMPLES, ROUND_OFF
+from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
 MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
@@ -28,7 +28,7 @@ PERSSON = (0.4, 0.5)
 MAX_SPIKE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
 MAX_SKEWNESS = 0.5
-MAX_EXCESS = 1.0  # largest kurtosis minus 3, for the same reason
+MAX_EXCESS_KURTOSIS = 1.0  # largest kurtosis minus 3, for the same reason
 # Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
 SHARPEST_FRACTION = 0.005
 MAX_SHARPEST_POWER = 0.5  # largest fraction of m_4 in the sharpest heights; more may be due to dust
@@ -89,7 +89,9 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
         )
     tilted = resample_evenly(clean)
     flat = level(tilted)
-    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
+    if flat.z.size >= MIN_TRACE_SAMPLES and not np.ptp(flat.z) > HEIGHT_ROUND_OFF * np.ptp(
+        tilted.z
+    ):
         raise PatchfemError(
             f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
         )
@@ -116,9 +118,9 @@ def rms_moments(trace: Profile) -> Moments:
     """
     z = trace.z
     step = trace.length / (z.size - 1)
-    if z.size < MIN_SAMPLES:
+    if z.size < MIN_TRACE_SAMPLES:
         raise PatchfemError(
-            f"{trace.source}: {z.size} samples give no curvature; at least {MIN_SAMPLES} are needed"
+            f"{trace.source}: {z.size} samples give no curvature; at least {MIN_TRACE_SAMPLES} are needed"
         )
     return Moments(
         *(float(np.sqrt(np.mean(np.diff(z, order) ** 2)) / step**order) for order in range(3))
@@ -136,7 +138,7 @@ def _describe_skew(z, moments: Moments, length: float) -> str:
     excess = float(np.mean(unit**4)) - 3
     count = max(moments.slope * length / (np.pi * moments.height), 1.0)
     max_skewness = max(MAX_SKEWNESS, MAX_DEVIATIONS * np.sqrt(6 / count))
-    max_excess = max(MAX_EXCESS, MAX_DEVIATIONS * np.sqrt(24 / count))
+    max_excess = max(MAX_EXCESS_KURTOSIS, MAX_DEVIATIONS * np.sqrt(24 / count))
     if abs(skewness) <= max_skewness and abs(excess) <= max_excess:
         return ""
     effect = "the stiffness from the theory is only a guess"

@@ -16,10 +16,10 @@ from .areal import AREAL, compute_areal_parameters
 from .filter import filter_surface
 from .form import subtract_form
 from .parameters import (
-    MIN_SAMPLES,
+    HEIGHT_ROUND_OFF,
     MIN_SECTIONS,
+    MIN_TRACE_SAMPLES,
     PROFILE,
-    ROUND_OFF,
     WAVES,
     WITHOUT_INTERVAL,
     compute_parameters,
@@ -119,16 +119,16 @@ def make_report(
     whole = part if is_scan else resample_evenly(part)
     # An uneven trace has more samples afterwards, and one without heights at its ends fewer.
     count = min(part.x.size, whole.x.size)
-    if count < MIN_SAMPLES and not is_scan:
+    if count < MIN_TRACE_SAMPLES and not is_scan:
         raise PatchfemError(
-            f"{part.source}: {count} samples; the parameters need at least {MIN_SAMPLES}"
+            f"{part.source}: {count} samples; the parameters need at least {MIN_TRACE_SAMPLES}"
         )
     primary, form_name = subtract_form(whole, form)
     if short is not None:
         # The filter changes the plane or line, so the form is subtracted again after it.
         primary = subtract_form(filter_surface(primary, short)[0], form)[0]
     # A straight line has heights of round-off, of which parameters would be made.
-    if np.nanmax(np.abs(primary.z)) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
+    if np.nanmax(np.abs(primary.z)) <= HEIGHT_ROUND_OFF * np.nanmax(np.abs(whole.z)):
         primary = replace(primary, z=frozen_array(primary.z * 0.0))
 
     # Without a cut-off, the primary profile or the levelled scan is evaluated.
@@ -248,6 +248,10 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
                 f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
             )
         low, high = np.maximum(np.searchsorted(axis, np.add((first, last), near), "right") - 1, 0)
+        if low == high:
+            raise PatchfemError(
+                f"{surface.source}: the window contains a single sample along {name}; take a longer one"
+            )
         parts.append(slice(low, high + 1))
         axes[name] = axis[parts[-1]]
     return replace(surface, **axes, z=surface.z[tuple(reversed(parts))])

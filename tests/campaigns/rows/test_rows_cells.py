@@ -1,14 +1,11 @@
 """Rows of measured responses as readings: conditions, repeats, flags and scores."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, read_response_table
 from patchfem.core import G_N, PatchfemError
 
-TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"
 HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 MIL = 25.4e-6
 
@@ -18,20 +15,6 @@ def write_table(tmp_path, *rows):
     path = tmp_path / "rows.csv"
     path.write_text(HEAD + "\n".join(rows) + "\n", "utf-8")
     return path
-
-
-def test_exact_table_1_has_readings_of_report():
-    """Table 1 of the report has 27 accelerations and 8 displacements in 20 conditions and 6 runs."""
-    cells = read_response_table(TABLE_1)
-    assert (np.count_nonzero(cells.is_acceleration), np.count_nonzero(~cells.is_acceleration)) == (
-        27,
-        8,
-    )
-    assert len(cells.conditions) == 20 and cells.empty_rows == [
-        8
-    ]  # The condition 143 Hz, 8 g is unstable and has no reading.
-    assert np.count_nonzero(cells.unstable) == 4
-    assert len(set(cells.row_names)) == 6  # four frequencies, two of which are repeated
 
 
 def test_exact_conditions_that_differ_by_round_off_are_one(tmp_path):

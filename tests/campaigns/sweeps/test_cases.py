@@ -1,6 +1,5 @@
 """The cases of a sweep: their number, order and names."""
 
-from dataclasses import replace
 from itertools import product as combinations
 from pathlib import Path
 
@@ -9,7 +8,6 @@ from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem import SceneError
 from patchfem.campaigns import Cases, Request, SweepScene, read_cases
-from patchfem.campaigns.sweeps.cases import combine_cases
 from patchfem.scene import read_assignments
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
@@ -34,19 +32,6 @@ def test_exact_cases_are_all_combinations():
     assert cases.assignments(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
 
 
-def test_exact_rows_are_combined_with_axes():
-    """Rows of a table are combined with every value of an axis."""
-    rows = replace(make_cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), is_table=True)
-    cases = combine_cases([rows, make_cases("slide.speed=1 mm/s,2 mm/s")])
-    assert cases.is_table and cases.shape == (4,)
-    assert [cases.texts(number) for number in range(4)] == [
-        ("1 N", "0.3", "1 mm/s"),
-        ("1 N", "0.3", "2 mm/s"),
-        ("2 N", "0.4", "1 mm/s"),
-        ("2 N", "0.4", "2 mm/s"),
-    ]
-
-
 def test_exact_case_name_depends_on_values_only():
     """The name of a case depends on its values, not on their order, their units or the other cases."""
     scene = SweepScene(Path("a.toml"), BENCH)
@@ -68,18 +53,6 @@ def test_exact_case_name_depends_on_values_only():
         .tolist()
         == names
     )
-
-
-def test_exact_cases_with_same_pieces_are_neighbours():
-    """Cases with the same pieces are computed one after another."""
-    cases = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
-    assert cases.sort_by_pieces(range(6)) == [0, 2, 4, 1, 3, 5]
-    assert make_cases(*THREE).sort_by_pieces([3, 1, 2]) == [3, 1, 2]
-    cases = make_cases(
-        "drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm"
-    )
-    # Cases with the same patch are adjacent.
-    assert cases.sort_by_pieces(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]
 
 
 def test_exact_cases_with_shared_mesh_are_named_by_sweep():

@@ -106,25 +106,6 @@ def test_refuses_worker_with_other_version(monkeypatch):
                 Cluster(one.scheduler.address)
 
 
-@pytest.mark.parametrize("is_begun", [False, True])
-def test_lost_connection_says_how_to_go_on(is_begun):
-    """A connection that is lost before the sweep or between two chunks gives an error that says how to go on.
-
-    Once a connection that was lost before the first chunk gave the traceback of Dask.
-    """
-    with start_cluster() as one:
-        executor = Cluster(one.scheduler.address)
-        work = make_work(Path("a.toml"))
-        if is_begun:
-            executor.begin(work, is_silent=True)
-        executor.client.close()
-        with pytest.raises(Missing, match=r"is lost; start the scheduler again, and .* --resume"):
-            if is_begun:
-                executor.submit([0])
-            else:
-                list(executor.run(work, lambda **_: [0]))
-
-
 @pytest.mark.slow
 def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
     """A lost scheduler ends the sweep with code 4, and the finished cases are kept."""

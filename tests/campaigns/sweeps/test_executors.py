@@ -22,9 +22,8 @@ from patchfem.campaigns import (
 )
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import ChunkQueue, WorkerDeath
+from patchfem.campaigns.sweeps.sweep import WorkerDeath
 from patchfem.core import Missing, PatchfemError
 from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch.case_results import join_case_results
@@ -116,28 +115,6 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
         assert len((tmp_path / str(number)).read_text()) == (1 if once else 2)
     for number in lost:
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
-
-
-def test_exact_cases_of_failed_chunk_are_repeated_alone():
-    """The cases of a chunk with a failing case are repeated alone, and only the failing one is lost."""
-    chunks = ChunkQueue(range(100), 1, 100)
-    lost = []
-    assert chunks.record_death(chunks.take_chunk()) == []
-    # they wait until no other case is computed
-    assert chunks.take_chunk(is_idle=False) is None
-    for number in range(100):
-        assert chunks.take_chunk() == [number]
-        lost += chunks.record_death([number]) if number == 61 else []
-    assert lost == [61] and chunks.take_chunk() is None
-
-
-@pytest.mark.slow
-def test_exact_cluster_equals_local_executor():
-    """A Dask cluster gives the same results as a single process."""
-    pytest.importorskip("distributed")
-    results, _ = run_all_cases(make_work(), Cluster("", 1))
-    expected, _ = run_all_cases(make_work(), LocalExecutor())
-    assert_same_results(results, expected, range(8))
 
 
 def test_refuses_unknown_executors(monkeypatch):

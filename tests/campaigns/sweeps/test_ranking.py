@@ -19,11 +19,6 @@ def evaluate_ishigami(x):
     return np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
 
 
-def evaluate_threshold(x):
-    """Return a discontinuous function (n,) of points (n, 3), zero where the interface sticks."""
-    return np.where(x[:, 0] + 0.3 * x[:, 1] > 0.6, x[:, 0] + x[:, 2], 0.0)
-
-
 def draw_points(count, keys, seed):
     """Return `count` scrambled Sobol points in the unit cube, (count, keys)."""
     return qmc.Sobol(keys, rng=np.random.default_rng(seed)).random(count)
@@ -58,25 +53,6 @@ def test_exact_intervals_cover_sobol_indices_of_ishigami(count):
     assert np.abs(indices["total"] - TOTAL).max() < 0.03
     assert np.abs(indices["first"] - FIRST).max() < 0.03
     assert np.all(indices["high"] - indices["low"] < {128: 1, 1024: 0.2}[count])
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_always_intervals_cover_indices_of_discontinuous_function(seed):
-    """The intervals cover the total indices of a discontinuous function."""
-    rng = np.random.default_rng(9)
-    a, b = rng.random((2, 200_000, 3))
-    truth = []
-    for k in range(3):
-        c = a.copy()
-        c[:, k] = b[:, k]
-        truth.append(
-            np.mean((evaluate_threshold(a) - evaluate_threshold(c)) ** 2)
-            / 2
-            / evaluate_threshold(a).var()
-        )
-    x = np.random.default_rng(seed).random((200, 3))
-    indices = collect_indices(compute_indices(x, evaluate_threshold(x)))
-    assert np.all((indices["low"] <= truth) & (truth <= indices["high"]))
 
 
 def test_exact_indices_of_grid_agree_with_its_variances():

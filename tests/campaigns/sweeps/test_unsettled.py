@@ -2,8 +2,11 @@
 
 import numpy as np
 from scene_texts import ELASTIC_JOINT
+from sweep_tables import make_table
 
 import patchfem as pf
+from patchfem.campaigns.sweeps.changes import analyse
+from patchfem.export.sweeps.words import make_verdict
 
 DRIVE = '[drive]\nkind = "force"\nforce = "1 N"\nfrequency = "220 Hz"\ncycles = 100\n'
 JOINT = ELASTIC_JOINT + DRIVE
@@ -34,3 +37,22 @@ def test_sticking_cases_that_still_vibrate_are_transient():
         true = np.array([find_steady_amplitude(force, 220.0) for force in forces])
         assert (np.abs(values - true) <= errors + 1e-6 * true).all()
     assert pf.run(JOINT, **{"drive.cycles": 2000}).outcome == "stuck"
+
+
+def test_exact_single_settled_case_has_no_range():
+    """A sweep of which one case settled states no range and no limit, also of a measure that only unsettled cases have."""
+    outcome = np.array(["steady", "transient", "transient", "transient"], object)
+    columns = {
+        "loop_area": np.array([np.nan, 1.0, 2.0, 3.0]),
+        "slip_amplitude": np.arange(1.0, 5.0),
+    }
+    table = make_table({"normal.load": np.arange(1.0, 5.0)}, columns, outcome=outcome)
+    analysis = analyse(table)
+    assert analysis.ranges == analysis.limits == []
+    verdict = make_verdict(table, analysis)
+    assert verdict[0] == "Only one of 4 cases settled, so that no change is known."
+    table.outcome[:] = "steady"
+    assert (
+        "slip amplitude changes most: from 1 at 1 to 4 at 4"
+        in make_verdict(table, analyse(table))[0]
+    )

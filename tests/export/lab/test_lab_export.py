@@ -1,13 +1,10 @@
 """Histories and loops in laboratory formats agree to the last bit when other programs read them."""
 
-import json
-
 import h5netcdf
 import numpy as np
 import pytest
 import pyuff
 from command_line import run_cli
-from lab_files import BOND, MU, SCENE, SI, elastic_plastic_loop, make_record, write_universal
 from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
@@ -23,60 +20,6 @@ def read_uff_functions(path):
         for dataset in pyuff.UFF(str(path)).read_sets()
         if dataset["type"] == 58
     }
-
-
-def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
-    """A loop that pyuff wrote is imported and fitted; the parameters agree with those of the loop within 1e-6.
-
-    The exported file has the same numbers as the imported one, to the last bit.
-    """
-    time, slide, force = elastic_plastic_loop()
-    write_universal(
-        tmp_path / "lab.uff", [SI, make_record(time, slide, 8), make_record(time, force, 13)]
-    )
-    (tmp_path / "scene.toml").write_text(SCENE)
-    assert run_cli("import", tmp_path / "lab.uff", "-o", tmp_path / "loop.csv").code == 0
-    answer = run_cli(
-        "fit",
-        tmp_path / "scene.toml",
-        "--to",
-        tmp_path / "loop.csv",
-        "-o",
-        tmp_path / "fit",
-        "-q",
-        "--free",
-        "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um",
-        "--json",
-    )
-    assert answer.code == 0, answer.err
-    values = json.loads(answer.out)["values"]
-    assert values["friction.static"]["value"] == pytest.approx(MU, rel=1e-6)
-    assert values["friction.bond_length"]["value"] == pytest.approx(BOND, rel=1e-6)
-    assert run_cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
-    exported = read_uff_functions(tmp_path / "back.uff")
-    for name, expected, kind in (("slide", slide, 8), ("force", force, 13)):
-        assert exported[name]["data"].tobytes() == expected.tobytes()
-        assert exported[name]["x"].tobytes() == time.tobytes()
-        assert (
-            exported[name]["ordinate_spec_data_type"] == kind and exported[name]["func_type"] == 1
-        )
-    measured = exported["force over slide"]
-    fitted = exported["fitted over slide"]
-    assert measured["x"].tobytes() == slide.tobytes()
-    assert measured["data"].tobytes() == force.tobytes()
-    assert fitted["data"] == pytest.approx(force, abs=1e-4)
-    second_import = run_cli(
-        "import",
-        tmp_path / "back.uff",
-        "-o",
-        tmp_path / "again.csv",
-        "--map",
-        "displacement=slide",
-        "--map",
-        "force=force",
-    )
-    assert second_import.code == 0, second_import.err
-    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "loop.csv").read_bytes()
 
 
 def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):

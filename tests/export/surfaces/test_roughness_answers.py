@@ -98,16 +98,3 @@ def test_exact_scan_has_areal_parameters_and_a_map():
     assert answer.data["height_map"].values.shape == (90, 160) and "primary" not in answer.data
     for name in answer.quantities:
         assert quantities.describe(name, "profile")
-
-
-def test_exact_reasons_of_missing_autocorrelation_length():
-    """White noise has no length that the raster resolves; of a long wave it does not fall to 0.2 within half of a side."""
-    x = np.arange(80) * 1e-6
-    noise = 1e-8 * np.random.default_rng(2).normal(size=(80, 80))
-    wave = 1e-8 * np.ones((80, 1)) * np.cos(2 * np.pi * x / 130e-6)
-    for z, reason in (
-        (noise, "it is shorter than two steps, which do not resolve it"),
-        (wave, "the autocorrelation does not fall to 0.2 within half of each side"),
-    ):
-        values = roughness.make_answer([make_report(Areal(x, x, z, "scan.csv"))]).quantities
-        assert values["Str"].value is None and values["Str"].reason == reason

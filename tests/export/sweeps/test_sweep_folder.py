@@ -12,7 +12,7 @@ from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.export import store
-from patchfem.export.charts.sweeps import list_measures
+from patchfem.export.folder import Folder
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -137,20 +137,19 @@ def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
         assert message == failed["message"] and "friction.static" in message
 
 
-def test_pages_name_cases_by_keys_and_begin_with_the_headline(scene_file, tmp_path):
-    """A page of several cases names them by their keys; the menu of a sweep begins with the measure of its headline.
-
-    The second key is needed, because the page of one key draws all main measures at once.
-    """
-    over = ("--over", "friction.static=0.1,0.2", "--over", "drive.acceleration=4 g,5 g")
+def test_exact_partial_files_of_killed_writers_are_removed(scene_file, tmp_path):
+    """A hidden partial file that a killed writer left in the folder of a run or of a sweep is gone after the next one."""
+    name = ".sweep.0123456789abcdef.partial.csv"
     folder = tmp_path / "swept"
-    run_cli("sweep", scene_file, *over, "-o", folder, "--keep", "results")
-    page = tmp_path / "both.html"
-    cases = [folder / "cases" / row["case"] for row in read_rows(folder)[:2]]
-    assert run_cli("report", *cases, "-o", page).code == 0
-    text = page.read_text("utf-8")
-    assert "static 0.1, acceleration 4 g" in text and "static 0.1, acceleration 5 g" in text
+    over = ("--over", "friction.static=0.1,0.2")
+    run_cli("sweep", scene_file, *over, "-o", folder)
+    (folder / name).write_text("half a table", "utf-8")
+    run_cli("sweep", scene_file, *over, "-o", folder, "--resume")
+    assert {path.name for path in folder.iterdir()} == {*TABLES, "cases", "chunks"}
 
-    answer = store.read(folder)
-    first = list_measures({"": answer})[0]
-    assert answer.verdict[0].lower().startswith(first.replace("_", " "))
+    partial = tmp_path / "run.partial"
+    (partial / "interfaces").mkdir(parents=True)
+    (partial / "interfaces" / name).write_text("half a file", "utf-8")
+    with Folder(tmp_path / "run", resume=True) as run:
+        (run.path / "summary.json").write_text("{}", "utf-8")
+    assert not list((tmp_path / "run").rglob(".*")) and (tmp_path / "run" / "summary.json").exists()

@@ -1,14 +1,11 @@
 """Answer and page of a sweep: sentences, quantities and charts agree with sweep.csv."""
 
 import csv
-import gzip
-import json
-import re
-from base64 import b64decode
 
 import numpy as np
 import pytest
 from command_line import run_cli
+from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
 
 from patchfem.export import store
@@ -50,21 +47,6 @@ def folders(tmp_path_factory):
     return found
 
 
-def read_figures(text: str) -> list[dict]:
-    """Return the figures in the data of a page."""
-    packed = re.search(r'id="data">(.*?)</script>', text, re.S)[1]
-    return json.loads(gzip.decompress(b64decode(packed)))
-
-
-def unpack(array) -> np.ndarray:
-    """Return an array of a figure."""
-    if isinstance(array, list):
-        return np.array(array, float)
-    return np.frombuffer(
-        b64decode(array["bdata"]), {"f4": np.float32, "i1": np.int8}[array["dtype"]]
-    )
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_verdict_is_short(folders, kind):
     """The headline has at most 30 words, the verdict at most four sentences, and both are those of sweep.json."""
@@ -94,7 +76,9 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
     for button in buttons:
         name = button["label"].replace(" ", "_")
         shown = zip(figure["data"], button["args"][0]["visible"], strict=True)
-        drawn = np.concatenate([unpack(trace["y"]) for trace, is_shown in shown if is_shown])
+        drawn = np.concatenate(
+            [np.asarray(trace["y"], float) for trace, is_shown in shown if is_shown]
+        )
         cells = np.array([float(row[name] or "nan") for row in rows])
         values = answer.data[name].values.ravel()
         np.testing.assert_array_equal(np.sort(values), np.sort(cells))

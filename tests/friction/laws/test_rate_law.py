@@ -127,4 +127,4 @@ def test_exact_weak_drive_acts_as_viscous_damper():
         MASS * level / (damping * OMEGA), rel=3e-4
     )
     assert result.outcome is Outcome.STEADY
-    assert any("never sticks" in text and "54.9 mm/s" in text for text in result.extra["notes"])
+    assert any("never sticks" in text and "54.9 mm/s" in text for text in result.notes)

@@ -103,6 +103,7 @@ def test_always_gain_and_transfer_of_scans_are_named():
     assert found.values["grown_volume"].value == pytest.approx(true, rel=0.1)
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("kind", ["smooth track", "crater", "deposits", "remounted", "exchanged"])
 def test_always_kinds_of_change_have_right_verdict(kind):
     """Rotated and shifted scans of five kinds of change have no false verdict, and the volume lies in its interval."""

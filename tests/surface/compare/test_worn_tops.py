@@ -2,11 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter1d
 from test_traces import NM, UM, compare_surfaces, draw_surface, has_finding, make_pair
-
-from patchfem.surface.compare.raster import clean_surface
-from patchfem.surface.profile import Profile
 
 START = 40  # sample of the surface at which the second trace starts
 
@@ -55,20 +51,6 @@ def test_always_tops_that_are_all_worn_a_little_are_found(seed):
     assert 0.3 * worn.mean() < mean.value < worn.mean() and mean.low < worn.mean()
 
 
-def test_always_narrow_tops_of_a_short_trace_are_found():
-    """Tops a few samples wide are worn although a drift may be as large as their area."""
-    random = np.random.default_rng(3)
-    surface = gaussian_filter1d(random.normal(size=500), 2.0)
-    surface *= 0.4 * UM / surface.std()
-    worn = cut_tops(surface, 0.5 * UM, 80, 220)[:300]
-    drift = gaussian_filter1d(random.normal(size=300), 40.0)
-    drift *= 8 * NM / drift.std()
-    found = compare_surfaces(*make_pair(worn + drift, 3, surface=surface))
-    assert found.verdict.code == "worn"
-    area = found.values["worn_area"]
-    assert area.low <= worn.sum() * UM <= area.high
-
-
 @pytest.mark.parametrize("gain", [0.98, 1.02])
 def test_always_drift_and_cut_tops_do_not_pass_for_another_gain(gain):
     """The gain is that of the valleys, with a drift of four deviations of the noise and cut tops."""
@@ -91,11 +73,3 @@ def test_always_end_of_a_track_with_worn_valleys_does_not_reach_to_other_tops(se
     width = compare_surfaces(*make_pair(worn, seed, surface=surface)).track.values["width"]
     assert width.low <= 1500 * UM <= width.high
     assert width.high - width.low < 0.03 * width.value
-
-
-def test_exact_edge_of_a_track_and_ends_of_a_slope_are_no_spikes():
-    """No height beside a step of 3 um is left out, nor one at the ends of a smooth trace."""
-    x = np.arange(400) * UM
-    z = 2 * UM * np.sin(np.arange(400) / 12) + draw_surface(3, 400) / 100
-    z[200:] -= 3 * UM
-    assert np.isfinite(clean_surface(Profile(x, z, "step")).z).all()

@@ -5,7 +5,6 @@ import re
 import sys
 import types
 import zipfile
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -147,17 +146,6 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
         read_bytes(tmp_path, data, name, units)
 
 
-@pytest.mark.skipif(
-    find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed"
-)
-def test_refuses_zip_file_without_extra(tmp_path):
-    """A text in a zip file is refused with the advice to unpack it, and an X3P file with the extra to install."""
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
-        archive.writestr("a.csv", "x [um],z [um]\n0,1\n5,2\n")
-    with pytest.raises(PatchfemError, match=r"unpack it if it contains a text; X3P .*\[profiles\]"):
-        read_surface(tmp_path / "a.zip")
-
-
 @pytest.mark.parametrize(
     "table", [TRACE, TRACE.T, TRACE.astype("f4"), TRACE.astype(">f8"), np.asfortranarray(TRACE)]
 )
@@ -234,6 +222,35 @@ def test_exact_scan_of_reader_library(tmp_path, monkeypatch, packed):
     with pytest.raises(PatchfemError, match="the unit of x is not given"):
         read_bytes(tmp_path, data, "scan.opdx")
     assert read_bytes(tmp_path, data, "scan.opdx", ("mm", "m")).x[1] == 1e-3
+
+
+class LargeStandIn(StandIn):
+    """Reader of a scan of 2e8 heights, which it cannot deliver."""
+
+    nb_grid_pts = (20000, 10000)
+    topography = None
+
+
+def test_refuses_scan_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
+    """A zip file that states 2 GiB, and a scan of 2e8 heights in a small file, are refused before they are read."""
+    use_library(monkeypatch, lambda file: LargeStandIn("um"))
+    with pytest.raises(
+        PatchfemError, match=r"scan.opdx: 200000000 heights, more than 5e\+07; export a part"
+    ):
+        read_bytes(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
+
+    path = tmp_path / "a.x3p"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("bindata/data.bin", bytes(2000))
+    use_library(monkeypatch, None)
+    data = path.read_bytes()
+    # The size of the unpacked file stands in its entry in the directory at the end.
+    start = data.index(b"PK\x01\x02")
+    data = data[:start] + data[start:].replace(
+        (2000).to_bytes(4, "little"), (2**31).to_bytes(4, "little")
+    )
+    with pytest.raises(PatchfemError, match=r"b.x3p: more than 1024 MiB after it is unpacked; exp"):
+        read_bytes(tmp_path, data, "b.x3p")
 
 
 def test_exact_mat_files_of_scipy_agree(tmp_path):

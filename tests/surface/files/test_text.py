@@ -9,7 +9,6 @@ import pytest
 from traces import UM, draw_uneven_trace, format_trace
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.formatting import format_length
 from patchfem.surface import read_profile
 
 
@@ -93,15 +92,6 @@ def test_exact_rounded_x_becomes_evenly_spaced(tmp_path, step):
         )
     else:
         assert profile.notes == ()
-
-
-@pytest.mark.parametrize("unit, metres", [("mil", 25.4e-6), ("in", 0.0254), ("mm", 1e-3)])
-def test_exact_rounded_x_in_every_unit(tmp_path, unit, metres):
-    """Positions rounded to a tenth of their unit become evenly spaced, in units of the inch as well."""
-    rows = "".join(f"{0.15625 * k:.1f},{0.001 * (k % 3)}\n" for k in range(300))
-    profile = read_content(tmp_path, f"x [{unit}],z [{unit}]\n{rows}")
-    assert np.diff(profile.x) == pytest.approx(0.15625 * metres, rel=1e-3)
-    assert f"x is rounded to {format_length(0.1 * metres)} in the file" in profile.notes[0]
 
 
 @pytest.mark.parametrize("steps", [(1.0, 1.4), (1.37, 0.63, 1.0)])

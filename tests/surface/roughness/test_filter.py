@@ -12,25 +12,6 @@ from patchfem.surface.roughness.filter import filter_surface, mean_surface
 
 UM = 1e-6
 ALPHA = np.sqrt(np.log(2) / np.pi)  # ISO 16610-21
-WAVE = 400 * UM
-
-
-def filtered_rms(cutoff: float) -> float:
-    """Return Rq of a sine of amplitude 1 and wavelength WAVE after the filter of ISO 16610-21."""
-    return (1 - 2.0 ** -((cutoff / WAVE) ** 2)) / np.sqrt(2)
-
-
-@pytest.mark.parametrize("cutoff, known", [(80, 0.0193359), (250, 0.1677264), (800, 0.6629126)])
-def test_exact_filtered_sine_agrees_with_closed_form(cutoff, known):
-    """Rq of a filtered sine agrees with the closed form within 1e-9 away from the ends.
-
-    Over the whole trimmed trace of 1000 waves it agrees within 1e-5.
-    """
-    assert filtered_rms(cutoff * UM) == pytest.approx(known, rel=3e-6)
-    trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
-    rough = filter_surface(trace, cutoff * UM)[1].z / 1e-6
-    assert abs(rough[2000 : 2000 + 400 * 900].std() - filtered_rms(cutoff * UM)) < 1e-9
-    assert abs(np.sqrt((rough**2).mean()) - filtered_rms(cutoff * UM)) < 1e-5
 
 
 @given(st.floats(20.0, 900.0), st.integers(0, 2**32 - 1))

@@ -4,9 +4,7 @@ The tests need PATCHFEM_DATA. One of the codes takes Rq about the mean of the ro
 about its mean line.
 """
 
-import json
 import os
-from pathlib import Path
 
 import pytest
 
@@ -17,18 +15,6 @@ pytestmark = pytest.mark.skipif(
 )
 UM = 1e-6
 TRACES = ("dektak-1.csv", "mitutoyo-2.csv.gz")
-
-
-@pytest.fixture(scope="module")
-def data_folder() -> Path:
-    """Return the folder of measured data."""
-    return Path(os.environ["PATCHFEM_DATA"])
-
-
-@pytest.fixture(scope="module")
-def reference_values(data_folder) -> dict:
-    """Return the reference values of the measured data."""
-    return json.loads((data_folder / "truth.json").read_text())
 
 
 @pytest.fixture(scope="module")

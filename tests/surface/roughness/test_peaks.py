@@ -128,7 +128,7 @@ def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
     assert stiffnesses[1] == pytest.approx(stiffnesses[0], rel=1e-4) and stiffnesses[
         2
     ] == pytest.approx(stiffnesses[1], rel=1e-12)
-    notes = [" ".join(note for note in run.extra["notes"] if "Persson" in note) for run in runs]
+    notes = [" ".join(note for note in run.notes if "Persson" in note) for run in runs]
     assert notes[0] and notes[1]
     assert not notes[2]
     assert any("Persson" in text for text in pf.plan(pasted).verdict)

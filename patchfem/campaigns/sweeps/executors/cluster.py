@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from logging import CRITICAL, getLogger
 from pathlib import Path
@@ -109,9 +110,7 @@ class Cluster(FutureExecutor):
         scene = replace(scene, path=Path(os.path.abspath(scene.path)))
         # Dask repeats this task if the workers that store its result die.
         with self._report_lost_connection():
-            self.shared = self.client.submit(
-                _identity, replace(work, sweep_scene=scene), pure=False
-            )
+            self.shared = self.client.submit(copy, replace(work, sweep_scene=scene), pure=False)
             self.executor = self.client.get_executor(pure=False)
 
     def submit(self, chunk: list[int]) -> Future:
@@ -134,11 +133,6 @@ class Cluster(FutureExecutor):
         self.client.close()
         if self.local_cluster is not None:
             self.local_cluster.close()
-
-
-def _identity(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep unchanged; a call as a Dask task stores them on the cluster."""
-    return work
 
 
 def _compute_on_worker(work: WorkerData, chunk: list[int], common_data: str) -> tuple[float, tuple]:

@@ -24,6 +24,7 @@ from ....response.errors import finer_errors
 from ....response.measures import Values, compute_peak
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
+from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
 from ..solution import Fields, Solution, compute_sampled_loop
@@ -52,20 +53,17 @@ class CycleRun(NamedTuple):
     - window: histories of the cycle
     - extremes (1, 2): smallest and largest output [m]
     - ledger: energies [J] by name
+    - reversals: displacement [m], friction force [N] and slip [m] at each of them (`SteadyMotion.find_reversals`)
     """
 
     window: Response
     extremes: np.ndarray
     ledger: Values
+    reversals: tuple[tuple[float, float, float], ...]
 
 
 class BalanceEvaluator(RunEvaluator):
-    """Evaluation of one cycle of a motion from harmonic balance.
-
-    `turns` are the reversals of the cycle, see `SteadyMotion.find_reversals`.
-    """
-
-    turns: tuple = ()
+    """Evaluation of one cycle of a motion from harmonic balance."""
 
     def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the check of the friction work, and the measures that depend on reversals.
@@ -86,14 +84,12 @@ class BalanceEvaluator(RunEvaluator):
             return IntegratedMeasures(values)
         book = run.ledger | {"booked": run.ledger["friction"]}
         values["work_check"] = compute_work_check(book | compute_sampled_work(run.window))
-        if not self.turns:
+        if not run.reversals:
             return IntegratedMeasures(values)
-        _, turn_forces, turn_slips = zip(*self.turns)
-        forces = np.append(turn_forces, run.window.force)
-        slips = np.append(turn_slips, run.window.slip)
-        values["friction_force_peak"] = float(np.abs(forces).max())
-        values["slip_amplitude"] = float(np.ptp(slips)) / 2
-        return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
+        slides, forces, slips = zip(*run.reversals)
+        values["friction_force_peak"] = float(np.abs([*forces, *run.window.force]).max())
+        values["slip_amplitude"] = float(np.ptp([*slips, *run.window.slip])) / 2
+        return IntegratedMeasures(values, reversals=(tuple(zip(slides, forces)),))
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return the friction loop of the cycle.
@@ -192,11 +188,7 @@ class BalanceFinder:
                 errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
             )
         name = balanced_regime(motion)
-        extra = {
-            "regime": name if stability.stable else f"{name}, unstable",
-            "multipliers": stability.multipliers,
-            "harmonics": motion.harmonics,
-        }
+        regime = name if stability.stable else f"{name}, unstable"
         outcome = Outcome.STUCK if name == "stuck" else Outcome.STEADY
         message = ""
         if not stability.stable:
@@ -215,8 +207,9 @@ class BalanceFinder:
             perf_counter() - begin,
             message=message,
             errors=errors,
-            extra=extra,
             notes=notes,
+            settings=Settings(harmonics=motion.harmonics),
+            periodic=SteadyData(regime, stability.multipliers),
         )
 
     def _solve_balance(self, drive, guess) -> SteadyMotion:
@@ -305,21 +298,6 @@ class BalanceFinder:
         """Participation (n,) of the point whose displacement is measured."""
         return self.modes.output if self.modes.gauge is None else self.modes.gauge
 
-    def _make_curve_point(self, motion) -> CurvePoint:
-        """Convert a steady motion with known stability to a point of a response curve."""
-        kind = balanced_regime(motion)
-        stable = bool(motion.stable)
-        drive = SineDrive(motion.level, motion.omega, self.model.rig.drive.signal.moving)
-        return CurvePoint(
-            drive,
-            self._compute_curve_measures(motion, drive),
-            {},
-            kind if stable else f"{kind}, unstable",
-            float(np.abs(motion.multipliers).max(initial=0.0)),
-            stable,
-            motion,
-        )
-
     def _compute_curve_measures(self, motion, drive) -> Values:
         """Return a dict of the measures of a point of a response curve."""
         response = make_cycle_response(motion, self.modes, drive, BALANCE_SAMPLES_PER_CYCLE)
@@ -347,9 +325,8 @@ class BalanceFinder:
         top = motion.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = CycleRun(response, extremes, book)
+        run = CycleRun(response, extremes, book, motion.find_reversals())
         evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
-        evaluator.turns = motion.find_reversals()
         return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
 
     def trace_curve(self, drive) -> ResponseCurve:
@@ -363,7 +340,7 @@ class BalanceFinder:
             self.harmonics,
             self.tolerance,
         )
-        points = [self._convert_branch_point(point, first) for point in branch.points]
+        points = [self._make_curve_point(point, first) for point in branch.points]
         return ResponseCurve(points, branch.folds, tuple(_note_end_of_branch(branch, drive.high)))
 
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
@@ -391,7 +368,7 @@ class BalanceFinder:
         motion = branches.find_point_between(
             self.modes, drive, first.guess, second.guess, fraction, self._sweep_width
         )
-        return self._convert_branch_point(motion, drive)
+        return self._make_curve_point(motion, drive)
 
     @property
     def _sweep_width(self) -> float:
@@ -399,20 +376,25 @@ class BalanceFinder:
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
-    def _convert_branch_point(self, motion, drive) -> CurvePoint:
+    def _make_curve_point(self, motion, drive) -> CurvePoint:
         """Convert a steady motion on a branch to a curve point with error estimates."""
         motion = add_stability(motion, self.modes) if motion.stable is None else motion
-        point = self._make_curve_point(motion)._replace(
-            regime="stable" if motion.stable else "unstable"
-        )
-        errors = self._estimate_errors(
-            point.values, point.guess, point.drive, self._compute_curve_measures
-        )
+        sine = SineDrive(motion.level, motion.omega, drive.moving)
+        values = self._compute_curve_measures(motion, sine)
+        errors = self._estimate_errors(values, motion, sine, self._compute_curve_measures)
         for name in errors:
-            errors[name] += HARMONIC_ROUND_OFF * abs(point.values[name])
+            errors[name] += HARMONIC_ROUND_OFF * abs(values[name])
         if "acceleration_distortion" in errors:
             errors["acceleration_distortion"] += HARMONIC_ROUND_OFF
-        return point._replace(errors=errors)
+        return CurvePoint(
+            sine,
+            values,
+            errors,
+            "stable" if motion.stable else "unstable",
+            float(np.abs(motion.multipliers).max(initial=0.0)),
+            bool(motion.stable),
+            motion,
+        )
 
 
 def _note_end_of_branch(branch: branches.Branch, last: float) -> list[str]:

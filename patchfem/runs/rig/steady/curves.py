@@ -3,15 +3,14 @@
 In: curve points from a finder. Out: columns of a response curve.
 """
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....core import Response, SineDrive
-from ....dynamics.curve_points import sample_adaptively
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
+from ...results.patch_rows import Arrays
 
 # Name of the measure in each column of a response curve.
 COLUMN_MEASURES = {
@@ -20,11 +19,8 @@ COLUMN_MEASURES = {
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
 }
-# Relative error of the measures of an event-driven motion, which has round-off only.
-EXACT_RELATIVE_ERROR = 1e-9
 # Round-off of the third harmonic of the acceleration relative to the first one.
 HARMONIC_ROUND_OFF = 1e-12
-N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 # Largest relative error of linear interpolation between the points of a response curve.
 INTERPOLATION_TOL = 0.01
 
@@ -80,16 +76,6 @@ class ResponseCurve(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def estimate_exact_errors(values: Values, residual: float) -> Values:
-    """Estimate the errors of an event-driven steady motion from its residual over a period."""
-    errors = {}
-    for name, value in values.items():
-        if value is not None:
-            round_off = HARMONIC_ROUND_OFF * (name == "acceleration_distortion")
-            errors[name] = abs(value) * (EXACT_RELATIVE_ERROR + residual) + round_off
-    return errors
-
-
 def describe_instability(multipliers) -> str:
     """Return the message on an unstable steady motion with these Floquet multipliers (m,)."""
     size = np.abs(multipliers).max()
@@ -97,75 +83,6 @@ def describe_instability(multipliers) -> str:
         f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; "
         'use accuracy.method = "march"'
     )
-
-
-class TracedCurve:
-    """Base class of finders whose response curve has no folds; subclasses compute its points."""
-
-    def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
-        """Return the distance [rad/s] between two points of a response curve."""
-        return abs(second.drive.omega - first.drive.omega)
-
-    def compute_point_between(
-        self, first: CurvePoint, second: CurvePoint, fraction: float
-    ) -> CurvePoint:
-        """Compute the curve point at a fraction of the distance between two points.
-
-        Parameters
-        ----------
-        first, second : CurvePoint
-            Neighbouring points of the curve.
-        fraction : float
-            Fraction of the distance between the points, from the first one.
-        """
-        omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
-        return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
-
-
-def compute_response_curve(modes, drive, find_point) -> list[CurvePoint]:
-    """Compute the response curve of a frequency sweep, with more points where it bends.
-
-    The curve starts with N_SWEEP_POINTS frequencies and the natural frequencies. It is refined
-    until linear interpolation has an error of at most INTERPOLATION_TOL.
-
-    Parameters
-    ----------
-    modes
-        Modal basis.
-    drive : SweepDrive
-        Range of the frequency [Hz] and acceleration [m s-2].
-    find_point : callable
-        Function (sine, guess) that returns a CurvePoint, where guess is the initial guess from the
-        previous point or None.
-    """
-
-    def sample(frequency, before):
-        """Return the amplitude [m] at a frequency [Hz], and the curve point."""
-        sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
-        point = find_point(sine, before and before[1].guess)
-        return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
-
-    samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)[
-        1
-    ]
-    return [point for _, point in samples]
-
-
-def choose_start_frequencies(modes, drive) -> np.ndarray:
-    """Return the frequencies [Hz] of a response curve before its refinement.
-
-    They are N_SWEEP_POINTS frequencies over the range, and the natural frequencies in it, where a
-    peak may be narrower than the spacing.
-    """
-    space = np.geomspace if drive.logarithmic else np.linspace
-    ends = sorted((drive.low, drive.high))
-    natural_frequencies = modes.omega / (2 * np.pi)
-    frequencies = np.union1d(
-        space(*ends, N_SWEEP_POINTS),
-        natural_frequencies[(natural_frequencies > ends[0]) & (natural_frequencies < ends[1])],
-    )
-    frequencies = frequencies[np.append(True, np.diff(frequencies) > 1e-9 * frequencies[1:])]
-    return frequencies if drive.low < drive.high else frequencies[::-1]
 
 
 def find_largest_point(points) -> int:
@@ -178,7 +95,7 @@ def find_largest_point(points) -> int:
     return int(np.argmax(np.where(is_stable | ~is_stable.any(), sizes, -2.0)))
 
 
-def tabulate_curve(points, folds=()) -> dict:
+def tabulate_curve(points, folds=()) -> Arrays:
     """Return the columns of a response curve as a dict; NaN for unbounded motions.
 
     The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES

@@ -165,7 +165,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     solution = replace(
         solution,
         notes=(*solution.notes, *curve.notes),
-        extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
+        periodic=solution.periodic._replace(curve=tabulate_curve(points, curve.folds)),
         drive=peak_point.drive,
     )
     height = peak_point.values.get(AMPLITUDE, 0.0)

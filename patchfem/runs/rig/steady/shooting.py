@@ -11,7 +11,8 @@ from time import perf_counter
 import numpy as np
 
 from .... import compiled
-from ....core import NotConverged, Outcome, PatchfemError
+from ....core import NotConverged, Outcome, PatchfemError, SineDrive
+from ....dynamics.curve_points import sample_adaptively
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
@@ -19,19 +20,24 @@ from ....hybrid.records import Clock, Status, Window
 from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
+from ...results.result import Settings, SteadyData
+from ..engines import estimate_hybrid_errors
 from ..event_to_event import LumpedEvaluator
 from ..hybrid_laws import make_joints
 from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
+    HARMONIC_ROUND_OFF,
+    INTERPOLATION_TOL,
     CurvePoint,
     ObservedMotion,
     ResponseCurve,
-    TracedCurve,
-    compute_response_curve,
     describe_instability,
-    estimate_exact_errors,
 )
+
+# Relative error of the measures of an event-driven motion, which has round-off only.
+EXACT_RELATIVE_ERROR = 1e-9
+N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
@@ -46,7 +52,7 @@ FULL_SLIP_TOL = (
 )
 
 
-class ShootingFinder(TracedCurve):
+class ShootingFinder:
     """Solver for steady motions by Newton's method on the map of a period."""
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
@@ -103,41 +109,54 @@ class ShootingFinder(TracedCurve):
         begin = perf_counter()
         run = self._leave_grooves(drive)
         if run is not None:
-            return self._make_solution(run, drive, begin, "leaves its grooves")
+            solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
+            errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
+            periodic_data = SteadyData("leaves its grooves", np.zeros(0))
+            return replace(solution, steady=(None, None), errors=errors, periodic=periodic_data)
+
         motion = self.find_periodic_motion(drive, guess)
         state = None if motion.grows else motion.batch.states
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
         run = self.evaluator.integrate(drive, cycles, state, self.frames)
-        return self._make_periodic_solution(run, motion, drive, begin)
-
-    def _leave_grooves(self, drive):
-        """Return the run from rest that leaves the grooves, or None if there is none."""
-        if self.model.grooves is None or not self.model.grooves.lifted_mass:
-            return None
-        run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
-        return run if run.outcome is Outcome.LEAVES_GROOVES else None
-
-    def _make_periodic_solution(self, run, motion, drive, begin: float) -> Solution:
-        """Return the Solution of a periodic motion with its stability and errors."""
         is_stuck = self.evaluator.is_stuck(run)
+        solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
+
+        # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
+        values = solution.values
+        errors = self._estimate_errors(values, motion, run, drive, is_stuck=is_stuck)
+        known = {"drift_per_cycle": 0.0}
+        errors["drift_per_cycle"] = 0.0
+        dissipated = values.get("energy_dissipated")
+        if is_stuck and dissipated is not None:
+            known |= {"friction_work": dissipated, "loop_area": dissipated / run.cycles_done}
+            if not dissipated:
+                errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
+
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.grows or motion.is_stable
-        solution = self._make_solution(
-            run, drive, begin, regime if is_stable else f"{regime}, unstable"
-        )
-        reach = float(np.abs(run.extremes).max())
         outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
         if motion.grows:
             outcome = Outcome.GROWS
-        elif reach > self.model.rig.springs.travel:
+        elif float(np.abs(run.extremes).max()) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
         if not is_stable:
             outcome = Outcome.NOT_CONVERGED
-            solution = replace(solution, message=describe_instability(motion.multipliers))
+            regime = f"{regime}, unstable"
+        return replace(
+            solution,
+            values=values | known,
+            steady=(None, None),
+            outcome=outcome,
+            message=solution.message if is_stable else describe_instability(motion.multipliers),
+            errors=errors,
+            settings=Settings(map="shooting"),
+            periodic=SteadyData(regime, motion.multipliers, motion.change),
+        )
 
-        # The error of the fixed point adds to that of the steps.
+    def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
+        """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point."""
         coarse = replace(
-            self.evaluator.numerics,
+            self.numerics,
             local=hybrid_runs.COARSE * RTOL,
             steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
         )
@@ -145,30 +164,19 @@ class ShootingFinder(TracedCurve):
         start = None if motion.grows else motion.batch.states
         other_run = other.integrate(drive, run.cycles_done, start, 0)
         coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
-        shared = {name: value for name, value in solution.values.items() if name in coarse_values}
-        errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
+        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
         relative = find_relative_error(motion)
-        errors = {
-            name: errors.get(name, solution.errors.get(name, abs(value))) + relative * abs(value)
-            for name, value in solution.values.items()
-        }
-        # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
-        known = {"drift_per_cycle": 0.0}
-        dissipated = solution.values.get("energy_dissipated")
-        if is_stuck and dissipated is not None:
-            per_cycle = dissipated / run.cycles_done
-            known |= {"friction_work": dissipated, "loop_area": per_cycle}
-            if not dissipated:
-                errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
-        errors |= {"drift_per_cycle": 0.0}
-        extra = {"multipliers": motion.multipliers, "residual": motion.change, "map": "shooting"}
-        return replace(
-            solution,
-            values=solution.values | known,
-            outcome=outcome,
-            errors=errors,
-            extra=solution.extra | extra,
-        )
+        errors = {}
+        for name, value in values.items():
+            errors[name] = step_errors.get(name, RTOL * abs(value)) + relative * abs(value)
+        return errors
+
+    def _leave_grooves(self, drive):
+        """Return the run from rest that leaves the grooves, or None if there is none."""
+        if self.model.grooves is None or not self.model.grooves.lifted_mass:
+            return None
+        run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
+        return run if run.outcome is Outcome.LEAVES_GROOVES else None
 
     def _name_regime(self, motion, *, is_stuck: bool) -> str:
         """Return the name of the regime of a periodic motion, such as "2 stops" or "partial slip"."""
@@ -188,14 +196,6 @@ class ShootingFinder(TracedCurve):
         lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
         n_stops = int((faces[:, Window.STARTS] * lasts).max())
         return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
-
-    def _make_solution(self, run, drive, begin: float, regime: str) -> Solution:
-        """Return the Solution of a run with a regime."""
-        solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
-        errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
-        errors |= solution.errors or {}
-        extra = {"regime": regime, "multipliers": np.zeros(0)}
-        return replace(solution, steady=(None, None), errors=errors, extra=extra)
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, starting from a neighbouring motion or from rest.
@@ -229,19 +229,12 @@ class ShootingFinder(TracedCurve):
         return CurvePoint(
             drive=drive,
             values={name: value for name, value in values.items() if np.isfinite(value)},
-            errors=self._estimate_point_errors(values, motion),
+            errors=estimate_point_errors(values, find_relative_error(motion)),
             regime=regime if is_stable else f"{regime}, unstable",
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=is_stable,
             guess=motion.batch.states,
         )
-
-    def _estimate_point_errors(self, values: Values, motion) -> Values:
-        """Return the errors of the measures of a point of a response curve."""
-        relative = find_relative_error(motion)
-        errors = estimate_exact_errors(values, relative)
-        # The ratio of two harmonics has the error of the first.
-        return errors | {"acceleration_distortion": errors["acceleration_distortion"] + relative}
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion | None:
         """Compute what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
@@ -285,7 +278,7 @@ class ShootingFinder(TracedCurve):
         }
         values = {name: value for name, value in values.items() if value is not None}
         multiplier = float(np.exp(self._max_growth_rate * drive.period))
-        errors = estimate_exact_errors(values, 0.0)
+        errors = estimate_point_errors(values)
         return CurvePoint(drive, values, errors, "sliding", multiplier, True)
 
     @cached_property
@@ -301,13 +294,69 @@ class ShootingFinder(TracedCurve):
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, which has no folds.
+        """Compute the response curve over frequency, which has no folds, with more points where it bends.
 
-        Each point starts from the motion at the previous one.
+        The curve starts with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
+        the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
         """
-        return ResponseCurve(compute_response_curve(self.modes, drive, self.compute_curve_point))
+
+        def sample(frequency, before):
+            """Return the amplitude [m] at a frequency [Hz], and the curve point."""
+            sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
+            point = self.compute_curve_point(sine, before and before[1].guess)
+            return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
+
+        frequencies = choose_start_frequencies(self.modes, drive)
+        samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)[1]
+        return ResponseCurve([point for _, point in samples])
+
+    def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
+        """Return the distance [rad/s] between two points of a response curve."""
+        return abs(second.drive.omega - first.drive.omega)
+
+    def compute_point_between(
+        self, first: CurvePoint, second: CurvePoint, fraction: float
+    ) -> CurvePoint:
+        """Compute the curve point at a fraction of the distance between two points.
+
+        Parameters
+        ----------
+        first, second : CurvePoint
+            Neighbouring points of the curve.
+        fraction : float
+            Fraction of the distance between the points, from the first one.
+        """
+        omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
+        return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
+
+
+def choose_start_frequencies(modes, drive) -> np.ndarray:
+    """Return the frequencies [Hz] of a response curve before its refinement.
+
+    They are N_SWEEP_POINTS frequencies over the range, and the natural frequencies in it, where a
+    peak may be narrower than the spacing.
+    """
+    space = np.geomspace if drive.logarithmic else np.linspace
+    ends = sorted((drive.low, drive.high))
+    natural = modes.omega / (2 * np.pi)
+    natural = natural[(natural > ends[0]) & (natural < ends[1])]
+    frequencies = np.union1d(space(*ends, N_SWEEP_POINTS), natural)
+    frequencies = frequencies[np.append(True, np.diff(frequencies) > 1e-9 * frequencies[1:])]
+    return frequencies if drive.low < drive.high else frequencies[::-1]
 
 
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
     return motion.error + STEPS_ERROR * RTOL
+
+
+def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
+    """Return the errors of the measures of a point of a response curve from the relative error of the motion.
+
+    The ratio of two harmonics has the error of the first.
+    """
+    scale = EXACT_RELATIVE_ERROR + relative
+    errors = {name: scale * abs(value) for name, value in values.items()}
+    if "acceleration_distortion" in errors:
+        errors["acceleration_distortion"] += HARMONIC_ROUND_OFF + relative
+    return errors

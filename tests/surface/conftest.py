@@ -1,0 +1,19 @@
+"""Measured data for the tests of surfaces."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_folder() -> Path:
+    """Return the folder of measured data."""
+    return Path(os.environ["PATCHFEM_DATA"])
+
+
+@pytest.fixture(scope="session")
+def reference_values(data_folder) -> dict:
+    """Return the reference values of the measured data."""
+    return json.loads((data_folder / "truth.json").read_text())
