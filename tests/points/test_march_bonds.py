@@ -1,11 +1,9 @@
-"""Points of bonds in the march: the recursion, lists of any order and reading, and shear of the pieces."""
+"""Points of bonds in the march: the recursion, and lists of any order and reading behind springs."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bond_moments import advance_bonds
-from friction_paths import random_walk
 from march_paths import OMEGA, follow_path, make_one_mode
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -17,7 +15,6 @@ from patchfem.points import time_march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
-from patchfem.slip.shear_modes import shear_modes
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]
@@ -39,13 +36,6 @@ def make_shear(shape, stiffness):
     )
 
 
-def make_compliance(count, scale=1.0):
-    """Return a tangential compliance (m, m) with the logarithm of a half-plane, and the positions (m,)."""
-    x = (np.arange(count) + 0.5) / count - 0.5
-    gap = np.abs(x[:, None] - x)
-    return scale * np.log(2.5 / np.where(gap > 0, gap, 0.3 / count)), x
-
-
 def reversing_path(steps: int) -> np.ndarray:
     """Return a path with five reversals at different slides [m]."""
     t = np.linspace(0, 1, steps + 1)
@@ -60,60 +50,6 @@ def check_balance(found, path, rel=1e-12) -> None:
 
 
 # ---- prescribed paths
-
-
-def march_nodal_deflections(law, compliance, force, path):
-    """Return mean forces, forces and losses (k, 3) of the steps, without shear modes.
-
-    The nodal deflections satisfy (d_0 + d_1)/2 = C f, where f are the mean nodal forces of a step.
-    """
-    m = force.size
-    bonds = np.stack([law.initial * force, np.zeros(m), np.zeros(m)])
-    d = np.zeros(m)
-    weight = law.static / law.length
-    results = []
-    for dq in np.diff(path):
-        end = d.copy()
-        for _ in range(80):
-            _, mean, slope, _ = advance_bonds(bonds, dq - (end - d), force, law.length)
-            residual = (d + end) / 2 - compliance @ (weight * mean)
-            if np.abs(residual).max() < 1e-15:
-                break
-            change = np.linalg.solve(np.eye(m) / 2 + compliance * (weight * slope), residual)
-            fraction = 1.0
-            while fraction > 1e-6:
-                trial = end - fraction * change
-                trial_mean = advance_bonds(bonds, dq - (trial - d), force, law.length)[1]
-                gap = np.abs((d + trial) / 2 - compliance @ (weight * trial_mean)).max()
-                if gap < np.abs(residual).max():
-                    break
-                fraction /= 2
-            end = end - fraction * change
-        bonds, mean, _, dissipated = advance_bonds(bonds, dq - (end - d), force, law.length)
-        d = end
-        results.append(weight * np.array([mean.sum(), bonds[1].sum(), dissipated.sum() / 2]))
-    return np.array(results)
-
-
-@pytest.mark.parametrize("step", [0.8, 0.2])
-def test_exact_shear_modes_agree_with_nodal_deflections(step):
-    """With all shear modes forces and losses agree within 1e-9 with Newton's method for the nodal deflections.
-
-    The steps are up to two bond lengths long, or up to half of one, where the loop over the points vectorises.
-    """
-    law = Bonds(0.4, 1.0)
-    compliance, x = make_compliance(24)
-    force = (1 + 0.8 * x) / 24
-    modes = shear_modes(compliance, law.static * force, law.length, 24)
-    path = random_walk(11, 60, step)
-    found = follow_path(make_bond_contact(law, force, ROW, modes), path, frames=(path.size - 1,))
-    expected = march_nodal_deflections(law, compliance, force, path)
-    assert found.n_unsolved == 0
-    assert found.forces[:-1, 1] == pytest.approx(expected[:, 0], abs=1e-10)
-    assert found.forces[1:, 0] == pytest.approx(expected[:, 1], abs=1e-9)
-    assert found.energies[:-1, 0] == pytest.approx(expected[:, 2], abs=1e-9)
-    last = found.motion.snapshots[0]
-    assert last.bend == pytest.approx(compliance @ last.forces, abs=1e-9)
 
 
 @pytest.mark.parametrize(

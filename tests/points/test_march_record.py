@@ -19,7 +19,6 @@ from patchfem.points.contacts import (
 from patchfem.points.time_march import March, march
 from patchfem.slip.shear_modes import shear_modes
 
-from .test_march_bonds import make_compliance
 from .test_march_loads import reduce_to_shear_modes
 
 DRIVE = SineDrive(49.0, OMEGA)
@@ -33,6 +32,13 @@ STEPS = 80
 def make_tanh_contact(rows=ROW[None]):
     """Return the contact of 20 N tanh(v/(5 mm/s))."""
     return make_contact([TanhLaw(20.0, 5e-3).element(1.0)], rows)
+
+
+def make_compliance(count, scale=1.0):
+    """Return a tangential compliance (m, m) with the logarithm of a half-plane, and the positions (m,)."""
+    x = (np.arange(count) + 0.5) / count - 0.5
+    gap = np.abs(x[:, None] - x)
+    return scale * np.log(2.5 / np.where(gap > 0, gap, 0.3 / count)), x
 
 
 def make_compliant_contact():

@@ -17,8 +17,6 @@ from friction_paths import (
     triangle_path,
     upper_pressure,
 )
-from hypothesis import example, given
-from hypothesis import strategies as st
 from scipy.special import gammainc
 
 from patchfem.friction import Bonds
@@ -204,32 +202,3 @@ def test_exact_huge_steps_reach_steady_sliding(reading, order, tail, growth):
     assert run.mean[2] == pytest.approx(-limit.sum(), rel=1e-4)
     if reading == "stretch" or not growth:
         assert run.traction[3] == pytest.approx(run.traction[2], rel=1e-12)
-
-
-@st.composite
-def growth_parameters(draw):
-    """Draw growth parameters of the bonds, or none."""
-    if draw(st.booleans()):
-        return {}
-    return {
-        "ratio": draw(st.floats(0.05, 1)),
-        "rest_growth": draw(st.floats(1e-3, 10)),
-        "slip_growth": draw(st.floats(0.01, 10)),
-        "rest_speed": draw(st.floats(1e-4, 1)),
-    }
-
-
-@given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growth_parameters())
-@example([2e-309], {})
-def test_always_sum_over_bonds_is_passive(steps, growth):
-    """No step creates energy, and the stored energy of the recursion is never negative.
-
-    That of a list, whose sums have quadrature errors, is above -1e-4 of the work of a bond length at the limit.
-    """
-    law = Bonds(1.0, 1.0, **growth)
-    path = np.concatenate([[0], np.cumsum(steps)])
-    for tail, least in ((None, 0.0), (0.0, -1e-4 * X.size)):
-        run = march_bonds(law, path, BARE, 0.3, tail)
-        total = max(np.abs(run.mean * np.diff(path)).sum(), 1e-3)
-        assert run.dissipated.min() >= -1e-12 * total
-        assert run.stored.min() >= least

@@ -32,24 +32,6 @@ def integrate_rate_equation(slide, exponent, shape):
     return np.array(z)
 
 
-@pytest.mark.parametrize("exponent", [1.0, 2.0])
-def test_exact_symmetric_loop_agrees_with_closed_form(exponent):
-    """The symmetric loop of shape 1/2 agrees with its closed form: linear unloading, loading as 1 - exp(-x) or tanh x."""
-    amplitude = 3e-6
-    time = np.arange(12001) / 1e5
-    result = run_bench_along_path(
-        law_keys(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time)
-    )
-    loading_curve = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
-    z_peak = brentq(lambda z: loading_curve(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
-    x = 2 * amplitude / EPS - z_peak
-    half_area = (
-        LIMIT * EPS * (-(z_peak**2) / 2 + (x - z_peak if exponent == 1 else np.log(np.cosh(x))))
-    )
-    assert result.force[-751] == pytest.approx(LIMIT * z_peak, rel=1e-9)
-    assert result.ledger[0, -1] - result.ledger[0, -1001] == pytest.approx(2 * half_area, rel=1e-9)
-
-
 @pytest.mark.share(0, 3, 4)
 @pytest.mark.parametrize(
     "exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0), (0.5, 0.9)]

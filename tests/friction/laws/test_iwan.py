@@ -44,27 +44,6 @@ def test_exact_slider_cells_reproduce_model_parameters(chi, beta):
     )
 
 
-@pytest.mark.parametrize("chi", [-0.7, -0.4, 0.0])
-def test_order_of_micro_slip_dissipation_is_chi_plus_three(chi):
-    """The energy lost per cycle of micro-slip agrees with the closed form and grows with the power chi + 3 of the force."""
-    law = LAW.replace("-0.4", str(chi))
-    r, _, phi_max = density_parameters(FORCE, STIFFNESS, chi, BETA)
-    forces = []
-    losses = []
-    for fraction in (1e-3, 1e-2):
-        u = fraction * phi_max
-        time = np.arange(801) / 40000
-        result = run_bench_along_path(law, time, u * np.sin(2 * np.pi * 100 * time))
-        losses.append(result.ledger[2, -1] - result.ledger[2, 400])
-        forces.append(np.abs(result.force).max())
-        assert losses[-1] == pytest.approx(
-            4 * r * u ** (chi + 3) / ((chi + 2) * (chi + 3)), rel=2e-3
-        )
-    assert np.log(losses[1] / losses[0]) / np.log(forces[1] / forces[0]) == pytest.approx(
-        chi + 3, abs=0.1
-    )
-
-
 def test_exact_bench_loop_agrees_with_slider_density():
     """A bench path with minor loops agrees with the density resolved by 200 000 sliders within 1e-6 of the limit."""
     time, slide = shrinking_sine()
