@@ -47,13 +47,8 @@ def test_exact_matrices_of_common_formats(tmp_path, suffix):
     read_matrices = matrices.align_rows(
         matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass")
     )
-    assert [
-        np.array_equal(matrix.values.toarray(), expected)
-        for matrix, expected in zip(read_matrices, (K, M))
-    ] == [
-        True,
-        True,
-    ]
+    for matrix, expected in zip(read_matrices, (K, M)):
+        assert np.array_equal(matrix.values.toarray(), expected)
 
 
 def test_exact_matrix_of_scipy_sparse_file(tmp_path):
