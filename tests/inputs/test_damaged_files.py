@@ -81,7 +81,6 @@ FILES = {
         matrix_market(sparse.coo_array(K)),
         bytes,
     ),
-    "full.mtx": (read_stiffness, "full.mtx", matrix_market(K), bytes),
     "rows.mtx": (read_stiffness, "rows.mtx", b"1 1 4.0\n1 2 -1.5\n2 2 3e-3\n", bytes),
     "packed.npz": (read_stiffness, "packed.npz", bytes_of(np.savez_compressed, K=K), bytes),
     "v5.mat": (read_stiffness, "v5.mat", matlab5_bytes({"K": sparse.csc_array(K)}), bytes),
