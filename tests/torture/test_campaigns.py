@@ -15,8 +15,6 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a fo
 ALWAYS = {
     "grammar": 0.0005,
     "bytes": 0.001,
-    "profiles": 0.002,
-    "tables": 0.002,
     "hostile": 0.004,
 }
 SEED = 4
