@@ -167,3 +167,16 @@ def test_exact_band_holds_the_other_curve_at_common_amplitudes_only():
     sentence = words.describe_band_width(backbone)
     assert "widest at 2 um, where the damping ratio is 0.999 to 1.101 beside 1" in sentence
     assert sentence.endswith("and the frequency is within 10 % everywhere.")
+
+
+@pytest.mark.parametrize(
+    "amplitudes, words_of_span",
+    [
+        ([3e-6, 4e-6, 9e-6], "from 3 um to 9 um"),
+        ([3e-6], "at 3 um"),
+        ([3e-6, 3.0001e-6], "at 3 um"),
+    ],
+)
+def test_exact_span_of_missing_amplitudes_names_no_place_twice(amplitudes, words_of_span):
+    """Amplitudes without a result lie between two places, or at one if both ends are the same in print."""
+    assert words._describe_span(np.array(amplitudes)) == words_of_span

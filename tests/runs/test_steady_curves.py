@@ -6,7 +6,7 @@ from scene_runs import find_sentences
 from scene_texts import COULOMB, MODE, PLASTIC, POINT, SECOND, SWEEP
 
 import patchfem as pf
-from patchfem.runs.rig.steady import curves
+from patchfem.runs.rig.steady import shooting
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
 STEADY = {"accuracy.method": "harmonic"}
@@ -34,7 +34,7 @@ def linear_response(
 @pytest.fixture
 def reduced_point_count(monkeypatch):
     """Compute curves with 13 points, refined only where they bend."""
-    monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
+    monkeypatch.setattr(shooting, "N_SWEEP_POINTS", 13)
 
 
 @pytest.mark.usefixtures("reduced_point_count")

@@ -701,7 +701,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
             "measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width = half_power_width",
         ),
         Table(
-            "Shares of a key in the variance (Sobol indices)",
+            "Share of each key in the variance (Sobol indices)",
             "ranking",
             "measure = name, key, alone = first:rounded, with interactions = total:rounded, at least = low:rounded, "
             "at most = high:rounded",

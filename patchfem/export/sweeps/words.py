@@ -42,6 +42,8 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if n_known < 2:
         one = "Only one case has a result, so that no change is known."
         return one if n_known else "No case has a result."
+    if not analysis.ranges and int(table.has_settled.sum()) == 1:
+        return f"Only one of {n_known} cases has settled, so that no change is known."
     if not analysis.ranges:
         return f"No main measure of {n_known} cases changes by more than its error."
 
