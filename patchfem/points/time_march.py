@@ -726,7 +726,6 @@ class March:
             "friction": friction - float(sample[n + Sample.ENERGY] - self.first_energy),
             "peak_stored": float(totals[Total.STORED]),
             "iterations": float(totals[Total.ITERATIONS]),
-            "worst_iterations": float(totals[Total.WORST]),
             "stored": self.find_stored_energy(sample),
             "booked": friction,
             "sampled": float(sampled),
@@ -1186,7 +1185,7 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     """Return samples (k, w) with their step numbers (k,) and energies (3, k) as histories.
 
     `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
-    slips (k, i) of several interfaces, and forces of springs (k, s); load, moment and energy of the contact, heave and
+    slips (k, i) of several interfaces; load, moment and energy of the contact, heave and
     pitch of a contact that moves.
 
     Parameters
@@ -1232,7 +1231,6 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     is_interface = np.array([not one.is_spring for one in sets], bool)
     if len(sets) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
-        extra["spring_forces"] = forces[:, ~is_interface]
         if is_interface.any():
             extra |= {name: part[:, is_interface] for name, part in parts.items()}
 
