@@ -70,7 +70,7 @@ PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn
 class Snapshot(NamedTuple):
     """State of the m contact points of the first interface at an instant.
 
-    - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
+    - time [s], slide [m], force [N], slip [m] of the first port; heave [m] and pitch [rad]
     - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
       displacement by shear of the pieces [m]
     - nodal (k,): forces of the nodes [N]; (0,) if the pressure does not change
@@ -79,7 +79,6 @@ class Snapshot(NamedTuple):
 
     time: float
     slide: float
-    rate: float
     force: float
     slip: float
     heave: float
@@ -704,11 +703,10 @@ class March:
         n = self.modes.omega.size
         row = self.system.ports.rows[0]
         rest = sample[2 * n :]
-        motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
-        ports = rest[Sample.PORTS :]
-        place = (self.done + self.shift) * self.step, *motion, ports[0], ports[1]
+        time = (self.done + self.shift) * self.step
+        motion = (time, float(row @ sample[:n]), *rest[Sample.PORTS : Sample.PORTS + 2])
         return make_snapshot(
-            self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
+            self.kernels, self.system, (*motion, rest[Sample.HEAVE], rest[Sample.PITCH])
         )
 
     def find_ledger(self, sample) -> dict[str, float]:
@@ -836,7 +834,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
 
 
 def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapshot:
-    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot.
+    """Return the state of the points on the first port; `motion` has the first six fields of Snapshot.
 
     Parameters
     ----------
@@ -845,7 +843,7 @@ def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapsho
     system : march_rows.System
         Arrays of the march.
     motion : tuple
-        The first seven fields of Snapshot.
+        The first six fields of Snapshot.
     """
     points = system.points
     count = points.port.size

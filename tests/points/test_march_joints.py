@@ -1,5 +1,7 @@
 """Several interfaces, nonlinear springs and rigid friction in one march: closed forms, the motion from event to event."""
 
+from dataclasses import replace
+
 import numpy as np
 import problems
 import pytest
@@ -15,7 +17,6 @@ from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.hybrid.laws.masing import from_elements
 from patchfem.points.contacts import (
     BondSum,
-    add_springs,
     make_bond_contact,
     make_contact,
     make_cubic_spring,
@@ -158,7 +159,8 @@ def test_always_list_beside_spring_converges():
     law = Bonds(0.4, 2e-6, 1.0, "report")
     modes = make_modal_basis(OMEGA, 0.003)
     alone = make_bond_contact(law, 98.0, np.ones(1), None, BondSum(law, 30.0, 0.01))
-    contact = add_springs(alone, [make_cubic_spring(1e12, np.ones(1))])
+    spring = make_cubic_spring(1e12, np.ones(1))
+    contact = replace(alone, point_sets=[*alone.point_sets, spring])
     result = march(modes, DRIVE, contact, 6, 100, window=6)
     assert result.outcome is None and energy_balance(result.ledger) < 1e-9
     assert np.ptp(result.extremes[-1]) < np.ptp(march(modes, DRIVE, alone, 6, 100).extremes[-1])

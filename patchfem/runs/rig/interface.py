@@ -3,6 +3,8 @@
 In: a Model, its Numerics and its Patch. Out: a `points.contacts.Contact`, or the Elements of the interfaces.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...contact import contact_sets
@@ -56,7 +58,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     if model.friction is None:
         return contacts.make_contact([], rows[:0], springs, scale)
     contact = _make_own_contact(model, numerics, patch, rows[0])
-    return contacts.add_springs(contact, springs)
+    return replace(contact, point_sets=[*contact.point_sets, *springs])
 
 
 def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
@@ -75,7 +77,7 @@ def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.
     reduction = None
     if not law_has_trait(law, "bonds"):
         reduction = list_joints(model, patch, numerics.meshed)[0].reduction
-    return contacts.with_elements(contact, reduction)
+    return replace(contact, elements=reduction)
 
 
 def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
