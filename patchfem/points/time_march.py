@@ -1169,7 +1169,7 @@ def make_histories(run: March, rows) -> Response:
     run : March
         March that was run.
     rows : (k, w) array
-        Samples with the numbers of their steps and the energies up to them, see `Record`.
+        Samples, then the number of the step and friction work, dissipated and created energy up to it [J].
     """
     modes = run.modes
     contact = run.contact
