@@ -333,15 +333,15 @@ def make_system(
     slides = (rows @ state[0, :n])[points.port]
     points.values[Point.TOTAL, : slides.size] = slides
     is_spring = points.is_spring
-    for memory in (points.memory, points.trial):
-        memory[0, is_spring] = slides[is_spring]
+    first = points.memory[0]
+    first[is_spring] = slides[is_spring]
     velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
-    for memory in (points.memory, points.trial):
-        memory[0] = np.where(velocity != 0, velocity, memory[0])
+    first[velocity != 0] = velocity[velocity != 0]
     if contact.sets is not None:
         _press_first(system, contact)
     if contact.grooves is not None and modes is not None:
         _climb_first(system, contact)
+    points.trial[:] = points.memory
     return system
 
 
@@ -484,9 +484,8 @@ def _climb_first(system: System, contact: Contact) -> None:
     loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
     system.points.values[loads] *= ratio
     is_bonds = system.points.numbers[0] == Law.BONDS
-    for memory in (system.points.memory, system.points.trial):
-        memory[1] *= ratio
-        memory[2:4, is_bonds] *= ratio
+    system.points.memory[1] *= ratio
+    system.points.memory[2:4, is_bonds] *= ratio
     flank[Flank.NORMAL] = normal
     flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
 
