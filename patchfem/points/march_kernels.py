@@ -24,6 +24,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
+from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
@@ -340,6 +341,17 @@ def write_point_forces(system, level, h):
     for j in range(points.port.size):
         if points.numbers[0, j] == Law.LIST:
             lists.write_list_mean(points.numbers, values, system.lists, j, h)
+            continue
+
+        # Bonds depend on the slide alone; without the step of other laws a patch takes a tenth less time.
+        if points.numbers[0, j] == Law.BONDS:
+            trial = points.trial[:, j]
+            slide = values[Point.SLIDE, j]
+            bonds = bond_mean(trial[1], trial[2], slide, values[Point.LOAD, j], trial[4])
+            stiffness = points.numbers[1, j] / points.numbers[2, j]
+            values[Point.FORCE, j] = stiffness * bonds.mean
+            values[Point.BY_SLIDE, j] = stiffness * bonds.slope
+            values[Point.BY_VELOCITY, j] = 0.0
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
