@@ -22,7 +22,6 @@ PUBLIC = {
     "contacts": (
         "BondSum",
         "Contact",
-        "add_springs",
         "make_bond_contact",
         "make_contact",
         "make_cubic_spring",
@@ -30,7 +29,6 @@ PUBLIC = {
         "make_interlocking_spring",
         "make_parallel_contact",
         "make_pressed_contact",
-        "with_elements",
     ),
     "laws": ("make_point_law",),
     "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),

@@ -7,6 +7,7 @@ its path; events of a rigid point are then located by linear interpolation. A mo
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
+from typing import NamedTuple
 
 import numpy as np
 
@@ -378,9 +379,17 @@ def find_force(wave, case, now, numbers, memory, j):
         now[Now.TIME_MEAN] = before + (1 - now[Now.EVENT]) * (now[Now.FORCE] - before)
 
 
+class Middle(NamedTuple):
+    """Slide [m], velocity [m/s] and force [N] in the middle of a step."""
+
+    slide: float
+    velocity: float
+    force: float
+
+
 @njit(**NJIT_KERNEL)
 def find_middle(h, start, now):
-    """Return slide, velocity and force in the middle of a step.
+    """Return the `Middle` of a step.
 
     The slide is the cubic with the velocities at both ends, the force the parabola with the time mean of the step.
 
@@ -395,7 +404,7 @@ def find_middle(h, start, now):
     """
     q = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
     v = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
-    return q, v, 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+    return Middle(q, v, 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE]))
 
 
 @njit(**NJIT_KERNEL)
@@ -415,7 +424,7 @@ def add_energies(waves, h, case, start, now):
     now : (17,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
     """
-    middle = find_middle(h, start, now)[1]
+    middle = find_middle(h, start, now).velocity
     end = now[Now.VELOCITY]
     power = case[Number.DRIVE] * h / 6
     work = power * (waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end)
@@ -445,7 +454,7 @@ def find_turn(h, start, now):
     """
     first = start[1]
     last = now[Now.VELOCITY]
-    middle = find_middle(h, start, now)[1]
+    middle = find_middle(h, start, now).velocity
     slope = 4 * middle - 3 * first - last
     bend = 2 * (first + last) - 4 * middle
     # The root between the ends, without a difference of large numbers
@@ -577,8 +586,8 @@ def observe_acceleration(waves, h, case, start, now, seen):
         peak = max(peak, abs(before), abs(after))
     else:
         first = find_acceleration(waves[0], start[0], start[1], start[2], case)
-        q_middle, v_middle, force = find_middle(h, start, now)
-        middle = find_acceleration(waves[1], q_middle, v_middle, force, case)
+        at = find_middle(h, start, now)
+        middle = find_acceleration(waves[1], at.slide, at.velocity, at.force, case)
         peak = find_parabola_extreme(first, middle, last)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
 
@@ -755,14 +764,14 @@ def find_largest_force(h, start, now, numbers, j, load):
     """
     law = numbers[0, j]
     force = now[Now.FORCE]
-    _, velocity, middle = find_middle(h, start, now)
+    middle = find_middle(h, start, now)
     if law == Law.TANH:
-        speed = find_parabola_extreme(start[1], velocity, now[Now.VELOCITY])
+        speed = find_parabola_extreme(start[1], middle.velocity, now[Now.VELOCITY])
         return numbers[1, j] * load * tanh(speed / numbers[2, j])
     if law == Law.COULOMB and start[1] == 0 and now[Now.VELOCITY] != 0:
         return numbers[1, j] * load
     if law == Law.LUGRE or (law == Law.COULOMB and start[1] == 0):
-        return find_parabola_extreme(start[2], middle, force)
+        return find_parabola_extreme(start[2], middle.force, force)
     return abs(force)
 
 

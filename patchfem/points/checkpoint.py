@@ -25,7 +25,7 @@ MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
 MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums", "work_sums")
-RECORD_STATE = ("numbers", "rows", "sums", "totals", "recent", "before")
+RECORD_STATE = ("early", "recent", "energies", "before")
 CYCLES = ("extremes", "phasors")  # lists of numbers of the cycles of a record
 _FILES = ContextVar("checkpoint_files", default=None)
 

@@ -1,6 +1,6 @@
 """Contact points of a rig or a bench with their laws: elements, bonds, patches under changing loads, flanks of grooves."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -330,13 +330,3 @@ def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shar
     points = PointSet(laws, row, None, shear)
     limit = grooves.max_force(load, law.static)
     return Contact([points], limit, length, preload=load, grooves=grooves)
-
-
-def add_springs(contact: Contact, springs: list[PointSet]) -> Contact:
-    """Return a contact with springs after its interfaces."""
-    return replace(contact, point_sets=[*contact.point_sets, *springs])
-
-
-def with_elements(contact: Contact, elements) -> Contact:
-    """Return a contact that knows the slip.shear_modes.JenkinsSet whose elements are its points."""
-    return replace(contact, elements=elements)

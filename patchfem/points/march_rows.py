@@ -127,8 +127,7 @@ class Total(IntEnum):
     - WORK_IN, POWER, VISCOUS, FRICTION: work of the drive, its magnitude, viscous loss and friction work since the start
       [J]
     - STORED: largest stored energy [J]
-    - ITERATIONS, WORST, UNSOLVED: numbers of Newton iterations, largest one of a step, and number of steps that did not
-      converge
+    - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - SLOT: slot of the contact set, -1 if none is found
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
@@ -141,12 +140,11 @@ class Total(IntEnum):
     FRICTION = 3
     STORED = 4
     ITERATIONS = 5
-    WORST = 6
-    UNSOLVED = 7
-    SLOT = 8
-    IS_FULL = 9
-    IS_DIRTY = 10
-    REST = 11
+    UNSOLVED = 6
+    SLOT = 7
+    IS_FULL = 8
+    IS_DIRTY = 9
+    REST = 10
 
 
 class Sample(IntEnum):

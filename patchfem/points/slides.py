@@ -98,7 +98,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         rows[begin : end + 1] = samples
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
-            motion = (float(time[end]), float(slide[end]), 0.0, force, slip, 0.0, 0.0)
+            motion = (float(time[end]), float(slide[end]), force, slip, 0.0, 0.0)
             snapshots.append(make_snapshot(kernels, system, motion))
         if report is not None:
             report(end / last)

@@ -64,13 +64,14 @@ WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
+NUMBER = -4  # column of the number of the step in a row of a record; the energies follow
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 class Snapshot(NamedTuple):
     """State of the m contact points of the first interface at an instant.
 
-    - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
+    - time [s], slide [m], force [N], slip [m] of the first port; heave [m] and pitch [rad]
     - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
       displacement by shear of the pieces [m]
     - nodal (k,): forces of the nodes [N]; (0,) if the pressure does not change
@@ -79,7 +80,6 @@ class Snapshot(NamedTuple):
 
     time: float
     slide: float
-    rate: float
     force: float
     slip: float
     heave: float
@@ -333,15 +333,15 @@ def make_system(
     slides = (rows @ state[0, :n])[points.port]
     points.values[Point.TOTAL, : slides.size] = slides
     is_spring = points.is_spring
-    for memory in (points.memory, points.trial):
-        memory[0, is_spring] = slides[is_spring]
+    first = points.memory[0]
+    first[is_spring] = slides[is_spring]
     velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
-    for memory in (points.memory, points.trial):
-        memory[0] = np.where(velocity != 0, velocity, memory[0])
+    first[velocity != 0] = velocity[velocity != 0]
     if contact.sets is not None:
         _press_first(system, contact)
     if contact.grooves is not None and modes is not None:
         _climb_first(system, contact)
+    points.trial[:] = points.memory
     return system
 
 
@@ -484,9 +484,8 @@ def _climb_first(system: System, contact: Contact) -> None:
     loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
     system.points.values[loads] *= ratio
     is_bonds = system.points.numbers[0] == Law.BONDS
-    for memory in (system.points.memory, system.points.trial):
-        memory[1] *= ratio
-        memory[2:4, is_bonds] *= ratio
+    system.points.memory[1] *= ratio
+    system.points.memory[2:4, is_bonds] *= ratio
     flank[Flank.NORMAL] = normal
     flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
 
@@ -704,11 +703,10 @@ class March:
         n = self.modes.omega.size
         row = self.system.ports.rows[0]
         rest = sample[2 * n :]
-        motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
-        ports = rest[Sample.PORTS :]
-        place = (self.done + self.shift) * self.step, *motion, ports[0], ports[1]
+        time = (self.done + self.shift) * self.step
+        motion = (time, float(row @ sample[:n]), *rest[Sample.PORTS : Sample.PORTS + 2])
         return make_snapshot(
-            self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
+            self.kernels, self.system, (*motion, rest[Sample.HEAVE], rest[Sample.PITCH])
         )
 
     def find_ledger(self, sample) -> dict[str, float]:
@@ -726,7 +724,6 @@ class March:
             "friction": friction - float(sample[n + Sample.ENERGY] - self.first_energy),
             "peak_stored": float(totals[Total.STORED]),
             "iterations": float(totals[Total.ITERATIONS]),
-            "worst_iterations": float(totals[Total.WORST]),
             "stored": self.find_stored_energy(sample),
             "booked": friction,
             "sampled": float(sampled),
@@ -837,7 +834,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
 
 
 def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapshot:
-    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot.
+    """Return the state of the points on the first port; `motion` has the first six fields of Snapshot.
 
     Parameters
     ----------
@@ -846,7 +843,7 @@ def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapsho
     system : march_rows.System
         Arrays of the march.
     motion : tuple
-        The first seven fields of Snapshot.
+        The first six fields of Snapshot.
     """
     points = system.points
     count = points.port.size
@@ -967,7 +964,7 @@ def march(
             and record.before is not None
             and record.before.size == now.size
         ):
-            largest = np.abs(record.last[1][:, : state.size]).max(axis=0)
+            largest = np.abs(record.last[:, : state.size]).max(axis=0)
             scale = np.concatenate([largest, np.abs(memory)])
             if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
                 record.repeat(count)
@@ -1016,14 +1013,15 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
 class Record:
     """Samples of a march: all of the window at its end, and some of each earlier cycle.
 
+    A row is a sample, the number of its step and the friction work, dissipated and created energy up to it [J].
+
     - run, n_steps, n_window: March, its number of steps, and that of the window
-    - keeps_samples: whether samples from before the window are kept
-    - numbers, rows, sums: step numbers, samples and energies (3, k) of the blocks that are kept
+    - keeps_samples: whether rows from before the window are kept
+    - early: rows (k, w) from before the last parts, at equal distances
+    - last, recent: rows of the last part, and of the last parts, which contain the window
     - extremes, phasors: of the output in each cycle
-    - totals (3,): friction work, dissipated and created energy up to the last sample [J]
+    - energies (3,): energies up to the last sample [J]
     - snapshots: of the last cycle
-    - last, recent: number of the first step, samples and energies of the last part, and of the last parts, which contain
-      the window
     - stride: distance of the samples of earlier cycles
     - before: state and memory at the end of the part before the last, if both have whole cycles; else None
     """
@@ -1033,16 +1031,14 @@ class Record:
         self.n_steps = n_steps
         self.n_window = n_window
         self.keeps_samples = keeps_samples
-        self.numbers = []
-        self.rows = []
-        self.sums = []
+        self.early = []
+        self.last = None
+        self.recent = []
         self.extremes = []
         self.phasors = []
-        self.totals = np.zeros(3)
+        self.energies = np.zeros(3)
         self.snapshots = []
-        self.last = None
         self.before = None
-        self.recent = []
         # The distance of early samples divides a cycle, so that each one begins with a sample.
         longest = max(1, run.steps // MAX_EARLY_SAMPLES_PER_CYCLE)
         self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)
@@ -1065,13 +1061,12 @@ class Record:
         losses = split_losses(samples, n, run.system.options.scale)
         # Only lists of bonds can create energy; of other laws a loss below 0 is an error of the step.
         created = np.maximum(-losses, 0) * run.system.options.has_lists
-        parts = [samples[:-1, n + Sample.WORK], losses + created, created]
-        sums = self.totals[:, None] + np.concatenate(
-            [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1
-        )
-        self.last = first, samples, sums
+        steps = np.stack([samples[:-1, n + Sample.WORK], losses + created, created], axis=1)
+        energies = self.energies + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        numbers = first + np.arange(count + 1.0)[:, None]
+        self.last = np.hstack([samples, numbers, energies])
         self._keep(self.last)
-        self.totals = sums[:, -1].copy()
+        self.energies = energies[-1]
         self.snapshots = list(snapshots)
 
         # Extremes and phasor of each cycle; the first and the last one may be a part of a cycle.
@@ -1085,71 +1080,51 @@ class Record:
             phasor = output[begin:end] @ np.exp(-2j * np.pi * phase)
             self.phasors.append(2 / max(end - begin, 1) * phasor)
 
-    def _keep(self, part: tuple[int, np.ndarray, np.ndarray]) -> None:
-        """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
+    def _keep(self, part: np.ndarray) -> None:
+        """Keep all rows of the parts within a window of the last one, and of older parts those at equal distances."""
         self.recent.append(part)
-        last = part[0] + len(part[1]) - 1
-        while len(self.recent) > 1 and self.recent[1][0] <= last - self.n_window:
-            first, samples, sums = self.recent.pop(0)
-            if self.keeps_samples and sum(map(len, self.numbers)) <= checkpoint.MAX_EARLY_SAMPLES:
-                picked = np.arange(0, len(samples) - 1, self.stride)
-                self.numbers.append(first + picked)
-                self.rows.append(samples[picked])
-                self.sums.append(sums[:, picked])
+        window_start = part[-1, NUMBER] - self.n_window
+        while len(self.recent) > 1 and self.recent[1][0, NUMBER] <= window_start:
+            rows = self.recent.pop(0)
+            if self.keeps_samples and sum(map(len, self.early)) <= checkpoint.MAX_EARLY_SAMPLES:
+                self.early.append(rows[: -1 : self.stride])
 
     def repeat(self, count: int) -> None:
         """Repeat the last part of the march."""
-        first, samples, sums = self.last
-        size = len(samples) - 1
-        n_cycles = size // self.run.steps
-        step = (sums[:, -1] - sums[:, 0])[:, None]
+        n_cycles = (len(self.last) - 1) // self.run.steps
+        change = np.zeros(self.last.shape[1])
+        change[NUMBER:] = self.last[-1, NUMBER:] - self.last[0, NUMBER:]
         for k in range(1, count + 1):
-            self._keep((first + k * size, samples, sums + k * step))
-        self.totals = self.totals + count * step[:, 0]
+            self._keep(self.last + k * change)
+        self.energies = self.energies + count * change[NUMBER + 1 :]
         self.extremes += count * self.extremes[-n_cycles:]
         self.phasors += count * self.phasors[-n_cycles:]
 
     def make_motion(self) -> Motion:
         """Return the record of a finished march."""
-        # The last sample of a block is the first of the next one.
+        # The last row of a part is the first of the next one.
         run = self.run
-        _, samples, sums = self.last
-        last = samples[-1:]
-        parts = [
-            (first + np.arange(len(one) - 1), one[:-1], energies[:, :-1])
-            for first, one, energies in self.recent
-        ]
-
-        recent_numbers, recent_rows, recent_sums = zip(*parts)
-        rows = np.concatenate([*self.rows, *recent_rows, last])
-        numbers = np.concatenate([*self.numbers, *recent_numbers, [run.done]]).astype(int)
-        energies = np.concatenate([*self.sums, *recent_sums, sums[:, -1:]], axis=1)
-
+        parts = [part[:-1] for part in self.recent]
+        rows = np.concatenate([*self.early, *parts, self.last[-1:]])
         if not self.keeps_samples:
-            is_kept = numbers >= run.done - self.n_window
-            rows = rows[is_kept]
-            numbers = numbers[is_kept]
-            energies = energies[:, is_kept]
+            rows = rows[rows[:, NUMBER] >= run.done - self.n_window]
 
-        in_window = numbers >= run.done - self.n_window
-        response = make_histories(run, rows, numbers, energies)
+        in_window = rows[:, NUMBER] >= run.done - self.n_window
+        response = make_histories(run, rows)
         n = 2 * run.modes.omega.size
         window_rows = rows[in_window][:-1]
-        steps = run.steps
-
+        has_interface = bool(run.contact.point_sets)
         return Motion(
             response,
             response.select(in_window),
-            window_rows[:, n + Sample.PORTS + 2]
-            if run.contact.point_sets
-            else window_rows[:, 0] * 0,
+            window_rows[:, n + Sample.PORTS + 2] if has_interface else np.zeros(len(window_rows)),
             float(window_rows[:, n + Sample.WORK].sum()),
             np.array(self.extremes),
             np.array(self.phasors),
-            run.find_ledger(last[0]),
+            run.find_ledger(self.last[-1]),
             run.outcome,
             run.message,
-            (run.done + run.shift) / steps,
+            (run.done + run.shift) / run.steps,
             self.snapshots,
             run,
         )
@@ -1182,27 +1157,22 @@ def find_extremes(q, v, step: float) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def make_histories(run: March, rows, numbers, energies) -> Response:
-    """Return samples (k, w) with their step numbers (k,) and energies (3, k) as histories.
+def make_histories(run: March, rows) -> Response:
+    """Return rows (k, w) of a record as histories.
 
     `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
-    slips (k, i) of several interfaces, and forces of springs (k, s); load, moment and energy of the contact, heave and
-    pitch of a contact that moves.
+    slips (k, i) of several interfaces; load, moment and energy of the contact, heave and pitch of a contact that moves.
 
     Parameters
     ----------
     run : March
         March that was run.
     rows : (k, w) array
-        Samples, in the rows of `march_rows.Sample`.
-    numbers : (k,) array
-        Numbers of their steps.
-    energies : (3, k) array
-        Friction work, dissipated and created energy up to them [J].
+        Samples, then the number of the step and friction work, dissipated and created energy up to it [J].
     """
     modes = run.modes
     contact = run.contact
-    time = run.find_times(numbers)
+    time = run.find_times(rows[:, NUMBER])
     n = modes.omega.size
 
     z = rows[:, :n]
@@ -1216,7 +1186,7 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     push = run.drive.values(time)
     forces = columns[..., 0]
     pull = forces @ port_rows
-    work, dissipated, created = energies
+    work, dissipated, created = rows[:, NUMBER + 1 :].T
 
     extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
@@ -1232,7 +1202,6 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     is_interface = np.array([not one.is_spring for one in sets], bool)
     if len(sets) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
-        extra["spring_forces"] = forces[:, ~is_interface]
         if is_interface.any():
             extra |= {name: part[:, is_interface] for name, part in parts.items()}
 

@@ -1,5 +1,6 @@
 """Several interfaces, nonlinear springs and rigid friction in one march: closed forms, the motion from event to event."""
 
+
 import numpy as np
 import problems
 import pytest

@@ -20,11 +20,10 @@ def make_modes(zeta=0.003) -> ModalBasis:
     return ModalBasis(("a",), np.array([OMEGA]), np.array([zeta]), one, one, one, 1.0)
 
 
-def run(law, steps, drive=DRIVE, cycles=60, **options):
-    """Return the motion of a block on one point."""
-    return march(
-        make_modes(), drive, Contact([PointSet([law], np.ones(1))], LIMIT), cycles, steps, **options
-    )
+def run(points, steps, drive=DRIVE, cycles=60, zeta=0.003, **options):
+    """Return the motion of a block on points of given laws."""
+    contact = Contact([PointSet(points, np.ones(1))], LIMIT)
+    return march(make_modes(zeta), drive, contact, cycles, steps, **options)
 
 
 def amplitude(motion) -> float:
@@ -35,7 +34,7 @@ def amplitude(motion) -> float:
 
 def test_coulomb_block_at_resonance():
     """The amplitude of the two-stop motion, and its energy balance."""
-    motion = run(laws.make_coulomb(1.0, 1.0, LIMIT), 200)
+    motion = run([laws.make_coulomb(1.0, 1.0, LIMIT)], 200)
     assert amplitude(motion) == pytest.approx(EXACT_AMPLITUDE, rel=1e-6)
     ledger = motion.ledger
     gap = ledger["work_in"] - ledger["viscous"] - ledger["booked"] - ledger["stored"]
@@ -56,7 +55,6 @@ def test_exact_release_of_a_coulomb_block():
     unit = LIMIT / OMEGA**2
     start = InitialState(np.array([11.5 * unit]), np.zeros(1))
     still = SineDrive(0.0, OMEGA)
-    contact = Contact([PointSet([laws.make_coulomb(1.0, 1.0, LIMIT)], np.ones(1))], LIMIT)
-    motion = march(make_modes(0.0), still, contact, 5, 400, start=start)
+    motion = run([laws.make_coulomb(1.0, 1.0, LIMIT)], 400, still, 5, 0.0, start=start)
     assert motion.window.slide[-1] / unit == pytest.approx(-0.5, abs=1e-4)
     assert np.ptp(motion.window.slide[-400:]) == 0

@@ -27,10 +27,10 @@ from ...compiled.jit import njit
 from .point_rows_kernels import GROWTH
 
 # Largest paths in bond lengths for which the power series SHAPE_SERIES and MOMENT_SERIES are exact to round-off
-MAX_SERIES_PATH = 0.03
+MAX_SERIES_PATH = 0.15
 MAX_SHORT_PATH = 0.5
 # Coefficients of the series of (exp(-x) - 1 + x)/x^2 in powers of -x
-SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(7)])
+SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(10)])
 # Coefficients of the series of the integral of y^3 exp(-y) from 0 to x, divided by x^4, in powers
 # of -x
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])

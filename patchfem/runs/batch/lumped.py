@@ -17,7 +17,7 @@ import numpy as np
 from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
-from ...model.similar_models import SimilarModels, collect_columns
+from ...model.similar_models import collect_columns
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
@@ -470,17 +470,9 @@ def needs_single_run(
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
     """Store the warnings and notes that follow from the models."""
-    first = models[0]
-    is_similar = isinstance(models, SimilarModels)
-    for case in range(len(models)):
-        model = first if is_similar else models[case]
+    creeps = law_has_trait(models[0].friction.law, "creeps")
+    for case, model in enumerate(models):
         if warnings := [*model.source.remarks, *model.rig.structure.notes]:
-            model = models[case] if is_similar else model
-            warnings = [*model.source.remarks, *model.rig.structure.notes]
-            texts = shorten_file_names(warnings, model.source.path)
-            results.warnings[case] = [*texts, *results.warnings.get(case, ())]
-    if law_has_trait(first.friction.law, "creeps"):
-        speeds = collect_columns(models, lambda model: (model.friction.reference_speed,))[0]
-        for case, speed in enumerate(speeds.tolist()):
-            law = first.friction.model_copy(update={"reference_speed": speed})
-            results.notes[case] = note_on_creep(law)
+            results.warnings[case] = list(shorten_file_names(warnings, model.source.path))
+        if creeps:
+            results.notes[case] = note_on_creep(model.friction)

@@ -3,6 +3,8 @@
 In: a Model, its Numerics and its Patch. Out: a `points.contacts.Contact`, or the Elements of the interfaces.
 """
 
+from dataclasses import replace
+
 from ...effects import law_has_trait
 from ...friction.laws import coulomb
 from ...friction.laws.elastic_plastic import parallel_element
@@ -44,7 +46,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     if model.friction is None:
         return contacts.make_contact([], rows[:0], springs, scale)
     contact = _make_own_contact(model, numerics, patch, rows[0])
-    return contacts.add_springs(contact, springs)
+    return replace(contact, point_sets=[*contact.point_sets, *springs])
 
 
 def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
@@ -55,7 +57,7 @@ def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.
         return shear.make_points(model, patch, row, choice, numerics.shear_modes)
     contact = contacts.make_contact([make_single_law(model, numerics, patch)], [row])
     reduction = list_joints(model, patch, numerics.meshed)[0].reduction
-    return contacts.with_elements(contact, reduction)
+    return replace(contact, elements=reduction)
 
 
 def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
