@@ -8,8 +8,8 @@ import numpy as np
 from .answer import Answer, JsonObject, Quantity, Variable, Variables
 from .charts.table import CSV_FILES, CSV_UNITS, Column, parse_columns
 
-# cells of the columns of a CSV file by heading
-Lists = dict[str, list[str | float]]
+# cells of the columns of a CSV file by heading; a missing cell is None or ""
+Lists = dict[str, list[str | float | None]]
 # cells of a row of a table by column
 Cells = dict[str, Quantity | str | float]
 
@@ -89,7 +89,7 @@ def _list_objects(rows: list[JsonObject], columns: list[Column], nested: str) ->
     for name, unit in units.items():
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             numbers = (row.get(name, {}).get(key) for row in rows)
-            lists[add_unit(name + suffix, unit)] = list(map(_write_number, numbers))
+            lists[add_unit(name + suffix, unit)] = list(numbers)
     return lists
 
 
@@ -114,13 +114,8 @@ def _stack_curves(details: JsonObject, columns: list[Column]) -> Lists:
             known = curve | case["band"] if method == case["method"] else curve
             for column in columns:
                 cells = known.get(column.name, [None] * size)
-                lists.setdefault(column.heading, []).extend(map(_write_number, cells))
+                lists.setdefault(column.heading, []).extend(cells)
     return lists
-
-
-def _write_number(number: float | None) -> float | str:
-    """Return a number as a cell of a CSV file; "" for a missing one."""
-    return "" if number is None else number
 
 
 def list_rows(answer: Answer, source: str) -> list[Cells]:

@@ -118,6 +118,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         details |= _describe_search(fit.keys)
     details |= parts.details
 
+    # fitted values; without an interval they have the reason
     measures = {}
     for name, entry in details["values"].items():
         reason = "" if entry["interval"] else "the measurement does not determine an interval"
@@ -125,6 +126,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         entry |= {"low": low, "high": high}
         measures[name] = Quantity(entry["value"], entry["unit"], None, low, high, reason=reason)
 
+    # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
     pairs = _collect_pairs(details.get("correlation", ()), list(measures))
     if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
@@ -193,6 +195,7 @@ def _describe_search(keys: FittedKeys) -> JsonObject:
             "sensitivity": intervals.sensitivity[k],
         }
 
+    # combinations of values that the data do not determine, without the values that do not take part
     unknown = [dict(zip(values, row, strict=True)) for row in intervals.unknown.tolist()]
     return {
         "outcome": str(keys.outcome),

@@ -84,6 +84,7 @@ def make_page(folders: list[Path]) -> str:
     answers = _read_all(folders)
     first = next(iter(answers.values()))
     drawn = panels.make_panels(answers, CHARTS[first.kind])
+    # a single answer has tables, files and films; of several answers the page shows what differs
     if len(folders) == 1:
         tables = make_tables(first)
         paths = sorted(folders[0].glob("[!.]*"))

@@ -233,7 +233,7 @@ def _find_digits(name: str) -> int | None:
     return MEASURED_DIGITS if surface_definitions.find(name) else None
 
 
-def format_value(value: float | str, unit: str, digits: int = 4) -> str:
+def format_value(value: float | str, unit: str, digits: int = 4, name: str = "") -> str:
     """Return a number without an error in a readable unit.
 
     Parameters
@@ -244,10 +244,12 @@ def format_value(value: float | str, unit: str, digits: int = 4) -> str:
         SI unit; "" for a number.
     digits : int, optional
         Number of significant digits.
+    name : str, optional
+        Name of the quantity; a fraction is displayed in percent.
     """
     if isinstance(value, str):
         return value
-    label, scale = choose_scale("", unit or "1", abs(value))
+    label, scale = choose_scale(name, unit or "1", abs(value))
     return f"{format_number(float(value) * scale, digits)} {label}".strip()
 
 

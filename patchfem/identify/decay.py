@@ -52,7 +52,7 @@ def fit_decay(time, value) -> FittedModes:
     is_kept &= energy > MIN_SINUSOID_RATIO**2 * energy.max()
     if not is_kept.any():
         largest = int(np.argmax(energy))
-        error = max(float(problem.estimate_damping_errors(fit)[largest]), DAMPING_ROUND_OFF)
+        error = max(problem.estimate_damping_errors(fit)[largest], DAMPING_ROUND_OFF)
         behaviour = (
             f"neither decays nor grows beyond its error of {error:.1g}; give a longer record"
         )

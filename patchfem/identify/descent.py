@@ -64,7 +64,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
             break
     else:
         return start._replace(is_converged=False)
-    scale = max(float(np.abs(residual).max()), 1e-300)
+    scale = max(np.abs(residual).max(), 1e-300)
 
     # the residual is scaled because the method stops at an absolute gradient
     ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL

@@ -38,7 +38,7 @@ def describe_fit(fit: Fit, names) -> list[str]:
     intervals = fit.intervals
     sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
-    min_sensitivity = MIN_SENSITIVITY * max(float(np.max(intervals.sensitivity)), fit.rms)
+    min_sensitivity = MIN_SENSITIVITY * max(np.max(intervals.sensitivity), fit.rms)
 
     for i, name in enumerate(names):
         if np.isfinite(intervals.ends[i]).all():

@@ -143,7 +143,7 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     weighted = np.interp(even_times, time, value - value.mean()) * np.hanning(2 * n)[n:]
     spectrum = np.abs(np.fft.rfft(weighted, PADDING_FACTOR * n))
     spectrum[:PADDING_FACTOR] = 0.0
-    frequency = float(np.argmax(spectrum)) / (PADDING_FACTOR * n * step)
+    frequency = np.argmax(spectrum) / (PADDING_FACTOR * n * step)
     if not frequency > 0 or not np.ptp(value) > 0:
         raise PatchfemError("the record contains no oscillation")
 

@@ -151,7 +151,7 @@ def compute_intervals(
     FitIntervals
     """
     n = u.size
-    rows = estimate_effective_rows(model(u)) if is_series else float(model.rows)
+    rows = estimate_effective_rows(model(u)) if is_series else model.rows
     dof = max(rows - n, 1)
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     quantile = stdtrit(dof, 0.975)

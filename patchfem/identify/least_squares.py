@@ -210,7 +210,7 @@ def _assemble_fit(
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, is_series=is_series)
-    rms = float(np.sqrt(cost / best.rows))
+    rms = np.sqrt(cost / best.rows)
     is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
     return Fit(
         values=model.space.to_values(u),

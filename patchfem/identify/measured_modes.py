@@ -182,7 +182,7 @@ def _convert_base_residues(modes: FittedModes) -> _ModeRows:
     product = -modes.residue
     magnitude = np.sqrt(np.abs(product))
     # the sum of the squared participations must not exceed 1
-    scale = max(1.0, float(np.sqrt(np.sum(magnitude**2))))
+    scale = max(1.0, np.sqrt(np.sum(magnitude**2)))
     motion = np.sign(product) * magnitude * scale
     rows = {"slide": motion, "output": motion, "base": magnitude / scale}
     return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])

@@ -52,7 +52,7 @@ class SinusoidFit(NamedTuple):
     @property
     def mean_square(self) -> float:
         """Mean square of the residual."""
-        return float(np.mean(self.residual**2))
+        return np.mean(self.residual**2)
 
     @property
     def omega(self) -> np.ndarray:
@@ -121,7 +121,7 @@ class SinusoidProblem:
         self.fixed = fixed
         self.compute_forced = compute_forced
         self.bounds = bounds
-        self.scale = float(np.std(value)) or 1.0
+        self.scale = np.std(value) or 1.0
 
     def tabulate(self, poles) -> np.ndarray:
         """Return the columns (n, 3, k, c) of each sinusoid and their derivatives with respect to w and s."""
@@ -230,7 +230,7 @@ class SinusoidProblem:
             damping=fit.damping[order],
             coefficients=fit.coefficients[order],
             damping_error=self.estimate_damping_errors(fit)[order],
-            misfit=float(np.sqrt(fit.mean_square)) / self.scale,
+            misfit=np.sqrt(fit.mean_square) / self.scale,
         )
 
     def estimate_damping_errors(self, fit: SinusoidFit) -> np.ndarray:

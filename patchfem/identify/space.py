@@ -139,7 +139,7 @@ class UnitCubeResidual:
     def sum_of_squares(self, u) -> float:
         """Return the sum of squares of the residual at u (n,); infinite if the evaluation fails."""
         residual = self(u)
-        return np.inf if residual is None else float(residual @ residual)
+        return np.inf if residual is None else residual @ residual
 
     def with_penalty(self, u) -> np.ndarray:
         """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
@@ -155,7 +155,7 @@ class UnitCubeResidual:
             residual = np.asarray(self.residual(self.space.to_values(u)), float)
             if np.isfinite(residual).all():
                 self.rows = residual.size
-                self.largest = max(self.largest, float(np.abs(residual).max(initial=0.0)))
+                self.largest = max(self.largest, np.abs(residual).max(initial=0.0))
                 self.counts = self.counts.add(SearchCounts(1, 0, ""))
                 return residual
         except Missing:

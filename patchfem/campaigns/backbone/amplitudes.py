@@ -59,7 +59,7 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
 
 def _default_slides(joint: JointMode) -> tuple[float, float]:
     """Return the smallest and largest relative displacement [m] of the default amplitudes."""
-    stiffness = float(joint.stiffness[joint.face])
+    stiffness = joint.stiffness[joint.face]
     deflection = joint.deflection if joint.friction_limit else 0.0
     if 0 < stiffness < np.inf or not deflection:
         slip = joint.slip_displacement
@@ -73,7 +73,7 @@ def _max_amplitude(joint: JointMode) -> float:
     travel = springs.travel / TRAVEL_FACTOR
     if not springs.cubic:
         return travel
-    output = abs(float(joint.modes.output[joint.mode])) or joint.reach
+    output = abs(joint.modes.output[joint.mode]) or joint.reach
     doubling = np.sqrt(joint.spring / abs(springs.cubic)) / output
     end = SOFTENING_END if springs.cubic < 0 else HARDENING_END
     return min(travel, doubling * end)
@@ -175,13 +175,10 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
         known = _join(known, _estimate_forces(joint, np.array(added)))
     for force in forces:
         if not known.force.min() <= force <= known.force.max():
-            ends = [
-                format_quantity(float(end), "N", 3)
-                for end in (known.force.min(), known.force.max())
-            ]
+            ends = [format_quantity(end, "N", 3) for end in (known.force.min(), known.force.max())]
             low, high = (format_length(known.amplitude[k], 3) for k in (0, -1))
             raise PatchfemError(
-                f"no amplitude from {low} to {high} needs a force of {format_quantity(float(force), 'N', 3)} at the "
+                f"no amplitude from {low} to {high} needs a force of {format_quantity(force, 'N', 3)} at the "
                 f"output for its phase resonance: the forces there are {ends[0]} to {ends[1]}; give other --forces"
             )
 
@@ -216,9 +213,9 @@ def _interpolate_amplitude(curve: Curve, force: float) -> float:
     """Return the smallest amplitude [m] at which the force [N] of a curve, a straight line in logarithms, is reached."""
     above = int(np.argmax(curve.force >= force))
     if not above:
-        return float(curve.amplitude[0])
+        return curve.amplitude[0]
     places = slice(above - 1, above + 1)
     log_amplitude = np.interp(
         np.log(force), np.log(curve.force[places]), np.log(curve.amplitude[places])
     )
-    return float(np.exp(log_amplitude))
+    return np.exp(log_amplitude)

@@ -138,7 +138,7 @@ def _find_motions(
         joint.modes.output,
         (harmonics // HARMONIC_COUNTS[0]) ** 2,
     )
-    small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude)
+    small = MIN_AMPLITUDE_FACTOR * joint.slip_amplitude
     return find_free_motions(equations, amplitudes, small, starts)
 
 
@@ -157,7 +157,7 @@ def find_forces(
         Force [N] and its frequency [Hz]; NaN if no force holds the motion in the shape of the mode.
     """
     modes = joint.modes
-    reach = abs(float(modes.output @ joint.shape))
+    reach = joint.reach
     excitation = np.outer(modes.output, modes.output) / reach**2
     forced_motions = _find_motions(group, joint, amplitudes, harmonics, excitation, motions)
     out = np.full((2, len(amplitudes)), np.nan)

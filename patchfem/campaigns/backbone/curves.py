@@ -264,7 +264,7 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
         """Return the frequency [Hz] of the mode with springs [N/m] on the rows."""
         return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
 
-    free = float(modes.omega[joint.mode]) / (2 * np.pi)
+    free = modes.omega[joint.mode] / (2 * np.pi)
     if model.rig.springs.interlock is not None:
         free = find(modes.interfaces[:1], model.rig.springs.interlock[0])
     if joint.stuck_mode.omega is None:
@@ -279,7 +279,7 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     free_error = 0.0
     if joint.stiffer is not None:
         shift = joint.stiffer.model.rig.modes.omega[joint.mode] - modes.omega[joint.mode]
-        free_error = abs(float(shift)) / (2 * np.pi)
+        free_error = abs(shift) / (2 * np.pi)
     return ModeFrequencies(free, joint.stuck_mode.omega / (2 * np.pi), free_error=free_error)
 
 
@@ -311,7 +311,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         slope = None
         if points.size > 1:
             ends = points[[first, -1]]
-            slope = float(np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0])
+            slope = np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0]
         slopes.append(slope)
     return LossExponents(*slopes)
 
@@ -338,11 +338,11 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
     def net_loss(log_amplitude: float) -> float:
         """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
         point = CURVES[method](joint, np.exp([log_amplitude]))
-        return float(point.damping[0] * point.amplitude[0])
+        return point.damping[0] * point.amplitude[0]
 
     try:
-        return float(np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_TOL)))
+        return np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_TOL))
     except (NotConverged, PatchfemError, ValueError):
         # No further point is known, so the root of the chord between the two points is used.
         fraction = losses[0] / (losses[0] - losses[1])
-        return float(amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0]))
+        return amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0])

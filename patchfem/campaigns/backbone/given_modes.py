@@ -44,7 +44,8 @@ def prepare_model(
     Parameters
     ----------
     build : callable
-        As in `request.compute_cases`.
+        Function of `BackboneTables` and of a tuple of assignments that returns the model of the scene with these tables
+        and changes; with None that of the scene as written.
     modes : str or iterable
         Text such as "120 Hz:0.01, 170 Hz:0.02", or tuples of frequency, damping ratio and slide; "" for the modes of
         the scene.
@@ -107,7 +108,7 @@ def _assume_slides(
         slide = mode.slide
         if slide is None:
             omega = 2 * np.pi * mode.frequency
-            slide = float(omega * np.sqrt(fraction / stiffness_per_mass))
+            slide = omega * np.sqrt(fraction / stiffness_per_mass)
         completed.append(mode._replace(slide=slide))
     return tuple(completed)
 

@@ -97,7 +97,7 @@ class JointMode(NamedTuple):
     @property
     def reach(self) -> float:
         """Output displacement per unit of the stuck mode shape."""
-        return abs(float(self.modes.output @ self.shape))
+        return abs(self.modes.output @ self.shape)
 
     @property
     def face(self) -> int:
@@ -109,7 +109,7 @@ class JointMode(NamedTuple):
     @property
     def face_slide(self) -> float:
         """Relative displacement of the dominant interface per unit of the stuck mode shape."""
-        return float(self.modes.interfaces[self.face] @ self.shape)
+        return self.modes.interfaces[self.face] @ self.shape
 
     @property
     def friction_limit(self) -> float:
@@ -157,7 +157,7 @@ class JointMode(NamedTuple):
     @property
     def spring(self) -> float:
         """Stiffness of the mode without the contact [N/m], per unit of its coordinate."""
-        return self.modes.mass * float(self.modes.omega[self.mode] or self.stuck_mode.omega) ** 2
+        return self.modes.mass * (self.modes.omega[self.mode] or self.stuck_mode.omega) ** 2
 
     @property
     def deflection(self) -> float:
@@ -176,8 +176,8 @@ class JointMode(NamedTuple):
         if not self.friction_limit:
             if rig.springs.cubic is None:
                 return rig.springs.interlock[1]
-            return float(np.sqrt(self.spring / abs(rig.springs.cubic)))
-        stiffness = float(self.stiffness[self.face])
+            return np.sqrt(self.spring / abs(rig.springs.cubic))
+        stiffness = self.stiffness[self.face]
         return self.friction_limit / stiffness if stiffness else self.deflection
 
     def output_amplitude(self, slide):

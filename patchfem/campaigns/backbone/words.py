@@ -178,7 +178,7 @@ def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:
     k = int(np.nanargmax(ratio))
     if ratio[k] < MIN_REPORTED_RATIO:
         return ["The coupling with the other modes is weak."]
-    frequency = format_quantity(float(curve.force_frequency[k]), "Hz", 5)
+    frequency = format_quantity(curve.force_frequency[k], "Hz", 5)
     return [
         f"A force at the output moves the other modes, too: at {format_length(curve.amplitude[k], 3)} its phase resonance "
         f"has {frequency}, {100 * shift[k]:.2g} % beside the curve; a test reads the curve only if it isolates the mode."

@@ -98,7 +98,7 @@ class MeasuredCurve(NamedTuple):
         parts = []
         for row in np.flatnonzero(self.assumed):
             name = FITTED_NAMES[row]
-            size = format_number(float(percent[row]), 2)
+            size = format_number(percent[row], 2)
             parts.append(f"{size} % of each {name} (no column {name}_error)")
         return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 

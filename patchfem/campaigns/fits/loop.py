@@ -77,7 +77,7 @@ class FittedLoop:
     def _residual_rms(self, mask: np.ndarray) -> float:
         """Return the root mean square residual of the rows in a mask (k,)."""
         residual = self.model - self.loop.reading
-        return float(np.sqrt(np.mean(residual[mask] ** 2)))
+        return np.sqrt(np.mean(residual[mask] ** 2))
 
 
 class BenchModel:
@@ -173,7 +173,7 @@ class BenchModel:
         self.steps_per_row *= 2
         fine = self(values)
         self.steps_per_row //= 2
-        return float(np.abs(fine - coarse).max())
+        return np.abs(fine - coarse).max()
 
     def refine_steps(self, values: np.ndarray) -> None:
         """Halve the time steps until their effect on the reading is negligible, unless the scene sets them."""
@@ -252,7 +252,7 @@ def fit_hysteresis_loop(
 
     # least squares of the deviations, as fractions of the largest force
     bench = BenchModel(keys, loop, time, say)
-    scale = float(np.abs(loop.reading[~held_out]).max(initial=0.0))
+    scale = np.abs(loop.reading[~held_out]).max(initial=0.0)
     problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
         fit = problem.solve(interval_kind="series" if bench.is_exact else "")
@@ -317,7 +317,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     """Return warnings about correlated residuals, a first row with force, and coarse time steps."""
     loop = fitted.loop
     scene = fitted.keys.scene
-    peak = float(np.abs(loop.reading).max())
+    peak = np.abs(loop.reading).max()
     n_used = np.count_nonzero(~fitted.held_out)
     n_independent = fitted.keys.fit.intervals.rows
     warnings = []

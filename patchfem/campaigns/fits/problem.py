@@ -132,7 +132,7 @@ class FreeKeys:
         for bound in self.ranges:
             _, value = find_scene_value(self.scene, bound.key)
             known = value if isinstance(value, float) else np.nan
-            values.append(float(np.clip(known, bound.low, bound.high)))
+            values.append(np.clip(known, bound.low, bound.high))
         return values
 
     def require_enough_rows(self, path: Path, count: int, name: str) -> None:

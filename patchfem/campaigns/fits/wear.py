@@ -190,7 +190,7 @@ def fit_wear(
 
     # one run with the largest coefficient gives the depth for all smaller ones
     curve = compute(bounds.high)
-    max_depth = float(curve.depth[-1])
+    max_depth = curve.depth[-1]
     if not max_depth >= target.value:
         raise PatchfemError(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
@@ -208,7 +208,7 @@ def fit_wear(
     n_runs = 1
     while n_runs < MAX_RUNS:
         n_runs += 1
-        computed_depth = float(compute(value).depth[-1])
+        computed_depth = compute(value).depth[-1]
         error = abs(computed_depth / target.value - 1)
         if error <= DEPTH_TOL * model.accuracy.tolerance:
             break

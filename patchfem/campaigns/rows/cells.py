@@ -230,5 +230,5 @@ def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
     for name, is_of_kind in kinds.items():
         selected_logs = log_ratios[is_of_kind & selected]
         is_known = selected_logs.size and not np.isnan(selected_logs).any()
-        out[name] = float(np.sqrt(np.mean(selected_logs**2))) if is_known else None
+        out[name] = np.sqrt(np.mean(selected_logs**2)) if is_known else None
     return out

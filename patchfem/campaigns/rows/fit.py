@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 
 from ...core import G_N, PatchfemError
 from ...identify.advice import advise_test
@@ -52,7 +53,7 @@ class FittedRows:
     """
 
     keys: FittedKeys
-    instrument: object
+    instrument: BaseModel | None
     cells: Readings
     held_out: np.ndarray
     computed: np.ndarray

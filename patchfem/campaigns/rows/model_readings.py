@@ -83,6 +83,8 @@ class ModelReadings:
                 if not observer.finds_periodic_motion:
                     driven = self.models.with_condition_drive(model, k)
                     observer = MotionObserver(driven, patch, self.say, needs_cycle)
+
+                # a motion begins at the last one under the same drive; without a bounded one the readings are infinite
                 drive = self.models.sine_drive(k)
                 motion = observer(drive, self.last_motions.get(k))
                 if motion is None:

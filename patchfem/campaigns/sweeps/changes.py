@@ -91,4 +91,4 @@ def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
         return []
     reference = abs(values[0]) if np.isfinite(values[0]) else max(abs(values[low]), values[high])
     relative = difference / reference if reference > column.floors[0] else np.inf
-    return [MeasureRange(name, low, high, float(relative))]
+    return [MeasureRange(name, low, high, relative)]

@@ -71,6 +71,7 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
     axis = _choose_axis(table)
     if axis is None:
         return []
+    # lines of cases along the key, in rising order of its values
     limits = []
     lines = table.split_lines(axis)
     key = table.keys[axis]
@@ -87,6 +88,8 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
             _find_limit_on_line(blank, key, along[order], values[line], errors[line])
             for line in lines[:, order]
         ]
+
+        # the smallest limit of all lines counts
         known = filter(None, on_lines)
         limits += sorted(
             known, key=lambda one: (one.is_never_reached, np.fmax(one.low, one.value))
@@ -136,7 +139,7 @@ def _find_limit_on_line(
     is_doubtful = size + error > largest
     inside = int(np.argmax(is_doubtful)) - 1 if is_doubtful.any() else size.size - 1
     limit = blank._replace(
-        low=float(sizes[counts][inside]),
+        low=sizes[counts][inside],
         is_never_reached=bool(counts[-1] and not is_doubtful.any()),
     )
     is_beyond = size - error > largest
@@ -145,7 +148,7 @@ def _find_limit_on_line(
 
     # Interpolation of the change in the direction of the case beyond, whose sign the limit has.
     beyond = int(np.argmax(is_beyond))
-    sign = float(np.sign(change[beyond]))
+    sign = np.sign(change[beyond])
     ends = [inside, beyond]
     places = sizes[counts][ends]
     changes = sign * change[ends]
@@ -156,9 +159,9 @@ def _find_limit_on_line(
             # A power law of the key is a straight line in logarithmic coordinates.
             changes = np.log1p(changes)
             target = np.log1p(target)
-    value = float(np.interp(target, changes, places))
+    value = np.interp(target, changes, places)
     return limit._replace(
         change=sign * largest,
-        value=float(np.exp(value)) if key.is_logarithmic else value,
-        high=float(sizes[counts][beyond]),
+        value=np.exp(value) if key.is_logarithmic else value,
+        high=sizes[counts][beyond],
     )

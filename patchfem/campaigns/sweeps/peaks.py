@@ -111,7 +111,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     near = slice(top - 1, top + 2)
     if not 0 < top < frequency.size - 1 or not counts[near].all() or height[top] <= 0:
         return None
-    spacing = float(frequency[top + 1] - frequency[top - 1]) / 2
+    spacing = (frequency[top + 1] - frequency[top - 1]) / 2
 
     # 1/y^2 over f^2, relative to the largest value
     square = frequency**2 - frequency[top] ** 2
@@ -140,7 +140,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     width_error = _estimate_error(widths) + 2 * width * slack
     height_error += np.nanmax(error[near])
     numbers = (frequencies[0, 0], frequency_error, heights[0], height_error, width, width_error)
-    return SweptPeak(*map(float, numbers), spacing)
+    return SweptPeak(*numbers, spacing)
 
 
 def _estimate_error(values: np.ndarray) -> float:
@@ -170,8 +170,8 @@ def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
     values = curve(places)
     if not values.size or values.min() <= 0:
         return None
-    place = float(places[values.argmin()])
-    level = float(values.min())
+    place = places[values.argmin()]
+    level = values.min()
     crossings = curve.solve(2 * level, extrapolate=False)
     below = np.max(crossings[crossings < place], initial=-np.inf)
     above = np.min(crossings[crossings > place], initial=np.inf)

@@ -191,7 +191,7 @@ class SweepTable:
             nonzero = cases[column.values[cases] != 0]
             ratios = column.errors[nonzero] / np.abs(column.values[nonzero])
             if cases.size:
-                worst = float(ratios.max()) if ratios.size else None
+                worst = ratios.max() if ratios.size else None
                 missed[name] = {"count": int(cases.size), "worst": worst}
         return {
             "count": len(self),

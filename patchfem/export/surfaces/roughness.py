@@ -15,6 +15,7 @@ from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
 from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
+from ..quantities import format_value
 from . import sentences
 from .variables import make_variables, maps
 
@@ -171,7 +172,7 @@ def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> 
         text = f"{name} {sentences.format_value(name, values[name])}"
         if values[name].reason == "few_files":
             found = [each[name].value for each in members]
-            ends = [sentences.format_rounded(end, "m", 3) for end in (min(found), max(found))]
+            ends = [format_value(end, "m", 3) for end in (min(found), max(found))]
             text += f" ({ends[0]} to {ends[1]} in the files)"
         parts.append(text)
     return ", ".join(parts)

@@ -6,7 +6,6 @@ A sentence is a template whose fields are the numbers of the record as text; no 
 from collections import defaultdict
 from typing import NamedTuple
 
-from ...formatting import format_number
 from ...surface.compare.records import Comparison, Track
 from ...surface.quantity import Quantity
 from .. import answer, quantities
@@ -142,22 +141,6 @@ def format_value(name: str, quantity: Quantity) -> str:
     return quantities.format_quantity(name, to_answer(quantity))
 
 
-def format_rounded(number: float, unit: str, digits: int = 4) -> str:
-    """Return a number in its display unit.
-
-    Parameters
-    ----------
-    number : float
-        [SI]
-    unit : str
-        SI unit.
-    digits : int, optional
-        Number of significant digits.
-    """
-    name, scale = quantities.choose_scale("", unit, abs(number))
-    return f"{format_number(number * scale, digits)} {name}".strip()
-
-
 def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
     """Return whether a quantity exists and has a value."""
     return quantity is not None and quantity.value is not None
@@ -211,7 +194,7 @@ def _describe_loss(comparison: Comparison) -> str:
     for name in ("worn_depth_max_at", "worn_depth_max_x", "worn_depth_max_y"):
         if is_known(values.get(name)):
             axis = "y" if name.endswith("y") else "x"
-            parts[0] += f", {axis} = {format_rounded(values[name].value, 'm')}"
+            parts[0] += f", {axis} = {quantities.format_value(values[name].value, 'm')}"
     if comparison.track is not None:
         parts.insert(0, _describe_track(comparison.track))
     if is_known(values.get("worn_volume")):
@@ -226,7 +209,7 @@ def _describe_track(track: Track) -> str:
     for side, name in enumerate(("from", "to")):
         end = track.values[name]
         if is_known(end) and not track.cut[side]:
-            places[side] = format_rounded(end.value, "m", digits=5)
+            places[side] = quantities.format_value(end.value, "m", digits=5)
     width, depth = (format_value(name, track.values[name]) for name in ("width", "depth_mean"))
     return f"a track from {places[0]} to {places[1]} of the second trace is {width} wide and {depth} deep on average"
 
@@ -256,7 +239,7 @@ def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> d
         if isinstance(number, float):
             # a ratio of lengths differs from 1 in its last digits
             digits = 6 if name in ("scale", "low", "high") else 4
-            fields[name] = format_rounded(number, unit, digits)
+            fields[name] = quantities.format_value(number, unit, digits)
         elif number is not None:
             fields[name] = str(number)
     # without a limit there is nothing to state

@@ -14,13 +14,16 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
+from ...response import rows
+from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
 from ..runs import list_versions
-from .tables import sort_measures
 from .words import describe_place, make_peak_quantities, make_verdict
 
+# place of a measure in the reference
+MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 MAX_RANGES = 3  # measures whose largest and smallest values are quantities
 MAX_MESSAGES = 5  # messages of failed cases among the warnings
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
@@ -170,6 +173,17 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
     for name, (values, text) in words.items():
         data[name] = Variable(dims, np.array(values, str).reshape(table.shape), "", text)
     return data
+
+
+def sort_measures(table: SweepTable) -> list[str]:
+    """Return the measures of a table in the order in which the reference lists them."""
+    return sorted(
+        table.measures,
+        key=lambda name: (
+            MEASURE_ORDER.get(rows.remove_interface_number(name), len(MEASURE_ORDER)),
+            name,
+        ),
+    )
 
 
 def _describe_key(key: SweptKey) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -16,13 +16,13 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.sweep import WorkerData, iterate_chunks
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Missing, PatchfemError
+from ...disk.atomic_write import write_rows
 from ...runs.batch.case_results import CaseResults
 from .. import page as pages
 from .. import store as answers
 from ..answer import Answer
-from .answer import identify_sweep, make_answer, read_tolerance
+from .answer import identify_sweep, make_answer, read_tolerance, sort_measures
 from .folder import Folder, Writer
-from .tables import write_csv
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
 MAX_CASES_WITH_TABLES = 200_000  # cases of which sweep.csv is written without --collect
@@ -204,6 +204,51 @@ def write_tables(
     if page:
         pages.write_page(folder.target)
     return answers.read(folder.target)
+
+
+def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:
+    """Write sweep.csv.
+
+    A row has the swept keys as written, the outcome, every measure with its error in SI, the message
+    of a failed case, and the name of its folder. A missing number is "".
+
+    Parameters
+    ----------
+    cases : Cases
+        Values of the keys in each case.
+    table : SweepTable
+        Measures and outcome of each case.
+    case_folders : sequence of str
+        Folders of the cases; empty if there are none.
+    path : Path
+        File to write.
+    """
+    names = sort_measures(table)
+    heads = [axis.key for axis in cases.axes] + ["outcome"]
+    texts = []
+    for name in names:
+        heads += [name, f"{name}_error"]
+        texts.append(_format_numbers(table.measures[name].values, "{!r}"))
+        texts.append(_format_numbers(table.measures[name].errors, "{:.6g}"))
+    heads += ["message"] + ["case"] * bool(case_folders)
+    # The rows are made one by one, because the cells of all cases would fill the memory.
+    lines = (
+        [
+            *cases.texts(number),
+            str(table.outcome[number]),
+            *cells,
+            table.messages.get(number, ""),
+            *case_folders[number : number + 1],
+        ]
+        for number, *cells in zip(range(len(table)), *texts)
+    )
+    write_rows(path, chain([heads], lines))
+
+
+def _format_numbers(numbers: np.ndarray, template: str) -> Iterator[str]:
+    """Yield numbers as strings; "" for NaN."""
+    for number in map(float, numbers):
+        yield "" if number != number else template.format(number)
 
 
 def compute_in_memory(

@@ -10,10 +10,9 @@ from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
-from ...formatting import format_number
 from ...response import rows
 from ..answer import Quantities, Quantity
-from ..quantities import choose_scale, format_quantity, format_value
+from ..quantities import format_quantity, format_value
 
 SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
@@ -72,8 +71,7 @@ def _label(name: str) -> str:
 
 def _format_measure(name: str, unit: str, value: float) -> str:
     """Return a value of a measure with its unit."""
-    label, scale = choose_scale(name, unit, value)
-    return f"{format_number(value * scale, 4)} {label}".strip() if value else "0"
+    return format_value(value, unit, name=name) if value else "0"
 
 
 def _describe_limit(limits: list[KeyLimit]) -> str:
