@@ -22,7 +22,24 @@ def subtract_sine(x):
 
 
 def find_rounded_angle(line_load, flat, radius, modulus) -> float:
-    """Return pi/2 - phi_0 of the rounded punch, with sin phi_0 = flat/(contact half width)."""
+    """Return pi/2 - phi_0 of the rounded punch, with sin phi_0 = flat/(contact half width).
+
+    Parameters
+    ----------
+    line_load : float
+        Load P per width [N/m].
+    flat : float
+        Half width a_f of the flat part [m].
+    radius : float
+        Radius R of the rounded edges [m].
+    modulus : float
+        Combined modulus E* [Pa].
+
+    Raises
+    ------
+    ValueError
+        If an argument is not positive, or if the flat part is too short to affect the pressure.
+    """
     require_positive(line_load=line_load, flat=flat, radius=radius, modulus=modulus)
     scaled_load = 2 * line_load * radius / (flat**2 * modulus)
     max_angle = np.pi / 2 - 1e-9

@@ -108,10 +108,9 @@ def estimate_static_measures(
         )
     else:
         error = 0.0 if coarse else None
-        out = {
-            name: make_measure(name, value, error, FINEST_MESH_SOURCE)
-            for name, value in finest.items()
-        }
+        out = {}
+        for name, value in finest.items():
+            out[name] = make_measure(name, value, error, FINEST_MESH_SOURCE)
 
     # Errors and reasons that no series over meshes shows.
     if coarse and fine.averaging is not None:

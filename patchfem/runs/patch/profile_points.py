@@ -203,13 +203,14 @@ def _combine_refinement_series(
             value = estimate.value + by_ends[name].value - end_levels[-1].values[name]
             error = estimate.error + by_ends[name].error
             out[name] = make_measure(name, value, error, HALF_SPACE_SOURCE)
-    peak = out.get("pressure_peak")
+
+    # The loaded fraction is the mean pressure divided by the peak.
+    peak_name, fraction_name = PEAK_MEASURES
+    peak = out.get(peak_name)
     if peak is not None and peak.value > 0:
-        # The loaded fraction is the mean pressure divided by the peak.
-        mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
-        fraction = mean / peak.value
+        fraction = finest.values[fraction_name] * finest.values[peak_name] / peak.value
         error = increase_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
-        out["loaded_fraction"] = make_measure("loaded_fraction", fraction, error, HALF_SPACE_SOURCE)
+        out[fraction_name] = make_measure(fraction_name, fraction, error, HALF_SPACE_SOURCE)
     return out
 
 

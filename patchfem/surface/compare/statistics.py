@@ -31,11 +31,8 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
         Quantile of the sizes on one side, which that of normal values scales. More than this fraction of
         them must be unchanged.
     """
-    sides = [
-        np.abs(side)
-        for side in (depth[depth > 0], depth[depth < 0])
-        if side.size >= MIN_SIDE_DEPTHS
-    ]
+    halves = (depth[depth > 0], depth[depth < 0])
+    sides = [np.abs(side) for side in halves if side.size >= MIN_SIDE_DEPTHS]
     if not sides:
         return max(robust_deviation(depth), TINY) if depth.size else TINY
     smallest = min(float(np.quantile(side, fraction)) for side in sides)
