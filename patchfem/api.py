@@ -12,7 +12,6 @@ perform computations; `run` returns a `Result`. `profile` and `compare` evaluate
 from __future__ import annotations
 
 import re
-import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
@@ -534,9 +533,7 @@ def backbone(
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
         if isinstance(scene, Model):
             return build(scene, **changes)
-        values = {}
-        if sets is not None:
-            values = changes | dict(text.split("=", 1) for text in sets)
+        values = {} if sets is None else changes | dict(text.split("=", 1) for text in sets)
         loaded = _load_and_prepare(scene, tables, values)
         return build_model(remember_written(loaded, _count_written(scene), tables))
 
@@ -624,24 +621,21 @@ def sweep(
     >>> dataset["friction_force_peak"].values.round(1).tolist()
     [11.5, 23.0, 34.5]
     """
-    if over is not None and not isinstance(over, Mapping):
+    if not isinstance(over, Mapping | None):
         raise PatchfemError(
             f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}"
         )
     values_by_key = over or {}
     if mistakes := find_oversized_lengths(values_by_key):
         raise SceneError(mistakes)
-    if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
-        raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
+    for key, values in values_by_key.items():
+        if hasattr(values, "__len__") and not len(values):
+            raise SceneError([f"{key}: the sweep has no value for this key"])
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed)
-    words = [word for text in ranges for word in ("--over", text)]
-    if draw:
-        words += [f"--{'sobol' if sobol else 'random'}", str(draw), "--seed", str(seed)]
-    command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets)
-    cases = parse_request.read_cases(sweep_scene, request)
-    cases = replace(cases, command=shlex.join([*shlex.split(command), *words]))
+    command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets, request.list_options())
+    cases = replace(parse_request.read_cases(sweep_scene, request), command=command)
     pool = executors.make_executor(executor, jobs)
     if out is None:
         answer = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
@@ -649,11 +643,6 @@ def sweep(
         target = sweep_run.SweepTarget(Path(out), resume)
         answer = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
     return sweep_datasets.to_dataset(answer)
-
-
-def _is_empty(values: Any) -> bool:
-    """Return whether the values of a swept key are an empty list or string."""
-    return hasattr(values, "__len__") and not len(values)
 
 
 class SweepPlots:
@@ -1524,8 +1513,8 @@ class Result(run_result.Result):
         """
         rows = []
         for name, measure in self.measures.items():
-            columns = ("value", "error", "unit")
-            rows.append({"measure": name} | {key: getattr(measure, key) for key in columns})
+            numbers = {"value": measure.value, "error": measure.error, "unit": measure.unit}
+            rows.append({"measure": name} | numbers)
         try:
             from pandas import DataFrame
         except ImportError:

@@ -100,20 +100,3 @@ def test_always_folder_used_during_removal_is_restored(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "rename", use_then_rename)
     cache_limit.remove_old_folders(current, 0)
     assert (old / "code" / "a.code").is_file() and len(list(tmp_path.iterdir())) == 2
-
-
-def test_always_permission_errors_are_ignored(tmp_path, monkeypatch):
-    """A folder that cannot be removed or marked because of missing permission causes no error."""
-    (old,), current = make_code_folders(tmp_path, [30]), make_current_folder(tmp_path)
-
-    def raise_permission_error(*given):
-        """Raise PermissionError."""
-        raise PermissionError
-
-    monkeypatch.setattr(os, "rename", raise_permission_error)
-    cache_limit.remove_old_folders(current, 0)
-    os.utime(current, (time() - HOUR,) * 2)
-    monkeypatch.setattr(os, "utime", raise_permission_error)
-    cache_limit.mark_used(current)
-    cache_limit.mark_used(tmp_path / "nowhere")
-    assert old.is_dir()

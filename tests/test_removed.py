@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import surfaces
 from command_line import run_cli
 from lab_files import SI, make_record, write_universal
 from scene_texts import COATED, COULOMB, DRIVE, MODE, POINT
@@ -235,7 +234,7 @@ def test_always_removing_versions_are_releases():
 def test_refuses_sdf_file_without_extra(tmp_path):
     """An SDF file is refused with the name of the extra to install."""
     path = tmp_path / "scan.sdf"
-    path.write_bytes(surfaces.make_binary_sdf(surfaces.draw_scan()))
+    path.write_bytes(b"bISO-1.0" + bytes(200))
     with pytest.raises(
         pf.Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"
     ):

@@ -7,7 +7,6 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 import patchfem as pf
 from patchfem.export import store
-from patchfem.runs.batch import lumped
 
 RIG = POINT + COULOMB + SHORT
 OVER = {"friction.static": [0.1, 0.3], "drive.acceleration": ["1 g", "5 g"]}
@@ -57,25 +56,6 @@ def test_exact_page_names_command(tmp_path):
     command = "patchfem sweep rig.toml --set drive.cycles=10 --over friction.static=0.1..0.3 --random 2 --seed 4"
     assert store.read(tmp_path / "drawn").origin["command"] == command
     assert command in (tmp_path / "drawn" / "report.html").read_text("utf-8")
-
-
-def test_always_fault_of_batch_is_a_warning(monkeypatch, tmp_path):
-    """A fault after which cases are run one by one is among the warnings of the sweep, also of a resumed one."""
-
-    def fail(*_):
-        """Fail in place of computing cases together."""
-        raise ZeroDivisionError("a fault")
-
-    monkeypatch.setattr(lumped, "solve", fail)
-    folder = tmp_path / "swept"
-    over = {"friction.static": np.linspace(0.1, 0.3, 40)}
-    pf.sweep(RIG, over, out=folder)
-    pf.sweep(RIG, over, out=folder, resume=True)
-    warnings = store.read(folder).remarks.warnings
-    assert (
-        len(warnings) == 1
-        and "internal fault, please report it: ZeroDivisionError: a fault" in warnings[0]
-    )
 
 
 def test_refuses_invalid_sweep():

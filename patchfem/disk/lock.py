@@ -55,7 +55,7 @@ class FolderLock:
         # without space the lock holds all the same, and its message names no process
         with suppress(OSError):
             os.ftruncate(self.file, 0)
-            os.pwrite(self.file, str(os.getpid()).encode(), 0)
+            os.write(self.file, str(os.getpid()).encode())
 
     def _lock(self, file: int) -> None:
         """Lock an open file, or close it and raise Missing."""

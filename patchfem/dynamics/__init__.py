@@ -24,10 +24,7 @@ PUBLIC = {
         "trace_over_frequency",
     ),
     "harmonic.forces": ("LawGroup",),
-    "harmonic.laws": (
-        "Interlock",
-        "Spring",
-    ),
+    "harmonic.laws": ("Spring",),
     "harmonic.motion": (
         "find_cycle_energies",
         "find_regime",

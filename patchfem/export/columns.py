@@ -146,13 +146,12 @@ def list_rows(answer: Answer, source: str) -> list[Cells]:
     columns = {}
     for name, variable in variables.items():
         columns[name] = list_cells(variable)
-        if not variable.meanings and variable.values.dtype.kind not in "UO":
-            ends = {end: variables.get(f"{name}_{end}") for end in ("error", "low", "high")}
-            lists = {end: one.values for end, one in ends.items() if one is not None}
-            rows = zip(variable.values, *lists.values(), strict=True)
+        if variable.values.dtype.kind == "f":
+            ends = [end for end in ("error", "low", "high") if f"{name}_{end}" in variables]
+            lists = [variables[f"{name}_{end}"].values for end in ends]
             columns[name] = [
-                Quantity(value, variable.unit, **dict(zip(lists, numbers, strict=True)))
-                for value, *numbers in rows
+                Quantity(value, variable.unit, **dict(zip(ends, numbers, strict=True)))
+                for value, *numbers in zip(variable.values, *lists, strict=True)
             ]
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 

@@ -200,9 +200,9 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
         columns[name] = ([getattr(run, attribute) for run in runs], unit)
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
-        measures = [run.measures.get(name) for run in runs]
-        for prefix, part in (("", "value"), ("error_", "error")):
-            columns[prefix + name] = ([getattr(one, part, None) for one in measures], unit)
+        for heading, part in ((name, "value"), (f"error_{name}", "error")):
+            numbers = [getattr(run.measures.get(name), part, None) for run in runs]
+            columns[heading] = (numbers, unit)
 
     # an exact run has no place on a logarithmic axis
     columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
@@ -216,10 +216,8 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
 
     # a colour for each varied setting and for runs that miss the tolerance
     has_several = rows[0].knob != rows[-1].knob
-    data["result"] = encode(
-        "run",
-        [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows],
-    )
+    texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
+    data["result"] = encode("run", texts)
     seconds = data["seconds"].values
     ends = {
         "allowed_seconds": ([seconds.min(), seconds.max()], "s"),

@@ -383,10 +383,10 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
         data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
 
     # codes by which the charts colour the rows
-    uses = [
-        ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
-        for held, row in zip(is_held, entries, strict=True)
-    ]
+    uses = []
+    for row, is_held_out in zip(entries, is_held, strict=True):
+        unstable = ", unstable in the test" * ("U" in row["flag"])
+        uses.append(f"{'held out' if is_held_out else 'fitted'}{unstable}")
     drives = [f"{row['frequency']:.6g} Hz" for row in entries]
     codes = {"use": encode("row", uses), "drive": encode("row", drives)}
     return entries, codes | data | make_columns("row", columns)

@@ -51,6 +51,11 @@ def make_variable_attributes(variable: Variable) -> Attributes:
     return attributes | ({"units": variable.unit} if variable.unit else {})
 
 
+def write_netcdf(answer: Answer, path: Path) -> None:
+    """Write the arrays of an answer as a netCDF4 file."""
+    write_arrays(answer.data, make_attributes(answer), path)
+
+
 def write_arrays(data: Variables, attributes: Attributes, path: Path) -> None:
     """Write variables as a netCDF4 file, which replaces an older one when it is complete.
 

@@ -127,7 +127,7 @@ def _choose_headline(result: Result, measures: Quantities) -> str:
         return "wear"
     if "relative_displacement_rms" in measures:
         return "random"
-    return {"patch": "patch", "bench": "bench"}.get(result.plan.kind, "rig")
+    return result.plan.kind if result.plan.kind in ("patch", "bench") else "rig"
 
 
 def _is_shown(measures: Quantities, name: str) -> bool:

@@ -4,6 +4,7 @@ import math
 import shlex
 import sys
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import shorten
 
@@ -85,7 +86,7 @@ def make_origin(source, verb: str) -> JsonObject:
     }
 
 
-def make_command(verb: str, path: Path, sets: tuple[str, ...]) -> str:
+def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence[str] = ()) -> str:
     """Return the command line that repeats a verb.
 
     Parameters
@@ -96,12 +97,14 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...]) -> str:
         Scene file; it is named without its folder.
     sets : tuple of str
         ``table.key=value`` strings.
+    options : sequence of str, optional
+        Further words.
     """
     words = ["patchfem", verb, Path(path).name]
     for assignment in sets:
         key, _, value = assignment.partition("=")
         words += ["--set", f"{key}={Path(value).name if value.startswith('/') else value}"]
-    return shlex.join(words)
+    return shlex.join([*words, *options])
 
 
 def list_versions() -> dict[str, str]:

@@ -5,6 +5,7 @@ read, the arrays as netCDF, a CSV file for each curve, and report.html, which is
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_text
 from .answer import RUN_KINDS, Answer, JsonObject, Quantity, Remarks, Variable
 from .columns import format_curves
-from .netcdf import make_attributes, read_netcdf, write_arrays
+from .netcdf import read_netcdf, write_netcdf
 
 SUMMARY = "summary.json"
 SCENE = "scene.resolved.toml"
@@ -59,7 +60,7 @@ def write(answer: Answer, folder: Path) -> None:
         write_text(folder / SCENE, answer.origin["resolved"])
     if answer.data:
         data = {name: variable for name, variable in answer.data.items() if name != CPU_TIMES}
-        write_arrays(data, make_attributes(answer), folder / data_file(answer.kind))
+        write_netcdf(replace(answer, data=data), folder / data_file(answer.kind))
     for name, text in format_curves(answer).items():
         write_text(folder / name, text)
     if not answer.is_run:

@@ -10,8 +10,8 @@ step is cut at the first zero of a margin, and the law changes its regime there.
 constraint on the modes. Work, slip and loss are states of the integrator; extremes, times of stick and harmonics of
 the last cycles are summed over the dense output. Nothing is derived from samples.
 
-In: `core.ModalBasis`, a drive, laws, loads (`cases`). Out: `runs.Motion` of a single case, `runs.Batch` of many. A
-bench is the same engine with a prescribed slide. Errors follow from a second run with larger steps.
+In: `core.ModalBasis`, a drive, laws, loads (`cases`). Out: `runs.Motion`. A bench is the same engine with a
+prescribed slide. Errors follow from a second run with larger steps.
 
 A module imports its own entry of this list and the entries before it:
 
@@ -20,12 +20,12 @@ A module imports its own entry of this list and the entries before it:
 3. `table_kernels`    functions of all laws as one
 4. `motion_kernels`   rates of modes, drive, friction, work
 5. `step_kernels`     step of order 8 with dense output
-6. `event_kernels`    first zero of a margin, change of regime
+6. `event_kernels`    roots within a step, its first event, change of regime
 7. `window_kernels`   measures of cycles and windows, samples
-8. `engine_kernels`   loop over steps, cycles and cases
+8. `engine_kernels`   loop over steps and cycles
 9. `drives`           pieces and tones of a drive
 10. `cases`           arrays of a case from the records of a rig or bench
-11. `measures`        measures of a window
+11. `measures`        measures of the window, energies
 12. `runs`            runs with errors and histories
 13. `periodic`        periodic motions by shooting
 

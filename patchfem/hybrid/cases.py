@@ -75,7 +75,7 @@ class Case:
     - rig: arrays of the engine
     - y (n,): state at the start
     - ends (C,): ends of the cycles [s]
-    - windows (C,): number of the window that a cycle belongs to, -1 for none
+    - windows (C,): 0 for a cycle of the window, -1 for others, -2 for those that are computed even if the motion repeats
     - samples (S,): rising times [s] at which the motion is stored
     - n_friction: number of friction interfaces; the others are springs
     - first_stiffness: stiffness [N/m] of the first mode at the contact, 0 if unknown
@@ -332,42 +332,26 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     return speed / omega, speed
 
 
-def stack(arrays) -> tuple[np.ndarray, ...]:
-    """Return records of arrays as one record with a leading axis of cases."""
-    first = arrays[0]
-    return type(first)(*(np.ascontiguousarray(np.stack(parts)) for parts in zip(*arrays)))
-
-
-def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
-    """Return rigs, states and empty records of cases whose arrays have the same shapes.
-
-    Parameters
-    ----------
-    cases : sequence of Case
-        Rigs of equal shape, with their states at the start.
-    n_events : int
-        Number of events that a case can store.
-    """
-    rig = cases[0].rig
-    n_cases = len(cases)
+def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
+    """Return the state at the start of a case and its empty record, with room for a number of events."""
+    rig = case.rig
     n_faces = rig.faces.shape[0]
-    n = cases[0].y.size
-    clock = np.zeros((n_cases, len(Clock)))
-    clock[:, Clock.STEP] = [0.1 * case.rig.settings[Setting.LONGEST_STEP] for case in cases]
+    n = case.y.size
+    clock = np.zeros(len(Clock))
+    clock[Clock.STEP] = 0.1 * rig.settings[Setting.LONGEST_STEP]
 
     # Memories of laws that have not moved.
-    memory = np.zeros((n_cases, n_faces, Memory.STACK + 2 * REVERSALS))
-    memory[..., [Memory.CONTACT, Memory.COUNT, Memory.VIRGIN]] = 1.0
+    memory = np.zeros((n_faces, Memory.STACK + 2 * REVERSALS))
+    memory[:, [Memory.CONTACT, Memory.COUNT, Memory.VIRGIN]] = 1.0
     for i in range(n_faces):
         law = LAWS[int(rig.faces[i, Face.LAW])]
-        memory[:, i, Memory.FLAG] = law in ("bouc_wen",)
-        memory[:, i, Memory.COUNT] = law in ("pressed_springs",)
+        memory[i, Memory.FLAG] = law in ("bouc_wen",)
+        memory[i, Memory.COUNT] = law in ("pressed_springs",)
         if law == "bonds":
-            memory[:, i, Memory.FLAG] = -1.0
+            memory[i, Memory.FLAG] = -1.0
 
-    # Workspaces are shared by all cases, which run one after the other.
     state = State(
-        np.array([case.y for case in cases]),
+        case.y.copy(),
         memory,
         clock,
         np.zeros((N_STATE_ROWS, n)),
@@ -376,20 +360,19 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
         np.zeros((n_faces, n_faces)),
     )
 
-    # Schedules and samples hold their times already.
-    n_cycles = cases[0].ends.size
-    n_windows = int(cases[0].windows.max()) + 1
-    cycles = np.zeros((n_cases, n_cycles, len(Cycle)))
-    cycles[..., Cycle.END] = [case.ends for case in cases]
-    cycles[..., Cycle.WINDOW] = [case.windows for case in cases]
+    # Schedule and samples hold their times already; extremes begin without a value.
+    cycles = np.zeros((case.ends.size, len(Cycle)))
+    cycles[:, Cycle.END] = case.ends
+    cycles[:, Cycle.WINDOW] = case.windows
+    cycles[:, [Cycle.MIN, Cycle.MIN_SLIDE]] = np.inf
+    cycles[:, [Cycle.MAX, Cycle.MAX_SLIDE]] = -np.inf
+    whole = np.zeros(len(Whole))
+    whole[[Whole.MIN, Whole.MIN_ACCELERATION]] = np.inf
+    whole[[Whole.MAX, Whole.MAX_ACCELERATION]] = -np.inf
+    faces = np.zeros((n_faces, len(Window)))
+    faces[:, Window.MIN_FORCE : Window.STUCK : 2] = np.inf
+    faces[:, Window.MAX_FORCE : Window.STUCK : 2] = -np.inf
     width = 1 + n + 3 * n_faces + 2
-    samples = np.zeros((n_cases, cases[0].samples.size, width))
-    samples[..., 0] = [case.samples for case in cases]
-    record = Record(
-        cycles,
-        np.zeros((n_cases, n_windows, len(Whole))),
-        np.zeros((n_cases, n_windows, n_faces, len(Window))),
-        samples,
-        np.zeros((n_cases, n_events, width)),
-    )
-    return stack([case.rig for case in cases]), state, record
+    samples = np.zeros((case.samples.size, width))
+    samples[:, 0] = case.samples
+    return state, Record(cycles, whole, faces, samples, np.zeros((n_events, width)))

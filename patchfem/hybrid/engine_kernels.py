@@ -1,4 +1,4 @@
-"""Motion from event to event over a schedule of cycles, and the loop over cases (compiled).
+"""Motion from event to event over a schedule of cycles (compiled).
 
 In every regime the equations are smooth. A step that leaves the regime is cut at the first zero of a margin on its dense
 output, and the regime is switched there.
@@ -13,12 +13,15 @@ from .event_kernels import (
     change_regime,
     copy_margins,
     find_event,
+    find_root,
+    find_value,
     hold_or_release,
     start_directions,
 )
 from .motion_kernels import find_integrals, find_rates, look, project
 from .records import (
     N_FACE_INTEGRALS,
+    WINDOW_START,
     Clock,
     Cycle,
     Face,
@@ -26,18 +29,13 @@ from .records import (
     Memory,
     Mode,
     Piece,
-    Record,
-    Rig,
+    Probe,
     Setting,
-    State,
     Status,
-    Whole,
-    Window,
 )
-from .step_kernels import CYCLE, N_STAGES, RATES, SCALE, WINDOW, read_curve, step_factor, take_step
+from .step_kernels import CYCLE, N_STAGES, RATES, SCALE, read_curve, step_factor, take_step
 from .window_kernels import (
     add_output,
-    find_output,
     observe_cycle,
     observe_window,
     write_directions,
@@ -63,7 +61,8 @@ MIN_PARTICIPATION = (
 )
 MIN_CONTRACTION = 1e-3  # smallest ratio of two changes over a cycle that is assumed
 MAX_CONTRACTION = 0.9999
-TRAVEL_TOL = 1e-12  # error of the end of travel, relative to its step
+SAME_PHASE_TOL = 1e-6  # difference of two phases that count as equal [cycles]
+MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
 REPEAT_TOL = (
     1.0  # largest remaining change of a motion that repeats, relative to the step tolerance
 )
@@ -145,7 +144,7 @@ def add_energies(rig, state, before):
 
 @njit(**NJIT_KERNEL)
 def find_travel_end(rig, state, fraction):
-    """Return the fraction of a step at which the output reaches the stop, or 2 (bisection).
+    """Return the fraction of a step at which the output reaches the stop, or 2.
 
     Parameters
     ----------
@@ -156,18 +155,12 @@ def find_travel_end(rig, state, fraction):
     fraction : float
         Fraction of the step at which its motion ends.
     """
-    limit = rig.settings[Setting.TRAVEL]
-    if limit == np.inf or abs(find_output(rig, state, fraction)) <= limit:
+    if (
+        rig.settings[Setting.TRAVEL] == np.inf
+        or find_value(rig, state, fraction, -1, Probe.TRAVEL) >= 0
+    ):
         return 2.0
-    left = 0.0
-    right = fraction
-    while right - left > TRAVEL_TOL:
-        middle = 0.5 * (left + right)
-        if abs(find_output(rig, state, middle)) <= limit:
-            left = middle
-        else:
-            right = middle
-    return right
+    return find_root(rig, state, -1, Probe.TRAVEL, 0.0, fraction)
 
 
 @njit(**NJIT_KERNEL)
@@ -285,6 +278,7 @@ def advance_over_pieces(rig, state, record, t_end, cycle):
         status = advance(rig, state, record, min(piece_end, t_end), cycle)
         if status != Status.DONE or is_last or piece_end > t_end:
             return status
+        find_rates(rig, state, clock[Clock.TIME], state.y, state.rows[RATES])
         clock[Clock.PIECE] += 1
         clock[Clock.IS_SMOOTH] = 0.0
         hold_or_release(rig, state)
@@ -300,6 +294,30 @@ def find_change(rig, state):
         change = abs(state.y[k] - state.rows[CYCLE, k]) / state.rows[SCALE, k]
         largest = max(largest, change)
     return largest
+
+
+@njit(**NJIT_KERNEL)
+def repeat_row(rig, state, row, source, count):
+    """Write a sample or event that repeats another one a number of cycles later.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion at the end of the cycle that is repeated.
+    row : (m,) array
+        Row that is written.
+    source : (m,) array
+        Row of the earlier sample or event.
+    count : int
+        Number of cycles between them.
+    """
+    for k in range(row.size):
+        row[k] = source[k]
+    row[0] += count * rig.settings[Setting.PERIOD]
+    for k in range(find_integrals(rig, state.y), state.y.size):
+        row[1 + k] += count * (state.y[k] - state.rows[CYCLE, k])
 
 
 @njit(**NJIT_KERNEL)
@@ -319,22 +337,48 @@ def skip_cycles(rig, state, record, cycle, count):
     count : int
         Number of cycles.
     """
-    columns = record.cycles.shape[1]
+    clock = state.clock
+    period = rig.settings[Setting.PERIOD]
     for c in range(cycle + 1, cycle + 1 + count):
-        for k in range(Cycle.MIN, columns):
+        for k in range(Cycle.MIN, record.cycles.shape[1]):
             record.cycles[c, k] = record.cycles[cycle, k]
         record.cycles[c, Cycle.REPEATS] = 1.0
+    end = record.cycles[cycle + count, Cycle.END]
+
+    # Samples have the same phases in all cycles, so that each repeats the one a period before.
+    source = 0
+    while clock[Clock.SAMPLE] < record.samples.shape[0]:
+        row = record.samples[int(clock[Clock.SAMPLE])]
+        t = row[0]
+        if t >= end:
+            break
+        while record.samples[source, 0] < t - (1 + SAME_PHASE_TOL) * period:
+            source += 1
+        repeat_row(rig, state, row, record.samples[source], 1)
+        row[0] = t
+        clock[Clock.SAMPLE] += 1
+
+    # Events of the cycle, in MAX_REPEATED of the skipped ones, for histories.
+    last = min(int(clock[Clock.N_EVENTS]), record.events.shape[0])
+    first = last
+    while (
+        record.samples.shape[0]
+        and first > 0
+        and record.events[first - 1, 0] > clock[Clock.TIME] - period
+    ):
+        first -= 1
+    for c in range(1, count + 1, max(1, count // MAX_REPEATED)):
+        for number in range(first, last):
+            if clock[Clock.N_EVENTS] < record.events.shape[0]:
+                row = record.events[int(clock[Clock.N_EVENTS])]
+                repeat_row(rig, state, row, record.events[number], c)
+                clock[Clock.N_EVENTS] += 1
+
     for k in range(find_integrals(rig, state.y), state.y.size):
         state.y[k] += count * (state.y[k] - state.rows[CYCLE, k])
-    clock = state.clock
     clock[Clock.EXCHANGED] += count * (clock[Clock.EXCHANGED] - clock[Clock.EXCHANGED_BEFORE])
-    clock[Clock.TIME] = record.cycles[cycle + count, Cycle.END]
-    state.clock[Clock.IS_SMOOTH] = 0.0
-    while state.clock[Clock.SAMPLE] < record.samples.shape[0]:
-        if record.samples[int(state.clock[Clock.SAMPLE]), 0] >= state.clock[Clock.TIME]:
-            break
-        record.samples[int(state.clock[Clock.SAMPLE]), 0] = np.nan
-        state.clock[Clock.SAMPLE] += 1
+    clock[Clock.TIME] = end
+    clock[Clock.IS_SMOOTH] = 0.0
 
 
 @njit(**NJIT_KERNEL)
@@ -372,55 +416,6 @@ def count_repeated(rig, state, record, cycle):
 
 
 @njit(**NJIT_KERNEL)
-def begin_window(rig, state, record, cycle):
-    """Start the sums of a window; the scales of extremes begin without any value.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    record : Record
-        What the run records.
-    cycle : int
-        Number of the cycle.
-    """
-    w = int(record.cycles[cycle, Cycle.WINDOW])
-    for k in range(state.y.size):
-        state.rows[WINDOW, k] = state.y[k]
-    for k in (Whole.MIN, Whole.MIN_ACCELERATION):
-        record.whole[w, k] = np.inf
-        record.whole[w, k + 1] = -np.inf
-    for i in range(rig.faces.shape[0]):
-        for k in range(Window.MIN_FORCE, Window.STUCK, 2):
-            record.faces[w, i, k] = np.inf
-            record.faces[w, i, k + 1] = -np.inf
-
-
-@njit(**NJIT_KERNEL)
-def end_window(rig, state, record, cycle):
-    """Write the friction works of a window.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    record : Record
-        What the run records.
-    cycle : int
-        Number of the cycle.
-    """
-    w = int(record.cycles[cycle, Cycle.WINDOW])
-    first = find_integrals(rig, state.y)
-    for i in range(rig.faces.shape[0]):
-        k = first + N_FACE_INTEGRALS * i
-        record.faces[w, i, Window.WORK] = state.y[k] - state.rows[WINDOW, k]
-
-
-@njit(**NJIT_KERNEL)
 def drop_cut_extremes(cycle, point):
     """Remove the friction force at an extreme slide that lies at an end of a cycle, but is no reversal.
 
@@ -440,7 +435,7 @@ def drop_cut_extremes(cycle, point):
 
 
 @njit(**NJIT_KERNEL)
-def run_case(rig, state, record):
+def run_cycles(rig, state, record):
     """Run the cycles of a case; return its `Status`.
 
     Parameters
@@ -463,15 +458,12 @@ def run_case(rig, state, record):
     cycle = 0
     while cycle < n_cycles:
         row = record.cycles[cycle]
-        window = row[Cycle.WINDOW]
-        if window >= 0 and (cycle == 0 or record.cycles[cycle - 1, Cycle.WINDOW] != window):
-            begin_window(rig, state, record, cycle)
+        in_window = row[Cycle.WINDOW] >= 0
+        if in_window and (cycle == 0 or record.cycles[cycle - 1, Cycle.WINDOW] < 0):
+            for k in range(state.y.size):
+                state.rows[WINDOW_START, k] = state.y[k]
 
-        # Start of a cycle: empty sums, extremes without a value, and the state for the check of repetition.
-        for k in range(Cycle.MIN, record.cycles.shape[1]):
-            row[k] = 0.0
-        row[Cycle.MIN] = row[Cycle.MIN_SLIDE] = np.inf
-        row[Cycle.MAX] = row[Cycle.MAX_SLIDE] = -np.inf
+        # State at the start of a cycle for the check of repetition.
         add_output(rig, state.y, row)
         if repeat and cycle % repeat == 0:
             for k in range(state.y.size):
@@ -494,13 +486,9 @@ def run_case(rig, state, record):
         clock[Clock.N_CYCLES] = cycle + 1
         if status != Status.DONE:
             return status
-        if window >= 0 and (
-            cycle + 1 == n_cycles or record.cycles[cycle + 1, Cycle.WINDOW] != window
-        ):
-            end_window(rig, state, record, cycle)
 
         # The remaining change is that of a geometric series of the last two changes.
-        if repeat == 1 and window < 0:
+        if repeat == 1 and not in_window:
             change = find_change(rig, state)
             ratio = min(max(change / last_change, MIN_CONTRACTION), MAX_CONTRACTION)
             last_change = max(change, 1e-300)
@@ -513,46 +501,16 @@ def run_case(rig, state, record):
 
 
 @njit(**NJIT_KERNEL)
-def run_cases(rigs, states, records):
-    """Run all cases of a batch, whose arrays have a leading axis, except the workspaces of the state.
+def run_case(rig, state, record):
+    """Run a case, and write its `Status` into the clock.
 
     Parameters
     ----------
-    rigs : Rig
-        Arrays of a batch.
-    states : State
-        Arrays of a batch.
-    records : Record
-        Arrays of a batch.
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
     """
-    for c in range(rigs.faces.shape[0]):
-        rig = Rig(
-            rigs.modes[c],
-            rigs.damping[c],
-            rigs.rows[c],
-            rigs.faces[c],
-            rigs.pieces[c],
-            rigs.tones[c],
-            rigs.scales[c],
-            rigs.settings[c],
-        )
-
-        # Workspaces are shared, because the cases run one after the other.
-        state = State(
-            states.y[c],
-            states.memory[c],
-            states.clock[c],
-            states.rows,
-            states.margins,
-            states.probes,
-            states.grip,
-        )
-
-        record = Record(
-            records.cycles[c],
-            records.whole[c],
-            records.faces[c],
-            records.samples[c],
-            records.events[c],
-        )
-        states.clock[c, Clock.STATUS] = run_case(rig, state, record)
+    state.clock[Clock.STATUS] = run_cycles(rig, state, record)

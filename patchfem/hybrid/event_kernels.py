@@ -1,4 +1,4 @@
-"""First zero of a margin within a step, and the change of regime there (compiled).
+"""Values and roots within a step, its first event, and the change of regime there (compiled).
 
 The margins are evaluated on the dense output at N_CHECKS points of a step, and at the vertex of the parabola through
 three of them where a margin nearly vanishes between two points.
@@ -10,8 +10,16 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .motion_kernels import find_rates, look, project, rests, update_grip
-from .records import Clock, Face, Margin, Memory, Setting
+from .motion_kernels import (
+    find_drive,
+    find_integrals,
+    find_rates,
+    look,
+    project,
+    rests,
+    update_grip,
+)
+from .records import N_FACE_INTEGRALS, Clock, Face, Margin, Memory, Mode, Probe, Setting
 from .step_kernels import POINT, RATES, read_curve
 from .table_kernels import switch_law, write_law_margins
 
@@ -26,6 +34,7 @@ class StepEvent(NamedTuple):
 
 N_CHECKS = 3  # points of a step at which margins are evaluated, besides its start
 N_MARGINS = 4
+LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
 MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive
 MAX_PIVOTS = 100
@@ -109,8 +118,49 @@ def write_margins_inside(rig, state, x, row):
 
 
 @njit(**NJIT_KERNEL)
-def find_margin(rig, state, x, i, k):
-    """Return a margin at the fraction x of a step.
+def write_probes(rig, state, t, y, probes):
+    """Write the scalars of a state that cycles and windows observe.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    probes : (p,) array
+        Scalars, which are written.
+    """
+    n = rig.modes.shape[1]
+    find_rates(rig, state, t, y, state.rows[RATES])
+    acceleration = state.rows[RATES, n : 2 * n]
+    output = rig.modes[Mode.OUTPUT]
+    probes[Probe.SPEED] = project(output, y[n : 2 * n])
+    probes[Probe.TRAVEL] = rig.settings[Setting.TRAVEL] - abs(project(output, y[:n]))
+    probes[Probe.GAUGE] = project(rig.modes[Mode.GAUGE], y[:n])
+    probes[Probe.ACCELERATION] = project(output, acceleration)
+    if rig.settings[Setting.BASE_MOVES] > 0:
+        probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
+    integrals = find_integrals(rig, y)
+    for i in range(rig.faces.shape[0]):
+        point = look(rig, state, i, t, y)
+        memory = state.memory[i]
+        first = Probe.FACES + Probe.COUNT * i
+        probes[first + Probe.FORCE] = memory[Memory.FORCE]
+        probes[first + Probe.SLIP] = y[integrals + N_FACE_INTEGRALS * i + 1]
+        probes[first + Probe.SLIDE] = point.slide
+        probes[first + Probe.LOAD] = max(point.load, 0.0)
+        slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
+        is_still = rests(memory) or point.velocity == 0
+        probes[first + Probe.SLIPPING] = -1.0 if is_still else slipping
+
+
+@njit(**NJIT_KERNEL)
+def find_value(rig, state, x, i, k):
+    """Return a margin of interface i, or a scalar of the probes for i < 0, at the fraction x of a step.
 
     Parameters
     ----------
@@ -121,17 +171,23 @@ def find_margin(rig, state, x, i, k):
     x : float
         Fraction of the step.
     i : int
-        Number of the interface.
+        Number of the interface, or -1.
     k : int
-        Number of the margin (`records.Margin`).
+        Number of the margin (`records.Margin`), or column of the probes (`records.Probe`).
     """
-    write_margins_inside(rig, state, x, LAST_MARGINS)
-    return state.margins[LAST_MARGINS, i, k]
+    if i >= 0:
+        write_margins_inside(rig, state, x, LAST_MARGINS)
+        return state.margins[LAST_MARGINS, i, k]
+    y = state.rows[POINT]
+    read_curve(state, x, y)
+    t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
+    write_probes(rig, state, t, y, state.probes[LAST_PROBES])
+    return state.probes[LAST_PROBES, k]
 
 
 @njit(**NJIT_KERNEL)
-def find_root(rig, state, i, k, left, right):
-    """Return the fraction of a step at which a margin vanishes between two fractions (Illinois rule).
+def find_margin_root(rig, state, i, k, left, right):
+    """Return the fraction of a step at which a margin vanishes between two fractions.
 
     Parameters
     ----------
@@ -148,23 +204,43 @@ def find_root(rig, state, i, k, left, right):
     right : float
         Fraction of the step after the root.
     """
-    f_left = find_margin(rig, state, left, i, k)
-    f_right = find_margin(rig, state, right, i, k)
+    f_left = find_value(rig, state, left, i, k)
     if f_left < -MARGIN_TOL:
         return left
     # A margin that starts at 0 may first increase.
-    inside = FIRST_LOOK
-    while f_left * f_right >= 0:
+    inside = 0.0
+    while f_left <= 0:
+        inside = FIRST_LOOK if inside == 0 else 4 * inside
         if inside > 1:
             return left
-        f_left = find_margin(rig, state, left + inside * (right - left), i, k)
-        if f_left * f_right < 0:
-            left += inside * (right - left)
-        inside *= 4
+        f_left = find_value(rig, state, left + inside * (right - left), i, k)
+    return find_root(rig, state, i, k, left + inside * (right - left), right)
 
+
+@njit(**NJIT_KERNEL)
+def find_root(rig, state, i, k, left, right):
+    """Return the fraction of a step at which a value changes its sign between two fractions (Illinois rule).
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface, or -1.
+    k : int
+        Number of the margin, or column of the probes.
+    left : float
+        Fraction of the step before the root.
+    right : float
+        Fraction of the step after the root.
+    """
+    f_left = find_value(rig, state, left, i, k)
+    f_right = find_value(rig, state, right, i, k)
     for _ in range(MAX_ROOT_STEPS):
         middle = (left * f_right - right * f_left) / (f_right - f_left)
-        f_middle = find_margin(rig, state, middle, i, k)
+        f_middle = find_value(rig, state, middle, i, k)
         if f_middle * f_right < 0:
             left = right
             f_left = f_right
@@ -225,10 +301,10 @@ def find_event(rig, state):
                     if vertex >= 0 and value < VERTEX_FRACTION * max(a, c):
                         right = (check - 2 + vertex) / N_CHECKS
                         left = (check - 2 + int(vertex)) / N_CHECKS
-                        is_negative = find_margin(rig, state, right, i, k) < -MARGIN_TOL
+                        is_negative = find_value(rig, state, right, i, k) < -MARGIN_TOL
 
                 if is_negative and left < event.fraction:
-                    root = find_root(rig, state, i, k, left, right)
+                    root = find_margin_root(rig, state, i, k, left, right)
                     if event.face < 0 or root < event.fraction:
                         event = StepEvent(root, i, k)
         if event.face >= 0:

@@ -1,21 +1,21 @@
-"""Measures of the windows of many cases, from what the engine records.
+"""Measures of the window of a case, and energies of its run, from what the engine records.
 
-Names and definitions are those of `response.rows`. All arrays have a leading axis of cases; a value without a meaning is
-NaN.
+Names and definitions are those of `response.rows`. A value without a meaning is NaN.
 """
 
 import numpy as np
 
 from ..friction import path_work
+from .cases import Case
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
+    WINDOW_START,
     Clock,
     Cycle,
     Face,
     Mode,
     Record,
-    Rig,
     Setting,
     State,
     Whole,
@@ -27,127 +27,143 @@ MIN_ENERGY = (
 )
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which there is no distortion
 FULL_STICK = 1e-12  # fraction by which a time of stick may miss the whole window
-FACE_MEASURES = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")
 
 
-def compute_measures(
-    rigs: Rig, states: State, records: Record, window: int, first, **model
-) -> dict[str, np.ndarray]:
-    """Return the measures of a window as arrays (c,) by name.
+def compute_measures(case: Case, state: State, record: Record) -> dict[str, float]:
+    """Return the measures of the window and of the whole run by name.
 
     Parameters
     ----------
-    rigs, states, records
-        Arrays of a batch after a run.
-    window : int
-        Number of the window.
-    first : (c, n) array
-        States at the start.
-    **model
-        `n_friction`: number of friction interfaces; `stiffness` (c,): of the first mode at the contact [N/m], 0 if
-        unknown.
+    case : Case
+        Case with the state at its start.
+    state : State
+        State at the end.
+    record : Record
+        What the run recorded.
     """
-    settings = rigs.settings
-    period = settings[:, Setting.PERIOD]
-    whole = records.whole[:, window]
-    span = whole[:, Whole.SPAN]
+    period = case.rig.settings[Setting.PERIOD]
+    # Extremes of a window that the run has not reached have no value.
+    whole, faces = (np.where(np.isinf(row), np.nan, row) for row in (record.whole, record.faces))
+    span = whole[Whole.SPAN]
     has_cycle = span > period * (1 - 1e-6)
-    harmonic_1 = np.hypot(whole[:, Whole.COS_1], whole[:, Whole.SIN_1]) * 2 / span
-    harmonic_3 = np.hypot(whole[:, Whole.COS_3], whole[:, Whole.SIN_3]) * 2 / span
+    harmonic_1 = np.hypot(whole[Whole.COS_1], whole[Whole.SIN_1]) * 2 / span
+    harmonic_3 = np.hypot(whole[Whole.COS_3], whole[Whole.SIN_3]) * 2 / span
     values = {
-        "relative_displacement_amplitude": (whole[:, Whole.MAX] - whole[:, Whole.MIN]) / 2,
-        "absolute_acceleration_peak": np.maximum(
-            whole[:, Whole.MAX_ACCELERATION], -whole[:, Whole.MIN_ACCELERATION]
+        "relative_displacement_amplitude": (whole[Whole.MAX] - whole[Whole.MIN]) / 2,
+        "absolute_acceleration_peak": max(
+            whole[Whole.MAX_ACCELERATION], -whole[Whole.MIN_ACCELERATION]
         ),
-        "absolute_acceleration_fundamental": np.where(has_cycle, harmonic_1, np.nan),
-        "acceleration_distortion": np.where(
-            has_cycle & (harmonic_1 > MIN_ACCELERATION), harmonic_3 / harmonic_1, np.nan
-        ),
+        "absolute_acceleration_fundamental": harmonic_1,
+        "acceleration_distortion": harmonic_3 / harmonic_1
+        if harmonic_1 > MIN_ACCELERATION
+        else np.nan,
     }
-    values |= _compute_energies(rigs, states, first, model["n_friction"])
-    if not model["n_friction"]:
+    if not has_cycle:
+        values |= dict.fromkeys(
+            ("absolute_acceleration_fundamental", "acceleration_distortion"), np.nan
+        )
+    values |= _compute_work(case, state)
+    if not case.n_friction:
         return values
 
     # Measures of every interface; those of further ones carry its number.
-    for i in range(model["n_friction"]):
-        row = records.faces[:, window, i]
+    work = (split_integrals(case, state.y) - split_integrals(case, state.rows[WINDOW_START]))[:, 0]
+    for i, row in enumerate(faces[: case.n_friction]):
         suffix = f"_{i + 1}" if i else ""
-        stuck = row[:, Window.STUCK]
         # A reversal without stick takes a time of the size of round-off.
-        stuck = np.where(stuck <= span * FULL_STICK, 0.0, stuck)
-        found = (
-            (row[:, Window.MAX_SLIP] - row[:, Window.MIN_SLIP]) / 2,
-            np.where(stuck >= span * (1 - FULL_STICK), 1.0, stuck / span),
-            np.maximum(row[:, Window.MAX_FORCE], -row[:, Window.MIN_FORCE]),
-            np.where(has_cycle, row[:, Window.WORK] * period / span, np.nan),
-        )
-        values |= {name + suffix: value for name, value in zip(FACE_MEASURES, found)}
+        stuck = row[Window.STUCK] / span
+        stuck = 0.0 if stuck <= FULL_STICK else 1.0 if stuck >= 1 - FULL_STICK else stuck
+        values |= {
+            f"slip_amplitude{suffix}": (row[Window.MAX_SLIP] - row[Window.MIN_SLIP]) / 2,
+            f"stick_fraction{suffix}": stuck,
+            f"friction_force_peak{suffix}": max(row[Window.MAX_FORCE], -row[Window.MIN_FORCE]),
+            f"loop_area{suffix}": work[i] * period / span if has_cycle else np.nan,
+        }
 
     # Measures of the first interface alone.
-    row = records.faces[:, window, 0]
+    row = faces[0]
     values["slip_start_phase"] = path_work.mean_slip_phase(
-        row[:, Window.STARTS], row[:, Window.COS_START], row[:, Window.SIN_START]
+        row[Window.STARTS], row[Window.COS_START], row[Window.SIN_START]
     )
-    if (rigs.faces[:, 0, Face.SWING] != 0).any() or (rigs.faces[:, 0, Face.STIFFNESS] != 0).any():
-        values["normal_load_least"] = row[:, Window.MIN_LOAD]
-        values["normal_load_peak"] = row[:, Window.MAX_LOAD]
-        values["open_fraction"] = row[:, Window.OPEN] / span
-    loop = _compute_loop(rigs, records, window, span, values, model["stiffness"])
-    return values | {name: np.where(has_cycle, value, np.nan) for name, value in loop.items()}
+    if case.rig.faces[0, Face.SWING] or case.rig.faces[0, Face.STIFFNESS]:
+        values["normal_load_least"] = row[Window.MIN_LOAD]
+        values["normal_load_peak"] = row[Window.MAX_LOAD]
+        values["open_fraction"] = row[Window.OPEN] / span
+    loop = _compute_loop(case, record, values["loop_area"])
+    return values | (loop if has_cycle else dict.fromkeys(loop, np.nan))
 
 
-def _compute_energies(rigs, states, first, n_friction: int) -> dict[str, np.ndarray]:
-    """Return the energies [J] of the whole run and the relative error of their balance."""
-    n_faces = rigs.faces.shape[1]
-    n = rigs.modes.shape[2]
-    y = states.y
-    integrals = y.shape[1] - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
-    faces = y[:, integrals : y.shape[1] - N_INTEGRALS].reshape(len(y), n_faces, N_FACE_INTEGRALS)
+def split_integrals(case: Case, y) -> np.ndarray:
+    """Return friction work [J], path of slip [m] and loss [J] (..., M, 3) of the interfaces in states y (..., n)."""
+    count = N_FACE_INTEGRALS * case.rig.faces.shape[0]
+    y = y[..., y.shape[-1] - N_INTEGRALS - count : y.shape[-1] - N_INTEGRALS]
+    return y.reshape(*y.shape[:-1], -1, N_FACE_INTEGRALS)
 
-    def find_stored(state):
-        """Return the energy (c,) of the modes [J]."""
-        squares = state[:, n : 2 * n] ** 2 + rigs.modes[:, Mode.STIFFNESS] * state[:, :n] ** 2
-        return 0.5 * rigs.settings[:, Setting.MASS] * squares.sum(axis=1)
 
-    work = faces[:, :n_friction, 0].sum(axis=1)
-    loss = faces[:, :n_friction, 2].sum(axis=1)
+def compute_energies(case: Case, state: State) -> dict[str, float]:
+    """Return the energies [J] of the whole motion.
+
+    - "work_in", "power": work of the drive and the sum of its magnitudes over the steps
+    - "viscous", "friction": energies that dampers and friction dissipate
+    - "stored", "peak_stored": change of the stored energy, and the largest energy of the modes
+    """
+    work, _, loss = split_integrals(case, state.y).T
+    change = _find_modal_energy(case, state.y) - _find_modal_energy(case, case.y)
+    return {
+        "work_in": float(state.y[-4]),
+        "viscous": float(state.y[-3]),
+        "power": float(state.clock[Clock.EXCHANGED]),
+        "friction": float(loss.sum()),
+        "stored": float(change + (work - loss).sum()),
+        "peak_stored": float(state.clock[Clock.STORED]),
+    }
+
+
+def _find_modal_energy(case: Case, y) -> float:
+    """Return the energy of the modes [J] in a state."""
+    n = case.rig.modes.shape[1]
+    squares = y[n : 2 * n] ** 2 + case.rig.modes[Mode.STIFFNESS] * y[:n] ** 2
+    return 0.5 * case.rig.settings[Setting.MASS] * float(squares.sum())
+
+
+def _compute_work(case: Case, state: State) -> dict[str, float]:
+    """Return the works of friction [J] in the whole run, and the relative error of the energy balance."""
+    settings = case.rig.settings
+    work, _, loss = split_integrals(case, state.y)[: case.n_friction].sum(axis=0)
     values = {"friction_work": work, "energy_dissipated": loss, "energy_stored": work - loss}
-    is_bench = rigs.settings[:, Setting.IS_BENCH] > 0
-    if is_bench.any():
+    if settings[Setting.IS_BENCH]:
         return values
-    gap = y[:, -4] + find_stored(first) - find_stored(y) - y[:, -3] - faces[..., 0].sum(axis=1)
-    size = states.clock[:, Clock.EXCHANGED] + states.clock[:, Clock.STORED]
-    min_gap = MIN_ENERGY * rigs.settings[:, Setting.MASS] * rigs.scales[:, n] ** 2
-    gap = np.where(np.abs(gap) > min_gap, np.abs(gap), 0.0)
-    return values | {"energy_balance": np.divide(gap, size, out=np.zeros_like(gap), where=size > 0)}
+    energies = compute_energies(case, state)
+    gap = abs(energies["work_in"] - energies["viscous"] - energies["friction"] - energies["stored"])
+    size = energies["power"] + energies["peak_stored"]
+    n = case.rig.modes.shape[1]
+    if gap <= MIN_ENERGY * settings[Setting.MASS] * case.rig.scales[n] ** 2 or size == 0:
+        gap = 0.0
+    return values | {"energy_balance": gap / (size or 1.0)}
 
 
-def _compute_loop(
-    rigs, records, window: int, span, values: dict[str, np.ndarray], stiffness
-) -> dict[str, np.ndarray]:
-    """Return stiffness, damping and drift of the first interface, from its cycles in a window."""
-    row = records.faces[:, window, 0]
-    slide = row[:, Window.SLIDE_COS] - 1j * row[:, Window.SLIDE_SIN]
-    force = row[:, Window.FORCE_COS] - 1j * row[:, Window.FORCE_SIN]
+def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, float]:
+    """Return stiffness, damping and drift of the first interface, from its cycles in the window."""
+    row = record.faces[0]
+    slide = row[Window.SLIDE_COS] - 1j * row[Window.SLIDE_SIN]
+    force = row[Window.FORCE_COS] - 1j * row[Window.FORCE_SIN]
 
     # Ranges and forces at the reversals of every cycle.
-    numbers = np.flatnonzero(records.cycles[0, :, Cycle.WINDOW] == window)
-    cycles = records.cycles[:, numbers]
-    ranges = cycles[..., Cycle.MAX_SLIDE] - cycles[..., Cycle.MIN_SLIDE]
-    jumps = cycles[..., Cycle.FORCE_AT_MAX] - cycles[..., Cycle.FORCE_AT_MIN]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = jumps / ranges
-        count = np.isfinite(slopes).sum(axis=1)
-        secant = np.where(np.isfinite(slopes), slopes, 0.0).sum(axis=1) / count
-        half_range = ranges.mean(axis=1) / 2
-        damping = values["loop_area"] / (2 * np.pi * stiffness * half_range**2)
-        found = {
-            "equivalent_stiffness": (force / slide).real,
-            "harmonic_force_ratio": np.abs(force / slide),
-            "secant_stiffness": secant,
-            "equivalent_damping": np.where(stiffness > 0, damping, np.nan),
-        }
-    if numbers.size > 1:
-        means = cycles[..., Cycle.SLIDE] / rigs.settings[:, Setting.PERIOD, None]
-        found["drift_per_cycle"] = (means[:, -1] - means[:, 0]) / (numbers.size - 1)
+    cycles = record.cycles[record.cycles[:, Cycle.WINDOW] >= 0]
+    ranges = cycles[:, Cycle.MAX_SLIDE] - cycles[:, Cycle.MIN_SLIDE]
+    slopes = (cycles[:, Cycle.FORCE_AT_MAX] - cycles[:, Cycle.FORCE_AT_MIN]) / ranges
+    slopes = slopes[np.isfinite(slopes)]
+    half_range = ranges.mean() / 2
+    damping = np.nan
+    if case.first_stiffness > 0:
+        damping = loop_area / (2 * np.pi * case.first_stiffness * half_range**2)
+    found = {
+        "equivalent_stiffness": (force / slide).real,
+        "harmonic_force_ratio": abs(force / slide),
+        "secant_stiffness": slopes.mean() if slopes.size else np.nan,
+        "equivalent_damping": damping,
+    }
+    if len(cycles) > 1:
+        means = cycles[:, Cycle.SLIDE] / case.rig.settings[Setting.PERIOD]
+        found["drift_per_cycle"] = (means[-1] - means[0]) / (len(cycles) - 1)
     return found

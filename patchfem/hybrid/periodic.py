@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cases import Case, make_batch
+from .. import compiled
+from .cases import Case, make_arrays
 from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
-from .runs import Batch, run_batch
+from .runs import Motion, run_case
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
@@ -44,7 +45,7 @@ MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second o
 class PeriodicMotion(NamedTuple):
     """Periodic motion of a case.
 
-    - batch: its measures (c = 1) over a period; energies are those of this period
+    - run: its motion over a period, with measures and energies of this period
     - change: largest change of the state over a period, relative to its scale; it has converged below `tolerance`
     - error: distance of the state from that of the periodic motion, relative to its scale
     - tolerance: largest change at which the motion counts as periodic
@@ -54,7 +55,7 @@ class PeriodicMotion(NamedTuple):
     - grows: whether the motion from the start grows for ever, so that none is periodic
     """
 
-    batch: Batch
+    run: Motion
     change: float
     error: float
     tolerance: float
@@ -92,7 +93,7 @@ def find_periodic_motion(
     """
     shooting = _Shooting(case)
     if start is not None:
-        shooting.state = _copy(start)
+        shooting.state = start
     shooting.relax(n_first - 1)
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
     if has_kinks:
@@ -112,14 +113,13 @@ def find_periodic_motion(
             error = shooting.find_multipliers(nearer)[1]
 
     # The measures are those of a period from there on.
-    shooting.state = before
-    batch = shooting.run(has_windows=True)
+    run = run_case(shooting.case, start=before)
     largest = np.abs(multipliers).max(initial=0.0)
     has_converged = change < tolerance
     may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
-    size = np.abs(before.y[0, : 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
+    size = np.abs(before.y[: 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
     return PeriodicMotion(
-        batch,
+        run,
         change,
         error,
         tolerance,
@@ -140,7 +140,7 @@ def _grows_for_ever(case: Case, size: float) -> bool:
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
-        sizes.append(float(np.abs(shooting.state.y[0, : 2 * case.rig.modes.shape[1]]).max()))
+        sizes.append(float(np.abs(shooting.state.y[: 2 * case.rig.modes.shape[1]]).max()))
     first, second = np.diff(sizes)
     is_moving = sizes[0] > case.rig.scales[0]
     is_far = size > MIN_SIZE_RATIO * sizes[-1]
@@ -152,42 +152,32 @@ class _Shooting:
     """State of a motion at the start of a period, and its map."""
 
     def __init__(self, case: Case):
-        self.case = case
-        self.state = make_batch([case])[1]
+        settings = case.rig.settings
+        self.period = float(settings[Setting.PERIOD])
+        self.case = replace(
+            case, ends=np.array([self.period]), windows=np.zeros(1), samples=np.zeros(0)
+        )
+        self.state = make_arrays(case)[0]
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
-        self.period = float(case.rig.settings[Setting.PERIOD])
         self.n_periods = 0
         self.slopes: tuple | None = None
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
-        self.difference = max(MIN_DIFFERENCE, float(case.rig.settings[Setting.RTOL]) ** 0.5)
+        self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
-    def run(self, states: State | None = None, *, has_windows: bool = False) -> Batch:
-        """Advance the motion, or several of them, by a period; the clocks start at 0.
-
-        Parameters
-        ----------
-        states : State, optional
-            States of several motions; default: that of this motion, which goes on.
-        has_windows : bool
-            Whether the measures of the period are computed.
-        """
-        own = states is None
-        states = _copy(self.state) if own else states
-        states.clock[:] = 0.0
-        states.clock[:, Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
-        ends = np.array([self.period])
-        case = replace(self.case, ends=ends, windows=np.zeros(1), samples=np.zeros(0))
-        count = len(states.y)
-        batch = run_batch([case] * count, states=states, has_windows=has_windows)
-        self.n_periods += count
-        if own:
-            self.state = batch.states
-        return batch
+    def advance(self, state: State) -> State:
+        """Return the state a period after another one, whose clock starts at 0."""
+        state = _copy(state)
+        state.clock[:] = 0.0
+        state.clock[Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
+        record = make_arrays(self.case)[1]
+        compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, record)
+        self.n_periods += 1
+        return state
 
     def relax(self, count: int) -> None:
         """Advance the motion by some periods."""
         for _ in range(count):
-            self.run()
+            self.state = self.advance(self.state)
 
     def converge(self, tolerance: float) -> tuple[State, float]:
         """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
@@ -202,7 +192,7 @@ class _Shooting:
         best = np.inf
         for _ in range(MAX_ITERATIONS):
             before = self.state
-            self.run()
+            self.relax(1)
             change = self.measure_change(before)
             if change < tolerance:
                 if self.has_same_regime(before):
@@ -236,7 +226,7 @@ class _Shooting:
         error : float
             Distance after these periods, enlarged for a distance that decays slowly.
         """
-        self.state = _copy(before)
+        self.state = before
         self.relax(N_CHECKED)
         distance = self.measure_change(before)
         if distance <= CHECK_FACTOR * tolerance:
@@ -246,13 +236,13 @@ class _Shooting:
     def correct_once(self, before: State) -> tuple[State, float]:
         """Return the state after a correction of another one, and its change over a period."""
         self.correct(before)
-        nearer = _copy(self.state)
-        self.run()
+        nearer = self.state
+        self.relax(1)
         return nearer, self.measure_change(nearer)
 
     def _scales(self) -> np.ndarray:
         """Return the magnitudes (n,) of the modes and law states at the start of a period."""
-        scale = np.maximum(np.abs(self.state.y[0, : self.n]), self.case.rig.scales[: self.n])
+        scale = np.maximum(np.abs(self.state.y[: self.n]), self.case.rig.scales[: self.n])
         n_modes = self.case.rig.modes.shape[1]
         omega = self.case.rig.settings[Setting.OMEGA]
         # Displacements and velocities share their magnitudes, because either may vanish at the start of a period.
@@ -263,26 +253,26 @@ class _Shooting:
 
     def measure_change(self, before: State) -> float:
         """Return the change of the state since another one, relative to its scale."""
-        change = np.abs(self.state.y[0, : self.n] - before.y[0, : self.n])
+        change = np.abs(self.state.y[: self.n] - before.y[: self.n])
         return float((change / self._scales()).max())
 
     def has_same_regime(self, before: State) -> bool:
         """Return whether the laws are in the regimes of another state."""
         columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
-        return np.array_equal(self.state.memory[..., columns], before.memory[..., columns])
+        return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
     def _columns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in (state, memory): what a period changes."""
-        changed = self.state.y[0, : self.n] != before.y[0, : self.n]
+        changed = _pack(self.state, self.n) != _pack(before, self.n)
         changed[: 2 * self.case.rig.modes.shape[1]] = True
-        memory = np.zeros(before.memory[0].shape, bool)
-        same = before.memory[0, :, Memory.COUNT] == self.state.memory[0, :, Memory.COUNT]
-        stack = before.memory[0, :, Memory.STACK :]
-        used = np.arange(stack.shape[1]) < 2 * before.memory[0, :, Memory.COUNT, None]
-        memory[:, Memory.STACK :] = (
-            (stack != self.state.memory[0, :, Memory.STACK :]) & used & same[:, None]
-        )
-        return np.flatnonzero(np.concatenate([changed, memory.ravel()]))
+
+        # Of the memories only the reversal points count, if their number is the same.
+        counts = before.memory[:, Memory.COUNT, None]
+        place = np.arange(before.memory.shape[1]) - Memory.STACK
+        is_used = (place >= 0) & (place < 2 * counts)
+        is_used &= counts == self.state.memory[:, Memory.COUNT, None]
+        changed[self.n :] &= is_used.ravel()
+        return np.flatnonzero(changed)
 
     def _differentiate(self, before: State) -> tuple[np.ndarray, ...]:
         """Return the unknowns' indices, change over a period, derivatives of the map, and their scales.
@@ -292,23 +282,24 @@ class _Shooting:
         columns = self._columns(before)
         start = _pack(before, self.n)
         end = _pack(self.state, self.n)
-        scale = np.concatenate([self._scales(), np.abs(start[0, self.n :])])[columns]
+        scale = np.append(self._scales(), np.abs(start[self.n :]))[columns]
         if self.slopes is None or not np.array_equal(self.slopes[0], columns):
             self.slopes = columns, self._compute_slopes(before, columns, scale, end)
-        return columns, (end - start)[0, columns], self.slopes[1], scale
+        return columns, (end - start)[columns], self.slopes[1], scale
 
     def _compute_slopes(self, before: State, columns, scale, end) -> np.ndarray:
         """Return the derivatives (k, k) of the map of a period with respect to the unknowns, by differences.
 
         `end` is the end of the period.
         """
-        states = _repeat(before, columns.size)
-        packed = _pack(states, self.n)
         steps = self.difference * scale
-        packed[np.arange(columns.size), columns] += steps
-        _unpack(states, packed, self.n)
-        after = _pack(self.run(states).states, self.n)
-        return (after - end)[:, columns].T / steps
+        slopes = np.empty((columns.size, columns.size))
+        for k, (column, step) in enumerate(zip(columns, steps)):
+            packed = _pack(before, self.n)
+            packed[column] += step
+            after = _pack(self.advance(_unpack(before, packed)), self.n)
+            slopes[:, k] = (after - end)[columns] / step
+        return slopes
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
@@ -329,12 +320,9 @@ class _Shooting:
         step = np.linalg.lstsq(np.eye(columns.size) - matrix, change / scale, rcond=1e-13)[0]
 
         # Regimes are those at the end of the period, where the motion has brought them.
-        start = _pack(before, self.n)
-        state = _copy(self.state)
-        packed = _pack(state, self.n)
-        packed[0, columns] = start[0, columns] + step * scale
-        _unpack(state, packed, self.n)
-        self.state = state
+        packed = _pack(self.state, self.n)
+        packed[columns] = _pack(before, self.n)[columns] + step * scale
+        self.state = _unpack(self.state, packed)
 
 
 def _copy(state: State) -> State:
@@ -342,18 +330,15 @@ def _copy(state: State) -> State:
     return State(*(array.copy() for array in state))
 
 
-def _repeat(state: State, count: int) -> State:
-    """Return the batch of a state that is repeated."""
-    parts = (np.repeat(array, count, axis=0) for array in state[:3])
-    return State(*parts, *state[3:])
-
-
 def _pack(state: State, n: int) -> np.ndarray:
-    """Return states and memories as rows (c, k)."""
-    return np.concatenate([state.y[:, :n], state.memory.reshape(len(state.y), -1)], axis=1)
+    """Return the first n states of the motion and the memories in one array (k,)."""
+    return np.append(state.y[:n], state.memory)
 
 
-def _unpack(state: State, packed, n: int) -> None:
-    """Write the rows of `_pack` into a state."""
-    state.y[:, :n] = packed[:, :n]
-    state.memory[:] = packed[:, n:].reshape(state.memory.shape)
+def _unpack(state: State, packed) -> State:
+    """Return a copy of a state with the values of `_pack`."""
+    state = _copy(state)
+    n = packed.size - state.memory.size
+    state.y[:n] = packed[:n]
+    state.memory[:] = packed[n:].reshape(state.memory.shape)
+    return state

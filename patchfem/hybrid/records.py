@@ -1,6 +1,6 @@
 """Arrays of a rig, of its motion and of what is recorded, and the meaning of their columns.
 
-A batch has the same arrays with one more leading axis, the cases. Few arrays make short calls and short compile times.
+Few arrays make short calls and short compile times.
 """
 
 from enum import IntEnum
@@ -12,6 +12,7 @@ N_FACE_INTEGRALS = 3  # work, slip and loss of every interface, near the end of 
 N_INTEGRALS = (
     4  # work of the drive, loss of the dampers, output times cosine and sine, at the end of a state
 )
+WINDOW_START = 28  # row of `State.rows` with the state at the start of the window
 
 
 class Mode(IntEnum):
@@ -205,7 +206,7 @@ class State(NamedTuple):
     - clock (15,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
     - margins (5, M, 4): margins at the points of a step, and those at the last evaluation
-    - probes (6, 3 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
+    - probes (6, 4 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
     - grip (M, M): force that holds an interface per unit of relative acceleration [kg]
     """
 
@@ -219,12 +220,16 @@ class State(NamedTuple):
 
 
 class Probe(IntEnum):
-    """Columns of `State.probes`: three of the whole, then five of every interface from FACES on."""
+    """Columns of `State.probes`: four of the whole, then five of every interface from FACES on.
 
-    OUTPUT = 0
-    GAUGE = 1
-    ACCELERATION = 2
-    FACES = 3
+    SPEED is the velocity of the output, TRAVEL the distance that is left to its largest displacement.
+    """
+
+    SPEED = 0
+    TRAVEL = 1
+    GAUGE = 2
+    ACCELERATION = 3
+    FACES = 4
     # per interface: friction force, path of slip, slide, load, and |slip rate| - |velocity|/2
     FORCE = 0
     SLIP = 1
@@ -235,7 +240,7 @@ class Probe(IntEnum):
 
 
 class Cycle(IntEnum):
-    """Columns of `Record.cycles`: end [s] and window (below 0: none) of each cycle, then what was measured.
+    """Columns of `Record.cycles`: end [s], window (0, or below 0 outside of it) of each cycle, then what was measured.
 
     Smallest and largest output, integrals of the output times cosine and sine, integral of the slide of the first
     interface over time, its smallest and largest slide with the friction forces there, and 1 for a cycle that was not
@@ -274,8 +279,8 @@ class Window(IntEnum):
     """Columns of `Record.faces`.
 
     Extremes of force, slip, slide and load; time stuck and open [s]; number of slip starts with the sums of cosine and
-    sine of twice their phases; duration of the stick at the end [s], -1 of an interface that slips there; friction work
-    [J]; first harmonics of slide and force.
+    sine of twice their phases; duration of the stick at the end [s], -1 of an interface that slips there; first
+    harmonics of slide and force.
     """
 
     MIN_FORCE = 0
@@ -292,18 +297,17 @@ class Window(IntEnum):
     COS_START = 11
     SIN_START = 12
     STICKS = 13
-    WORK = 14
-    SLIDE_COS = 15
-    SLIDE_SIN = 16
-    FORCE_COS = 17
-    FORCE_SIN = 18
+    SLIDE_COS = 14
+    SLIDE_SIN = 15
+    FORCE_COS = 16
+    FORCE_SIN = 17
 
 
 class Record(NamedTuple):
     """What a run records.
 
     - cycles (C, 12): see `Cycle`
-    - whole (W, 9), faces (W, M, 19): measures of the windows, see `Whole` and `Window`
+    - whole (9,), faces (M, 18): measures of the window, the last cycles, see `Whole` and `Window`
     - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
       of an event; the first column of the samples is given. Force and load of an event are those before it, the
       directions of slip those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it

@@ -3,8 +3,8 @@
 The coefficients are those of `scipy.integrate.DOP853` (Hairer, Norsett and Wanner 1993, II.5).
 
 Rows of `State.rows`: 16 stages, 7 coefficients of the dense output per component (from CURVE on), the state at the END of
-the step, workspaces POINT, SPARE and RATES, the state at the last cycle (CYCLE), that at the start of a window (WINDOW),
-and at last the scales of the errors.
+the step, workspaces POINT, SPARE and RATES, the state at the last cycle (CYCLE), that at the start of the window
+(`records.WINDOW_START`), and at last the scales of the errors.
 """
 
 import numpy as np
@@ -31,7 +31,6 @@ POINT = 24
 SPARE = 25
 RATES = 26
 CYCLE = 27
-WINDOW = 28
 SCALE = 29
 SAFETY = 0.9
 MAX_FACTOR = 4.0  # largest ratio of successive steps

@@ -8,18 +8,14 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .event_kernels import MAX_ROOT_STEPS, ROOT_TOL, find_vertex
+from .event_kernels import LAST_PROBES, find_root, find_value, find_vertex
 from .motion_kernels import (
-    find_drive,
-    find_integrals,
     find_phase,
     find_rates,
     look,
     project,
-    rests,
 )
 from .records import (
-    N_FACE_INTEGRALS,
     Clock,
     Cycle,
     Face,
@@ -36,90 +32,10 @@ from .step_kernels import POINT, RATES, read_curve
 N_NODES = 5
 NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0])
 WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
-LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
 MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
 EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
-
-
-@njit(**NJIT_KERNEL)
-def write_probes(rig, state, t, y, probes):
-    """Write the scalars of a state that windows observe.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    t : float
-        Time [s].
-    y : (n,) array
-        State.
-    probes : (p,) array
-        Scalars, which are written.
-    """
-    n = rig.modes.shape[1]
-    find_rates(rig, state, t, y, state.rows[RATES])
-    acceleration = state.rows[RATES, n : 2 * n]
-    probes[Probe.OUTPUT] = project(rig.modes[Mode.OUTPUT], y[:n])
-    probes[Probe.GAUGE] = project(rig.modes[Mode.GAUGE], y[:n])
-    probes[Probe.ACCELERATION] = project(rig.modes[Mode.OUTPUT], acceleration)
-    if rig.settings[Setting.BASE_MOVES] > 0:
-        probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
-    integrals = find_integrals(rig, y)
-    for i in range(rig.faces.shape[0]):
-        point = look(rig, state, i, t, y)
-        memory = state.memory[i]
-        first = Probe.FACES + Probe.COUNT * i
-        probes[first + Probe.FORCE] = memory[Memory.FORCE]
-        probes[first + Probe.SLIP] = y[integrals + N_FACE_INTEGRALS * i + 1]
-        probes[first + Probe.SLIDE] = point.slide
-        probes[first + Probe.LOAD] = max(point.load, 0.0)
-        slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
-        is_still = rests(memory) or point.velocity == 0
-        probes[first + Probe.SLIPPING] = -1.0 if is_still else slipping
-
-
-@njit(**NJIT_KERNEL)
-def find_probe(rig, state, x, column):
-    """Return a scalar at the fraction x of a step.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    x : float
-        Fraction of the step.
-    column : int
-        Column of `State.probes`.
-    """
-    y = state.rows[POINT]
-    read_curve(state, x, y)
-    t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
-    write_probes(rig, state, t, y, state.probes[LAST_PROBES])
-    return state.probes[LAST_PROBES, column]
-
-
-@njit(**NJIT_KERNEL)
-def find_output(rig, state, x):
-    """Return the output at the fraction x of a step.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    x : float
-        Fraction of the step.
-    """
-    z = state.rows[POINT, : rig.modes.shape[1]]
-    read_curve(state, x, z)
-    return project(rig.modes[Mode.OUTPUT], z)
 
 
 @njit(**NJIT_KERNEL)
@@ -157,15 +73,15 @@ def raise_extreme(rig, state, fraction, column, sign, known):
     middle = min(max(x, width), 1 - width)
 
     for _ in range(N_PARABOLAS):
-        a = -sign * find_probe(rig, state, fraction * (middle - width), column)
-        b = -sign * find_probe(rig, state, fraction * middle, column)
-        c = -sign * find_probe(rig, state, fraction * (middle + width), column)
+        a = -sign * find_value(rig, state, fraction * (middle - width), -1, column)
+        b = -sign * find_value(rig, state, fraction * middle, -1, column)
+        c = -sign * find_value(rig, state, fraction * (middle + width), -1, column)
         vertex = find_vertex(a, b, c)[0]
         if vertex < 0:
             vertex = 0.0 if a < c else 2.0
 
         at = middle + (vertex - 1) * width
-        found = sign * find_probe(rig, state, fraction * at, column)
+        found = sign * find_value(rig, state, fraction * at, -1, column)
         gain = found - value
         if gain > 0:
             x = at
@@ -176,7 +92,7 @@ def raise_extreme(rig, state, fraction, column, sign, known):
         middle = min(max(at, width), 1 - width)
     if value <= sign * known:
         return known
-    find_probe(rig, state, fraction * x, column)
+    find_value(rig, state, fraction * x, -1, column)
     return sign * value
 
 
@@ -194,33 +110,17 @@ def observe_cycle(rig, state, fraction, cycle):
         Motion, which is updated.
     fraction : float
         Fraction of the step at which its motion ends.
-    cycle : (11,) array
+    cycle : (12,) array
         Row of `records.Record.cycles`.
     """
     n = rig.modes.shape[1]
-    y = state.rows[POINT, : 2 * n]
-    f_left = project(rig.modes[Mode.OUTPUT], state.y[n : 2 * n])
+    y = state.rows[POINT]
+    before = project(rig.modes[Mode.OUTPUT], state.y[n : 2 * n])
     read_curve(state, fraction, y)
-    f_right = project(rig.modes[Mode.OUTPUT], y[n : 2 * n])
     add_output(rig, y, cycle)
-    if f_left * f_right >= 0:
-        return
-
-    # Illinois rule
-    left = 0.0
-    right = fraction
-    for _ in range(N_PARABOLAS):
-        middle = (left * f_right - right * f_left) / (f_right - f_left)
-        read_curve(state, middle, y)
-        f_middle = project(rig.modes[Mode.OUTPUT], y[n : 2 * n])
-        if f_middle * f_right < 0:
-            left = right
-            f_left = f_right
-        else:
-            f_left *= 0.5
-        right = middle
-        f_right = f_middle
-    add_output(rig, y, cycle)
+    if before * project(rig.modes[Mode.OUTPUT], y[n : 2 * n]) < 0:
+        find_root(rig, state, -1, Probe.SPEED, 0.0, fraction)
+        add_output(rig, y, cycle)
 
 
 @njit(**NJIT_KERNEL)
@@ -233,7 +133,7 @@ def add_output(rig, y, cycle):
         Arrays of the rig.
     y : (n,) array
         State.
-    cycle : (11,) array
+    cycle : (12,) array
         Row of `records.Record.cycles`.
     """
     output = project(rig.modes[Mode.OUTPUT], y[: rig.modes.shape[1]])
@@ -258,12 +158,11 @@ def observe_window(rig, state, record, cycle, fraction):
     fraction : float
         Fraction of the step at which its motion ends.
     """
-    w = int(record.cycles[cycle, Cycle.WINDOW])
-    whole = record.whole[w]
+    whole = record.whole
     t = state.clock[Clock.TIME]
     length = fraction * state.clock[Clock.LENGTH]
     for node in range(N_NODES):
-        find_probe(rig, state, fraction * NODES[node], 0)
+        find_value(rig, state, fraction * NODES[node], -1, 0)
         for k in range(state.probes.shape[1]):
             state.probes[node, k] = state.probes[LAST_PROBES, k]
 
@@ -282,7 +181,7 @@ def observe_window(rig, state, record, cycle, fraction):
         # First harmonics of slide and force.
         for i in range(rig.faces.shape[0]):
             first = Probe.FACES + Probe.COUNT * i
-            row = record.faces[w, i]
+            row = record.faces[i]
             slide = weight * state.probes[node, first + Probe.SLIDE]
             force = weight * state.probes[node, first + Probe.FORCE]
             row[Window.SLIDE_COS] += slide * np.cos(phase)
@@ -298,7 +197,7 @@ def observe_window(rig, state, record, cycle, fraction):
         observe_reversal(rig, state, fraction, row, 1.0, Cycle.MAX_SLIDE)
     for i in range(rig.faces.shape[0]):
         first = Probe.FACES + Probe.COUNT * i
-        row = record.faces[w, i]
+        row = record.faces[i]
         for k in range(4):  # force, slip, slide and load, in the order of `Probe` and `Window`
             raise_both(rig, state, fraction, first + k, row, Window.MIN_FORCE + 2 * k)
         add_stick(rig, state, fraction, i, row)
@@ -343,7 +242,7 @@ def observe_reversal(rig, state, fraction, cycle, sign, column):
         Motion, which is updated.
     fraction : float
         Fraction of the step at which its motion ends.
-    cycle : (11,) array
+    cycle : (12,) array
         Row of `records.Record.cycles`.
     sign : float
         1 for the largest value, -1 for the smallest.
@@ -376,7 +275,7 @@ def add_stick(rig, state, fraction, i, row):
         Fraction of the step at which its motion ends.
     i : int
         Number of the interface.
-    row : (19,) array
+    row : (18,) array
         Row of `records.Record.faces`.
     """
     column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
@@ -395,7 +294,7 @@ def add_stick(rig, state, fraction, i, row):
         sticks_after = state.probes[node, column] < 0
         root = right if sticks else left
         if sticks_after != sticks:
-            root = find_probe_root(rig, state, column, left, right)
+            root = find_root(rig, state, -1, column, left, right)
         part = h * ((root - left) if sticks else (right - root) * sticks_after)
         row[Window.STUCK] += part
         duration = part + (duration if sticks else 0.0)
@@ -406,35 +305,6 @@ def add_stick(rig, state, fraction, i, row):
 
 
 @njit(**NJIT_KERNEL)
-def find_probe_root(rig, state, column, left, right):
-    """Return the fraction of a step at which a scalar changes sign between two fractions (bisection).
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    column : int
-        Column of `State.probes`.
-    left : float
-        Fraction of the step before the root.
-    right : float
-        Fraction of the step after the root.
-    """
-    is_negative = find_probe(rig, state, left, column) < 0
-    for _ in range(MAX_ROOT_STEPS):
-        middle = 0.5 * (left + right)
-        if (find_probe(rig, state, middle, column) < 0) == is_negative:
-            left = middle
-        else:
-            right = middle
-        if right - left < 100 * ROOT_TOL:
-            break
-    return right
-
-
-@njit(**NJIT_KERNEL)
 def add_start(rig, clock, t, row):
     """Add the phase of the drive at which slip starts.
 
@@ -442,11 +312,11 @@ def add_start(rig, clock, t, row):
     ----------
     rig : Rig
         Arrays of the rig.
-    clock : (14,) array
+    clock : (15,) array
         Row of `records.State.clock`.
     t : float
         Time [s].
-    row : (19,) array
+    row : (18,) array
         Row of `records.Record.faces`.
     """
     phase = 0.0

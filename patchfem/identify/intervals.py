@@ -129,7 +129,7 @@ class _Minimum(NamedTuple):
 
 
 def compute_intervals(
-    model: UnitCubeResidual, u: np.ndarray, cost: float, is_series: bool
+    model: UnitCubeResidual, u: np.ndarray, cost: float, *, is_series: bool
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 

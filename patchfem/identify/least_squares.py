@@ -209,7 +209,7 @@ def _assemble_fit(
     if kind != IntervalKind.NONE:
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
-        intervals = compute_intervals(model, u, cost, is_series)
+        intervals = compute_intervals(model, u, cost, is_series=is_series)
     rms = float(np.sqrt(cost / best.rows))
     is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
     return Fit(

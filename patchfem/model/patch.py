@@ -185,7 +185,7 @@ class SharedMeshes(NamedTuple):
 
     - levels: meshes (lower, upper) of each level, fine to coarse; upper is None if it is like the
       lower.
-    - name: hash of the content.
+    - name: unique name, by which results on these meshes are cached.
     """
 
     levels: "tuple[tuple[Mesh, Mesh | None], ...]"

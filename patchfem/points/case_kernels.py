@@ -878,6 +878,8 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     tick = 0
     sine = 0.0
     cosine = 1.0
+    turn_level = -1
+    half_sine = half_cosine = 0.0
     now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
     now[Now.COS] = now[Now.SIN] = 0.0
     # An extreme at the border of two cycles has no force of its own.
@@ -886,7 +888,14 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         size = TICKS >> level
         h = step / (1 << level)
         time = tick * (step / TICKS)
-        drive = sine, sin(omega * (time + 0.5 * h)), sin(omega * (time + h))
+        # Sines and cosines by rotation over half steps; each cycle begins with exact ones.
+        if level != turn_level:
+            half_sine = sin(0.5 * omega * h)
+            half_cosine = cos(0.5 * omega * h)
+            turn_level = level
+        middle_sine = sine * half_cosine + cosine * half_sine
+        middle_cosine = cosine * half_cosine - sine * half_sine
+        drive = sine, middle_sine, middle_sine * half_cosine + middle_cosine * half_sine
         start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
         if not try_step(
             drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
@@ -898,7 +907,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         add_energies(drive, h, case, start, now)
         last_cosine = cosine
         sine = drive[2]
-        cosine = cos(omega * (time + h))
+        cosine = middle_cosine * half_cosine - middle_sine * half_sine
         now[Now.COS] += 0.5 * h * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
         now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * sine)
         observe_extremes(h, numbers[0, j], start, now, seen, observes)

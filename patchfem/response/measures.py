@@ -255,7 +255,8 @@ def interpolate_peaks(magnitude) -> ArrayPair:
     If a curve is smooth, its peak is the vertex of the parabola through the largest sample and its
     neighbours. A curve is smooth if neighbouring second differences around its largest sample differ by
     at most a factor of MAX_SMOOTH_RATIO; next to a jump, their signs differ. With a jump at the largest
-    sample, the error is the change over one step on the smooth side.
+    sample, the error is the change over one step on the smooth side. With a kink between two samples, it is the
+    distance of the largest sample from the crossing of the lines through the samples on both sides.
 
     Parameters
     ----------
@@ -286,8 +287,27 @@ def interpolate_peaks(magnitude) -> ArrayPair:
     value = magnitude[largest, columns]
     # a larger increase indicates a jump, not a smooth peak
     is_peak &= vertex < 1.01 * value
-    errors = np.where((middle == largest) & ~is_smooth, centre - np.maximum(left, right), 0.0)
+    jump = centre - np.maximum(left, right)
+    kink = np.maximum(
+        _extrapolate_to_kink(left, centre, right, samples[4]),
+        _extrapolate_to_kink(right, centre, left, samples[0]),
+    )
+    errors = np.where((middle == largest) & ~is_smooth, np.maximum(jump, kink), 0.0)
     return np.where(is_peak, vertex, value), errors
+
+
+def _extrapolate_to_kink(before, top, after, last) -> np.ndarray:
+    """Return by how much a kink exceeds the largest of four samples (n,), if it lies in the step after it.
+
+    The lines through the first two and through the last two samples cross at the kink. The result is 0 if they do not
+    cross in this step.
+    """
+    rise = top - before
+    fall = after - last
+    slopes = rise + fall
+    fraction = (after - top + fall) / np.where(slopes > 0, slopes, 1.0)
+    crosses = (slopes > 0) & (rise > 0) & (fall > 0) & (fraction > 0) & (fraction < 1)
+    return np.where(crosses, rise * fraction, 0.0)
 
 
 def interpolate_ranges(values) -> ArrayPair:

@@ -334,16 +334,14 @@ def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
 
 def _make_result_without_load(inputs: RunInputs) -> Result:
     """Return the Result of a rig whose interfaces carry no load."""
-    result = Result(
+    return Result(
         inputs.plan,
         Outcome.NO_CONTACT,
         {"normal_load": Measure(0.0, "N", 0.0)},
         inputs.seconds,
         [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
         inputs.notes,
-        faces=faces.add_slip_fields(inputs.plan.model, inputs.faces, ()),
     )
-    return _add_static_measures(result, inputs.faces)
 
 
 def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:

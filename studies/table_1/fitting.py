@@ -27,8 +27,7 @@ from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_tabl
 from patchfem.campaigns.rows.fit import make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
-from patchfem.identify.descent import Descent, descend
-from patchfem.identify.least_squares import NEAR_BOUND_FRACTION
+from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
 from patchfem.identify.space import UnitCubeResidual, make_search_space
 
 MIL = 25.4e-6

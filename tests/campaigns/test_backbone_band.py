@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.campaigns.backbone import words
 
 LAW = '[normal]\nload = "100 N"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "60 um"\n'
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\n'
@@ -98,3 +99,16 @@ def test_refuses_invalid_modes(scene, modes, message):
     """Modes with invalid text, units, slide or beside a structure of masses are refused."""
     with pytest.raises(pf.PatchfemError, match=f"(?s){message}"):
         pf.backbone(scene, modes=modes)
+
+
+@pytest.mark.parametrize(
+    "amplitudes, words_of_span",
+    [
+        ([3e-6, 4e-6, 9e-6], "from 3 um to 9 um"),
+        ([3e-6], "at 3 um"),
+        ([3e-6, 3.0001e-6], "at 3 um"),
+    ],
+)
+def test_exact_span_of_missing_amplitudes_names_no_place_twice(amplitudes, words_of_span):
+    """Amplitudes without a result lie between two places, or at one if both ends are the same in print."""
+    assert words._describe_span(np.array(amplitudes)) == words_of_span

@@ -1,4 +1,4 @@
-"""Batches of `hybrid`, errors, histories, samples and early ends."""
+"""Errors of `hybrid`, histories, samples and early ends."""
 
 import dataclasses
 
@@ -117,7 +117,7 @@ def test_drives_have_the_values_of_their_records():
                 np.zeros(0),
                 1,
             )
-            outputs.append(runs.run_case(case).final.y[0, :2])
+            outputs.append(runs.run_case(case).final.y[:2])
         assert outputs[0] == pytest.approx(outputs[1], abs=1e-4)
 
 

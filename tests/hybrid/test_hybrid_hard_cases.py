@@ -74,7 +74,7 @@ def test_chatter_of_many_interfaces_on_many_modes():
     assert motion.values["energy_balance"] < 1e-6
     forces = motion.event_rows[:, 1 + case.y.size :][:, :8]
     assert np.abs(forces).max() <= 0.05 * (1 + 1e-6)
-    assert len(motion.events) > 100
+    assert len(forces) > 100
 
 
 def test_forty_modes():
@@ -120,5 +120,6 @@ def test_divergence_ends_at_the_stop_and_grows_without_one():
             )
         )
         assert motion.status is status
-        assert np.isfinite(motion.values[AMPLITUDE])
+        # The run that ends at the stop does not reach its last cycles.
+        assert np.isfinite(motion.values[AMPLITUDE]) == (status is Status.DONE)
     assert motion.extremes[-1, 1] > 1e2

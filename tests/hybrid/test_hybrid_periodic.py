@@ -37,10 +37,8 @@ def test_shooting_equals_a_long_run(name):
     assert steady.is_stable
     assert steady.n_periods <= 60
     run = runs.run_case(case)
-    assert steady.batch.windows[0][AMPLITUDE][0] == pytest.approx(run.values[AMPLITUDE], rel=1e-6)
-    assert steady.batch.windows[0]["loop_area"][0] == pytest.approx(
-        run.values["loop_area"], rel=1e-5
-    )
+    assert steady.run.values[AMPLITUDE] == pytest.approx(run.values[AMPLITUDE], rel=1e-6)
+    assert steady.run.values["loop_area"] == pytest.approx(run.values["loop_area"], rel=1e-5)
 
 
 def test_force_of_elements_that_slide_on_both_sides_is_their_limit():
@@ -48,10 +46,10 @@ def test_force_of_elements_that_slide_on_both_sides_is_their_limit():
     whatever offset a correction gives to the reversal points that it starts from."""
     case = make_oscillator(LAWS["elastic"], acceleration=2.0, zeta=0.05, cycles=1, rtol=1e-9)
     first = find_periodic_motion(case)
-    start = first.batch.states
-    stack = start.memory[0, 0, Memory.STACK :]
-    stack[1 : 2 * int(start.memory[0, 0, Memory.COUNT]) : 2] -= 0.3
-    faces = find_periodic_motion(case, start=start, n_first=1).batch.records.faces[0, 0, 0]
+    start = first.run.final
+    stack = start.memory[0, Memory.STACK :]
+    stack[1 : 2 * int(start.memory[0, Memory.COUNT]) : 2] -= 0.3
+    faces = find_periodic_motion(case, start=start, n_first=1).run.record.faces[0]
     assert faces[[Window.MIN_FORCE, Window.MAX_FORCE]] == pytest.approx([-0.8, 0.8], abs=1e-9)
 
 

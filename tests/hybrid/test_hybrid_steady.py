@@ -22,9 +22,9 @@ def find(friction, zeta=0.0, ratio=1.0, level=1.0, kinetic=None, **options):
         **options,
     )  # fmt: skip
     motion = find_periodic_motion(case)
-    row = motion.batch.records.faces[0, 0, 0]
+    row = motion.run.record.faces[0]
     stops = int(row[Window.STARTS]) if row[Window.STUCK] > 1e-9 * motion.period else 0
-    return motion, motion.batch.windows[0][AMPLITUDE][0], stops
+    return motion, motion.run.values[AMPLITUDE], stops
 
 
 @pytest.mark.parametrize(
@@ -102,4 +102,4 @@ def test_exact_elements_agree_with_a_long_run(count, zeta):
     case = make_oscillator(law, load=1.0, zeta=zeta, omega=1.1, cycles=1500, rtol=1e-11)
     motion = find_periodic_motion(case)
     expected = runs.run_case(case).values[AMPLITUDE]
-    assert motion.batch.windows[0][AMPLITUDE][0] == pytest.approx(expected, rel=1e-8)
+    assert motion.run.values[AMPLITUDE] == pytest.approx(expected, rel=1e-8)

@@ -36,3 +36,15 @@ def test_order_acceleration_peak_is_four(shift):
         errors.append(abs(found / 7 - 1))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
     assert errors[-1] < (2 * pi / steps[-1]) ** 4 / 30
+
+
+@pytest.mark.parametrize("shift", [0.05, 0.3, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("fall", [0.4, 1.0, 3.0])
+def test_always_error_of_peak_at_kink_contains_it(shift, fall):
+    """The peak of a curve with a kink between two samples lies within the stated error of the largest sample."""
+    place = np.arange(40.0) - 20 - shift
+    curve = np.where(place < 0, 50 + place, 50 - fall * place)
+    peaks, errors = measures.interpolate_peaks(curve[:, None])
+    assert peaks[0] <= 50 * (1 + 1e-12)
+    assert 50 - peaks[0] <= errors[0] * (1 + 1e-9)
+    assert errors[0] <= max(1.0, fall)

@@ -4,7 +4,8 @@
 """
 
 import pytest
-from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHORT
+from scene_runs import find_sentences
+from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHEAR, SHORT, SLIDE
 
 from patchfem import run
 
@@ -47,3 +48,10 @@ def test_advice_of_a_finding_is_a_record(name):
         assert f"{finding.advice.key} = {finding.advice.value:g}" in finding.sentence
     accurate = run(scene)
     assert not accurate.findings and not misses_tolerance(accurate)
+
+
+@pytest.mark.parametrize("shear, count", [("", 1), (SHEAR, 0)])
+def test_exact_note_on_stiffness_of_pieces_that_are_rigid_in_shear(shear, count):
+    """Without [contact.shear] a note says that the motion does not use the tangential stiffness of the pieces."""
+    notes = run(BLOCK + LOOSE + shear + COULOMB + SLIDE + "cycles = 1\n").notes
+    assert len(find_sentences(notes, "rigid in shear without")) == count

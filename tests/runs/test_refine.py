@@ -2,7 +2,11 @@
 
 import re
 
+import pytest
+
 import patchfem as pf
+from patchfem.core import ErrorCauses, Measure
+from patchfem.runs import refine
 
 MAIN_MEASURES = (
     "relative_displacement_amplitude",
@@ -74,3 +78,29 @@ def test_exact_bench_has_more_steps_until_its_peak_meets_the_tolerance():
     for result in (fixed, done):
         peak = result.measures["friction_ratio_peak"]
         assert abs(peak.value - truth) <= peak.error
+
+
+@pytest.mark.parametrize(
+    "parts, axis",
+    [
+        ({"steps": 8e-4, "mesh": 4e-4}, "steps"),  # most of the error
+        ({"steps": 3e-4, "mesh": 9e-4}, "steps"),  # the mesh alone meets the tolerance
+        ({"steps": 3e-4, "mesh": 1.1e-3}, ""),  # smaller steps do not help
+        ({"mesh": 2e-3}, ""),
+    ],
+)
+def test_exact_steps_are_refined_where_they_alone_bring_a_measure_inside(parts, axis):
+    """Smaller steps follow if they have most of an error, or if a measure meets its tolerance without their part."""
+    error = sum(parts.values())
+    measure = Measure(1.0, "m", error, 0.0, causes=ErrorCauses(parts, None))
+    worst = refine.find_worst_measure({"loop_area": measure}, 1e-3, ["steps"])
+    assert worst.axis == axis
+    assert worst.excess == (pytest.approx(error / 1e-3) if axis else 0.0)
+
+
+def test_exact_errors_of_a_pass_are_bounded_with_their_causes():
+    """An error that vanishes by chance is a quarter of that of the pass before, with the shares of its axes."""
+    before = {"a": Measure(1.0, "m", 4.0, 0.0, causes=ErrorCauses({"steps": 4.0}, None))}
+    now = {"a": Measure(1.0, "m", 0.0, 0.0, causes=ErrorCauses({"steps": 0.0}, None))}
+    bounded = refine.bound_errors(now, before)["a"]
+    assert (bounded.error, bounded.causes.parts) == (1.0, {"steps": 1.0})

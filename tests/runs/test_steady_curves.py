@@ -6,7 +6,7 @@ from scene_runs import find_sentences
 from scene_texts import COULOMB, MODE, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
-from patchfem.runs.rig.steady import curves
+from patchfem.runs.rig.steady import shooting
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
 STEADY = {"accuracy.method": "harmonic"}
@@ -23,7 +23,7 @@ def run_curve(text, **keys):
 @pytest.fixture
 def reduced_point_count(monkeypatch):
     """Compute curves with 13 points, refined only where they bend."""
-    monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
+    monkeypatch.setattr(shooting, "N_SWEEP_POINTS", 13)
 
 
 @pytest.mark.share(1)

@@ -1,23 +1,20 @@
-"""Pairs of traces and of areal scans with known wear, of the kinds that a laboratory compares.
+"""Pairs of traces with known wear, of the kinds that a laboratory compares.
 
 Made from how instruments work, without knowledge of the method that compares them. Both measurements of a pair are taken
-from one surface; each has its own place, tilt, offset and noise, and the second scan is rotated too. Lengths in m.
-Campaigns `trace-pairs` and `scan-pairs` of `campaigns`: a verdict is right if it does not claim what is false of the kind.
+from one surface; each has its own place, tilt, offset and noise. Lengths in m.
+Campaign `trace-pairs` of `campaigns`: a verdict is right if it does not claim what is false of the kind.
 Seeds 41000 to 41019 were used in developing the comparison of traces.
 """
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from campaigns import Row
-from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 from traces import format_trace
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
-from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import compare_surfaces
 
 KINDS = (
@@ -192,19 +189,8 @@ def write_traces(pair: TracePair, folder: Path, before: str, after: str) -> tupl
     return paths
 
 
-SCAN_KINDS = (
-    "smooth track",
-    "crater",
-    "shallow wear",
-    "worn tops",
-    "deposits",
-    "remounted",
-    "exchanged",
-)
-# Claims that are false of a kind of scans or traces; every other kind is worn.
 FALSE_VERDICTS = {
     "unworn": ("worn", "worn_and_grown", "grown"),
-    "remounted": ("worn", "worn_and_grown", "grown"),
     "dust": ("worn", "worn_and_grown", "grown"),
     "deposits": ("worn", "no_wear"),
     "exchanged": ("worn", "no_wear"),
@@ -212,124 +198,12 @@ FALSE_VERDICTS = {
 UNDECIDABLE = ("even", "wedge", "elsewhere", "scale", "mirrored", "turned")
 
 
-class ScanPair(NamedTuple):
-    """Two scans of a kind, with the lost volume [m^3] of the region that both of them cover."""
-
-    kind: str
-    before: Areal
-    after: Areal
-    worn_volume: float
-
-
-def draw_scans(kind: str, seed: int) -> ScanPair:
-    """Draw the pair of scans of a kind for a seed."""
-    draw = np.random.default_rng([seed, 311, SCAN_KINDS.index(kind)])
-    shape = np.array([draw.integers(120, 221), draw.integers(150, 301)])
-    spacing = float(np.exp(draw.uniform(np.log(0.4e-6), np.log(5e-6))))
-    size = (shape[::-1] - 1) * spacing
-    shift = draw.uniform(-0.12, 0.12, 2) * size
-    rotation = np.radians(draw.uniform(-2, 2))
-
-    # The surface has half the spacing of the scans and extends beyond both of them. Its lay is along x.
-    margin = 0.22 * size.max()
-    x, y = np.meshgrid(*(np.arange(-margin, side + margin, spacing / 2) for side in size))
-    rms = spacing * np.exp(draw.uniform(np.log(0.04), np.log(0.3)))
-    new = gaussian_filter(
-        draw.normal(size=x.shape), draw.uniform(2, 4) * np.array([1, draw.uniform(1, 4)])
-    )
-    new *= rms / new.std()
-    box = np.array([np.maximum(0, shift), np.minimum(size, size + shift)])
-    old = new + wear_surface(kind, draw, (x, y), new, box)
-
-    # Both scans sample the surface as their instrument resolves it.
-    blur = 2 * draw.uniform(0.35, 0.6)
-    first, second = (gaussian_filter(heights, blur) for heights in (new, old))
-    if kind == "exchanged":
-        first, second = second, first
-    rows, columns = np.indices(tuple(shape)) * spacing
-    cos, sin = np.cos(rotation), np.sin(rotation)
-    dx, dy = columns - size[0] / 2, rows - size[1] / 2
-    after_points = (
-        size[0] / 2 + shift[0] + cos * dx - sin * dy,
-        size[1] / 2 + shift[1] + sin * dx + cos * dy,
-    )
-
-    def sample(heights, points):
-        """Return the heights [m] of the surface at points (x, y) [m] by cubic splines."""
-        index = [(points[1] + margin) / (spacing / 2), (points[0] + margin) / (spacing / 2)]
-        return map_coordinates(spline_filter(heights), index, prefilter=False, mode="nearest")
-
-    axes = spacing * np.arange(shape[1]), spacing * np.arange(shape[0])
-    noise = rms * draw.uniform(0.01, 0.06)
-    scans = [
-        Areal(*axes, add_instrument(draw, sample(heights, points), rms, noise), name)
-        for name, heights, points in (
-            ("before", first, (columns, rows)),
-            ("after", second, after_points),
-        )
-    ]
-    depth = sample(first - second, after_points)
-    is_common = (after_points[0] >= 0) & (after_points[0] <= size[0])
-    is_common &= (after_points[1] >= 0) & (after_points[1] <= size[1])
-    return ScanPair(kind, *scans, float(np.maximum(depth, 0)[is_common].sum() * spacing**2))
-
-
-def wear_surface(kind: str, draw, grid, new, box) -> np.ndarray:
-    """Return the change of the heights [m] of a surface by wear of a kind; both scans cover the box."""
-    span = box[1] - box[0]
-    middle = box[0] + draw.uniform(0.4, 0.6, 2) * span
-    dx, dy = grid[0] - middle[0], grid[1] - middle[1]
-    rms = new.std()
-    depth = draw.uniform(2, 10) * rms
-    if kind == "deposits":
-        grown = np.zeros_like(new)
-        for _ in range(draw.integers(1, 7)):
-            place = draw.uniform(-0.3, 0.3, 2) * span
-            half = draw.uniform(0.04, 0.13, 2) * span.min()
-            r = ((dx - place[0]) / half[0]) ** 2 + ((dy - place[1]) / half[1]) ** 2
-            grown = np.maximum(grown, draw.uniform(1.5, 7) * rms * np.sqrt(np.maximum(1 - r, 0)))
-        return grown
-    if kind == "worn tops":
-        half = draw.uniform(0.25, 0.38, 2) * span
-        tops = np.maximum(new - np.quantile(new, draw.uniform(0.3, 0.7)), 0)
-        return np.where((np.abs(dx) < half[0]) & (np.abs(dy) < half[1]), -tops, 0.0)
-    if kind == "shallow wear":
-        half = draw.uniform(0.27, 0.4, 2) * span
-        r = (np.abs(dx) / half[0]) ** 4 + (np.abs(dy) / half[1]) ** 4
-        return -draw.uniform(0.3, 1.5) * rms * np.clip((1 - r) / draw.uniform(0.1, 0.9), 0, 1)
-    if kind == "smooth track":
-        # The floor is the smoothed surface below the track; a straight track goes through both scans.
-        angle = draw.uniform(0, np.pi)
-        across = (np.cos(angle) * dy - np.sin(angle) * dx) / (draw.uniform(0.08, 0.17) * span.min())
-        cut = gaussian_filter(new, 50) - depth * (1 - across**2)
-        return np.where(np.abs(across) < 1, np.minimum(cut - new, 0), 0.0)
-    if kind in ("crater", "exchanged"):
-        radius = draw.uniform(0.15, 0.32) * span.min()
-        return -depth * np.maximum(1 - (dx**2 + dy**2) / radius**2, 0)
-    return np.zeros_like(new)
-
-
-def add_instrument(draw, heights, rms: float, noise: float) -> np.ndarray:
-    """Return heights [m] with noise of lines and points, tilt, offset, digitization, dust and missing points."""
-    ny, nx = heights.shape
-    z = heights + noise * (
-        draw.normal(size=(ny, nx)) + draw.uniform(0, 1.5) * draw.normal(size=(ny, 1))
-    )
-    tilt = draw.uniform(-8, 8, 2) * rms
-    z += tilt[0] * np.linspace(-0.5, 0.5, nx) + tilt[1] * np.linspace(-0.5, 0.5, ny)[:, None]
-    z = np.round((z + draw.uniform(-5e-6, 5e-6)) / (0.3 * noise)) * 0.3 * noise
-    for _ in range(draw.integers(0, 5)):
-        i, j = draw.integers(0, ny - 4), draw.integers(0, nx - 4)
-        z[i : i + draw.integers(1, 4), j : j + draw.integers(1, 4)] += draw.uniform(6, 25) * rms
-    slope = np.hypot(*np.gradient(heights))
-    z[(slope > np.quantile(slope, 0.99)) & (draw.random(z.shape) < 0.7)] = np.nan
-    return z
-
-
-def compare_pair(kind: str, before, after, truths: dict) -> dict:
-    """Return a line of `campaigns`: whether the verdict is false, and the intervals of the true values of a worn pair."""
+def compare_traces(seed: int, folder) -> dict:
+    """Compare the traces of a seed: whether the verdict is false, and the interval of the worn area; see `campaigns`."""
+    kind = KINDS[seed % len(KINDS)]
+    pair = draw_pair(kind, seed)
     try:
-        comparison = compare_surfaces(before, after)
+        comparison = compare_surfaces(*make_profiles(pair))
     except PatchfemError as error:
         return {"rows": [], "refused": str(error), "group": kind}
     verdict = comparison.verdict.code
@@ -337,24 +211,11 @@ def compare_pair(kind: str, before, after, truths: dict) -> dict:
         return {"rows": [], "outcome": verdict, "group": kind}
     is_false = verdict in FALSE_VERDICTS.get(kind, ("no_wear", "grown"))
     rows = [Row("verdict", float(is_false), 0.0, 0.0, 0.0, 0.0)]
-    for name, truth in truths.items() if verdict == "worn" else ():
-        value = comparison.values[name]
-        if value.value is not None and value.high is not None:
-            error = value.high - value.value if truth > value.value else value.value - value.low
-            rows.append(Row(name, value.value, error, 0.0, truth, 0.0))
+    value = comparison.values["worn_area"]
+    if verdict == "worn" and value.value is not None and value.high is not None:
+        truth = 0.0
+        if kind != "exchanged":
+            truth = np.trapezoid(np.maximum(pair.worn, 0), pair.after[0])
+        error = value.high - value.value if truth > value.value else value.value - value.low
+        rows.append(Row("worn_area", value.value, error, 0.0, truth, 0.0))
     return {"rows": rows, "outcome": verdict, "group": kind}
-
-
-def compare_traces(seed: int, folder) -> dict:
-    """Compare the traces of a seed; see `campaigns`."""
-    pair = draw_pair(KINDS[seed % len(KINDS)], seed)
-    area = (
-        np.trapezoid(np.maximum(pair.worn, 0), pair.after[0]) if pair.kind != "exchanged" else 0.0
-    )
-    return compare_pair(pair.kind, *make_profiles(pair), {"worn_area": area})
-
-
-def compare_scans(seed: int, folder) -> dict:
-    """Compare the scans of a seed; see `campaigns`."""
-    pair = draw_scans(SCAN_KINDS[seed % len(SCAN_KINDS)], seed)
-    return compare_pair(pair.kind, pair.before, pair.after, {"worn_volume": pair.worn_volume})

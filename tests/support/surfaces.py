@@ -1,7 +1,6 @@
 """Surface files for the tests: variants of X3P, SDF, .npy, .mat, exports of Dektak."""
 
 import io
-import struct
 import zipfile
 
 import numpy as np
@@ -45,14 +44,6 @@ def heights_to_x3p(z, kind="D", increment=1.0) -> bytes:
         valid = np.packbits(np.isfinite(z).ravel(), bitorder="little")
         archive.writestr("bindata/valid.bin", valid.tobytes())
     return out.getvalue()
-
-
-def make_binary_sdf(z) -> bytes:
-    """Return heights (m, n) [m] as a binary SDF file of 8-byte numbers in nanometres."""
-    names = b"bISO-1.0", b"tests", b"010120260000", b"010120260000"
-    scales = 0.5e-6, 0.75e-6, 1e-9, 0.0
-    head = struct.pack("<8s10s12s12sHHddddBBB", *names, z.shape[1], z.shape[0], *scales, 0, 7, 0)
-    return head + (z / 1e-9).astype("<f8").tobytes()
 
 
 def make_npy(array) -> bytes:

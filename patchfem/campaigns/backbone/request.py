@@ -105,7 +105,6 @@ def compute_cases(
             raise SceneError(mistakes) from None
     models = [case.model for case in prepared]
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
-    backbones = [
-        one._replace(notes=(*case.notes, *one.notes)) for one, case in zip(backbones, prepared)
-    ]
+    for k, case in enumerate(prepared):
+        backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
     return BackboneCases(axis, backbones, models[0].source)

@@ -71,10 +71,9 @@ def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[st
             f"method {method}: with rigid friction the force in phase resonance is computed for a single mode only; use "
             'law = "elastic-plastic" with a short bond_length for several modes'
         ]
-    ends = [format_length(missing[k], 3) for k in (0, -1)]
     return [
         f"method {method}: no force in phase resonance was found at {missing.size} of {curve.amplitude.size} amplitudes, "
-        f"from {ends[0]} to {ends[1]}"
+        f"{_describe_span(missing)}"
     ]
 
 
@@ -84,11 +83,16 @@ def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
     count = curve.amplitude.size
     if not missing.size or count == amplitudes.size:
         return []
-    low, high = (format_length(missing[k], 3) for k in (0, -1))
     return [
-        f"method {method}: {count} of {amplitudes.size} amplitudes have a result; those without lie from {low} to {high}: "
-        f"{REASONS_OF_GAPS[method]}"
+        f"method {method}: {count} of {amplitudes.size} amplitudes have a result; those without lie "
+        f"{_describe_span(missing)}: {REASONS_OF_GAPS[method]}"
     ]
+
+
+def _describe_span(amplitudes) -> str:
+    """Return where amplitudes (k,) [m] in increasing order lie: from the first to the last, or at one place."""
+    first, last = (format_length(amplitudes[k], 3) for k in (0, -1))
+    return f"at {first}" if first == last else f"from {first} to {last}"
 
 
 def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:

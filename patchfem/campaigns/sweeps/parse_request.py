@@ -48,6 +48,16 @@ class Request:
     sobol: bool = False
     seed: int = 0
 
+    def list_options(self) -> list[str]:
+        """Return the words of the command line that ask for the same cases, without a file."""
+        words = []
+        for text in self.over:
+            words += ["--over", text]
+        if self.count:
+            words += ["--sobol" if self.sobol else "--random", str(self.count)]
+            words += ["--seed", str(self.seed)]
+        return words
+
 
 def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[SweepScene, Cases]:
     """Read the scene of a sweep and its cases.

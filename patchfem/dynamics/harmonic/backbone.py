@@ -16,10 +16,10 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from .equations import HarmonicBalance, LinearPart, invert_matrices, solve_damped, split_equations
+from .equations import HarmonicBalance, solve_damped, split_equations
 from .laws import MAX_SAMPLES_PER_CYCLE
 from .motion import find_loss
-from .series import N_SAMPLES, evaluate_series, find_peak, pack_harmonics
+from .series import N_SAMPLES, evaluate_series, half_range, pack_harmonics
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_STEP_HALVINGS = 6
@@ -58,20 +58,27 @@ class FreeEquations(NamedTuple):
 
     residual: np.ndarray
     jacobian: np.ndarray
-    motion: FreeMotion
+    motion: FreeMotion | None
 
 
 class FreeBalance:
     """Harmonic balance for free motions of a coordinate.
 
+    The unknowns are the packed slides [m], omega relative to that of the mode with sticking contacts, zeta, and the
+    amplitude a of the coordinate [m].
+
     Parameters
     ----------
-    balance : HarmonicBalance
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    group : LawGroup
+        Laws of the interfaces.
     mode : int
         Index of the coordinate.
     harmonics : int
-    omega : float
-        Scale of the frequency [rad/s].
+        Number of harmonics H.
+    samples : int
+        Samples per cycle.
     excitation : (n, n) array, optional
         Matrix E of a force 2 zeta omega m E z' in the first harmonic alone, such as that of a shaker; default: the
         negative damping of all coordinates in all harmonics.
@@ -81,24 +88,19 @@ class FreeBalance:
     """
 
     def __init__(
-        self,
-        balance: HarmonicBalance,
-        mode: int,
-        harmonics: int,
-        omega: float,
-        excitation=None,
-        output=None,
+        self, modes, group, mode: int, harmonics: int, samples: int, excitation=None, output=None
     ):
-        self.balance = balance
+        self.balance = HarmonicBalance(modes, group, samples)
         self.mode = mode
-        self.h = harmonics
-        self.omega = omega
         self.output = output
-        n = balance.modes.omega.size
-        is_excited = np.ones(harmonics + 1) if excitation is None else np.arange(harmonics + 1) == 1
-        self.excitation = is_excited[:, None, None] * (
-            np.eye(n) if excitation is None else excitation
-        )
+        self.stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
+        self.omega = self.stuck_mode.omega
+
+        # Matrices of each harmonic: E, and the spring and damper of the coordinate, which are as stiff as the mode.
+        eye = np.eye(modes.omega.size)
+        is_first = (np.arange(harmonics + 1) == 1)[:, None, None]
+        self.excitation = is_first * excitation if excitation is not None else (is_first >= 0) * eye
+        self.holding = is_first * self.omega**2 * (1 + 1j) * np.outer(eye[mode], eye[mode])
 
     def start(self, omega: float, shape, amplitude: float) -> np.ndarray:
         """Return the unknowns of a linear mode.
@@ -112,9 +114,10 @@ class FreeBalance:
         amplitude : float
             At the output [m].
         """
-        y = np.zeros((len(self.balance.rows), self.h + 1), complex)
+        rows = self.balance.rows
         reach = 1.0 if self.output is None else abs(float(self.output @ shape))
-        y[:, 1] = self.balance.rows @ shape * amplitude / reach
+        y = np.zeros((len(rows), len(self.excitation)), complex)
+        y[:, 1] = rows @ shape * amplitude / reach
         return np.append(pack_harmonics(y), [omega / self.omega, 0.0, amplitude / reach])
 
     def evaluate(self, x, amplitude: float | None) -> FreeEquations:
@@ -123,65 +126,51 @@ class FreeBalance:
         Parameters
         ----------
         x : (N,) array
-            Packed slides [m], omega over its scale, zeta, and amplitude of the coordinate [m].
+            Unknowns.
         amplitude : float or None
             Amplitude of the output [m]; None for a motion without damping, zeta = 0.
         """
         balance = self.balance
-        modes = balance.modes
         omega = x[-3] * self.omega
         zeta, a = x[-2:]
         if not omega > 0:
             return FreeEquations(np.full(x.size, np.inf), np.eye(x.size), None)
 
-        # The spring of the coordinate is as stiff as the mode.
-        damping = modes.damping_matrix - 2 * zeta * omega * self.excitation
-        stiffness, by_omega = balance.make_stiffness(omega, self.h, damping)
-        k = np.arange(self.h + 1)[:, None, None]
-        by_omega = by_omega - 2j * k * omega * zeta * self.excitation
-        spring = self.omega**2 * (1 + 1j)
-        stiffness[1, self.mode, self.mode] += spring
-        exciting = np.zeros((self.h + 1, modes.omega.size), complex)
-        exciting[1, self.mode] = spring * a
-        rows = [balance.rows, np.eye(modes.omega.size)[[self.mode]]]
-        rows += [] if self.output is None else [self.output[None]]
-        measured = np.vstack(rows)
-        linear = LinearPart(invert_matrices(stiffness), by_omega)
-        motion = balance.find_motion(x[:-3], omega, linear, exciting, measured)
-
-        # Measured displacements, and their derivatives by all unknowns.
-        values = motion.modal @ measured.T
-        by_zeta = 2j * k[..., 0] * omega**2 * np.einsum("kab,kb->ka", self.excitation, motion.modal)
-        by_zeta = np.einsum("kpa,ka->kp", motion.transfer, by_zeta)
-        by_a = np.zeros_like(by_zeta)
-        by_a[1] = motion.transfer[1, :, self.mode] * spring
-        slopes = np.concatenate(
-            [motion.by_unknowns, np.stack([motion.by_omega * self.omega, by_zeta, by_a], axis=2)],
-            axis=2,
+        # Motion under the negative damping and the spring, whose other end moves by a.
+        damping = balance.modes.damping_matrix - 2 * zeta * omega * self.excitation
+        unit = self.holding[:, self.mode]
+        motion = balance.find_motion(
+            x[:-3], omega, unit * a, damping, -2 * zeta * self.excitation, self.holding
         )
+
+        # Derivatives of the coordinates by all unknowns.
+        k = np.arange(len(unit))
+        by_zeta = 2j * omega**2 * np.einsum("k,kab,kb->ka", k, self.excitation, motion.modal)
+        by_last = motion.inverse @ np.stack([by_zeta, unit], axis=2)
+        by_omega = motion.by_omega[..., None] * self.omega
+        slopes = np.concatenate([motion.by_unknowns, by_omega, by_last], axis=2)
 
         # Equations: slides, amplitude and phase of the coordinate, and the condition of the motion.
-        r = len(balance.rows)
-        residual = np.empty(x.size)
-        jacobian = np.zeros((x.size, x.size))
-        residual[:-3] = x[:-3] - split_equations(values[:, :r])
-        jacobian[:-3] = np.eye(x.size)[:-3] - split_equations(slopes[:, :r])
-        residual[-3:-1] = values[1, r].real - a, values[1, r].imag
-        jacobian[-3:-1] = slopes[1, r].real, slopes[1, r].imag
+        first = motion.modal[1, self.mode]
+        by_first = slopes[1, self.mode]
+        condition, gradient = self._find_condition(x, amplitude, motion.modal, slopes)
+        slides = x[:-3] - split_equations(motion.modal @ balance.rows.T)
+        residual = np.append(slides, [first.real - a, first.imag, condition])
+        jacobian = np.eye(x.size)
+        jacobian[:-3] -= split_equations(balance.rows @ slopes)
+        jacobian[-3:] = by_first.real, by_first.imag, gradient
         jacobian[-3, -1] -= 1.0
-        residual[-1], jacobian[-1] = self._find_condition(
-            x, amplitude, values[:, -1], slopes[:, -1]
-        )
         slides = balance.unpack_slides(x[:-3])
-        free = FreeMotion(a, omega, zeta, slides, motion.contact.force, motion.modal)
-        return FreeEquations(residual, jacobian, free)
+        return FreeEquations(
+            residual, jacobian, FreeMotion(a, omega, zeta, slides, motion.force, motion.modal)
+        )
 
     def _find_condition(
-        self, x, amplitude: float | None, output, slopes
+        self, x, amplitude: float | None, modal, slopes
     ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
-        output, slopes: harmonics (H + 1,) of the output [m] and their derivatives (H + 1, N).
+        modal, slopes: harmonics (H + 1, n) of the coordinates [m] and their derivatives (H + 1, n, N).
         """
         gradient = np.zeros(x.size)
         if amplitude is None:
@@ -190,11 +179,11 @@ class FreeBalance:
         if self.output is None:
             gradient[-1] = 1.0
             return x[-1] - amplitude, gradient
+        output = modal @ self.output
         motion = evaluate_series(output, N_SAMPLES)
         ends = 2 * np.pi / N_SAMPLES * np.array([np.argmax(motion), np.argmin(motion)])
         high, low = np.exp(1j * np.outer(ends, np.arange(output.size)))
-        residual = (find_peak(motion) + find_peak(-motion)) / 2 - amplitude
-        return residual, ((high - low) @ slopes).real / 2
+        return half_range(output) - amplitude, ((high - low) @ (self.output @ slopes)).real / 2
 
     def solve(
         self, x, amplitude: float | None, max_steps: int = 40
@@ -229,7 +218,7 @@ class FreeBalance:
         solution = solve_damped(evaluate, x / unit, is_solved, max_steps)
         if solution is None:
             raise NotConverged(
-                f"backbone: no free motion with the amplitude {format_length(amplitude or x[-1], 3)} was found by "
+                f"backbone: no free motion with the amplitude {format_length(amplitude or size, 3)} was found by "
                 "following the motion from smaller amplitudes"
             )
         x = solution[0] * unit
@@ -252,9 +241,8 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
-            scaled = x * np.append(
-                np.full(x.size - 3, targets[-1] / start), [1.0, 1.0, targets[-1] / start]
-            )
+            scaled = x * (targets[-1] / start)
+            scaled[-3:-1] = x[-3:-1]
             try:
                 x, motion = self.solve(scaled, targets[-1], MAX_CONTINUATION_STEPS)
                 start = targets.pop()
@@ -304,13 +292,11 @@ def make_free_balance(
     factor : int, optional
         Samples per cycle, relative to those that the laws need.
     """
-    omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
+    shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode).shape
     reach = 1.0 if output is None else abs(float(output @ shape))
     widest = np.abs(group.rows @ shape) * max_amplitude / reach
     samples = min(factor * group.samples_for(harmonics, widest), MAX_SAMPLES_PER_CYCLE)
-    return FreeBalance(
-        HarmonicBalance(modes, group, samples), mode, harmonics, omega, excitation, output
-    )
+    return FreeBalance(modes, group, mode, harmonics, samples, excitation, output)
 
 
 def find_free_motions(
@@ -339,9 +325,7 @@ def find_free_motions(
     mode : tuple, optional
         Frequency [rad/s] and shape (n,) of the linear mode; by default that of the sticking contact.
     """
-    modes = equations.balance.modes
-    group = equations.balance.group
-    linear_mode = mode or modes.compute_stuck_mode(group.rows, group.stiffness(), equations.mode)
+    linear_mode = mode or equations.stuck_mode
 
     def solve_near(neighbour: FreeSolution | None, amplitude: float) -> FreeSolution | None:
         """Solve at an amplitude with a similar motion as initial guess; None if this fails."""

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import ModalBasis, NotConverged, PatchfemError
-from .forces import ForceHarmonics, LawGroup
+from .forces import LawGroup
 from .series import find_harmonics, unpack_harmonics
 
 RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
@@ -36,26 +36,19 @@ MAX_RESIDUAL = (
 MAX_DAMPED_STEPS = 40
 
 
-class LinearPart(NamedTuple):
-    """Linear part of the modal equations at a frequency: P_k^-1 and dS_k/d omega, (H + 1, n, n) each."""
-
-    inverse: np.ndarray
-    by_omega: np.ndarray
-
-
 class Motion(NamedTuple):
     """Motion that follows from given slides, and its derivatives.
 
     - modal: (H + 1, n) harmonics of the modal coordinates [m]
-    - contact: forces of the contact
-    - transfer: (H + 1, p, n) displacement of p measured rows per acceleration of the coordinates
-    - by_unknowns: (H + 1, p, r (2 H + 1)) derivative of the measured rows by the packed unknowns
-    - by_omega: (H + 1, p) derivative of the measured rows by the frequency
+    - force: (r, H + 1) harmonics of the contact forces [N]
+    - inverse: (H + 1, n, n) matrices P_k^-1, coordinates per acceleration [s2]
+    - by_unknowns: (H + 1, n, N) derivatives of the coordinates by the packed unknowns
+    - by_omega: (H + 1, n) derivatives of the coordinates by the frequency
     """
 
     modal: np.ndarray
-    contact: ForceHarmonics
-    transfer: np.ndarray
+    force: np.ndarray
+    inverse: np.ndarray
     by_unknowns: np.ndarray
     by_omega: np.ndarray
 
@@ -102,71 +95,68 @@ class HarmonicBalance:
         """Return the harmonics (r, H + 1) [m] of the slides for the unknowns (N,)."""
         return unpack_harmonics(x, len(self.rows))
 
-    def make_springs(self, harmonics: int) -> np.ndarray:
-        """Return the complex stiffness (H + 1,) [N/m] of the springs on the rows."""
-        return self.spring * (1 + 1j * (np.arange(harmonics + 1) > 0))
+    def make_stiffness(self, omega: float, harmonics: int, damping=None) -> np.ndarray:
+        """Return the dynamic stiffness S_k (H + 1, n, n) at a frequency [rad/s].
 
-    def make_stiffness(
-        self, omega: float, harmonics: int, damping=None, *, has_springs: bool = True
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each.
-
-        Parameters
-        ----------
-        omega : float
-            [rad/s].
-        harmonics : int
-            Number of harmonics H.
-        damping : (H + 1, n, n) array, optional
-            Damping matrices [1/s]; default: that of the modes.
-        has_springs : bool
-            Whether the springs on the rows are added.
+        damping: (H + 1, n, n) matrices [1/s]; default: that of the modes.
         """
         modes = self.modes
-        k = np.arange(harmonics + 1)[:, None, None]
-        eye = np.eye(modes.omega.size)
+        k_omega = omega * np.arange(harmonics + 1)[:, None, None]
         damping = modes.damping_matrix if damping is None else damping
-        stiffness = np.diag(modes.omega**2) - (k * omega) ** 2 * eye + 1j * k * omega * damping
-        if has_springs:
-            springs = self.make_springs(harmonics)[:, None, None] / modes.mass
-            stiffness = stiffness + springs * (self.rows.T @ self.rows)
-        return stiffness, 1j * k * damping - 2 * k**2 * omega * eye
+        return (
+            np.diag(modes.omega**2) - k_omega**2 * np.eye(modes.omega.size) + 1j * k_omega * damping
+        )
 
-    def find_motion(self, x, omega: float, linear: LinearPart, exciting, measured) -> Motion:
+    def find_motion(
+        self, x, omega: float, exciting, damping=None, damping_slope=0.0, holding=0.0
+    ) -> Motion:
         """Return the motion that follows from slides, and its derivatives.
 
         Parameters
         ----------
-        x : (r (2 H + 1),) array
+        x : (N,) array
             Packed harmonics of the slides [m].
         omega : float
             [rad/s].
-        linear : LinearPart
-            Transfer matrices of the linear part, and their change with omega.
         exciting : (H + 1, n) array
             Accelerations of the coordinates by the drive [m s-2].
-        measured : (p, n) array
-            Rows of the displacements whose derivatives are computed.
+        damping : (H + 1, n, n) array, optional
+            Damping matrices D [1/s]; default: that of the modes.
+        damping_slope : (H + 1, n, n) array, optional
+            Their derivatives by the frequency [1].
+        holding : (H + 1, n, n) array, optional
+            Stiffness of further springs and dampers over the modal mass [s-2].
         """
+        modes = self.modes
+        rows = self.rows
         q = self.unpack_slides(x)
         h = q.shape[1] - 1
-        springs = self.make_springs(h)
+        k = np.arange(h + 1)
+        damping = modes.damping_matrix if damping is None else damping
+        springs = self.spring * (1 + 1j * (k > 0))
+        stiffness = self.make_stiffness(omega, h, damping) + holding
+        stiffness += springs[:, None, None] / modes.mass * (rows.T @ rows)
+        inverse = invert_matrices(stiffness)
+
+        # The friction less the forces of the springs acts on the modes.
         contact = self.group.compute_harmonics(q, omega, self.samples)
         friction = contact.force - springs * q
-        modal_force = exciting - friction.T @ self.rows / self.modes.mass
-        modal = np.einsum("kab,kb->ka", linear.inverse, modal_force)
+        modal = np.einsum("kab,kb->ka", inverse, exciting - friction.T @ rows / modes.mass)
 
-        # Derivatives of friction by the unknowns of the same row, (r, H + 1, 2 H + 1), less those of the springs.
+        # Derivatives of this force by the unknowns of the same row, (r, H + 1, 2 H + 1).
         slope = contact.slope.copy()
-        k = np.arange(h + 1)
         slope[:, k, k] -= springs
         slope[:, k[1:], h + k[1:]] -= 1j * springs[1:]
-        transfer = measured @ linear.inverse
-        by_force = -transfer @ self.rows.T / self.modes.mass
-        by_unknowns = np.einsum("kpr,rkl->kprl", by_force, slope).reshape(*by_force.shape[:2], -1)
-        by_omega = -np.einsum("kpa,kab,kb->kp", transfer, linear.by_omega, modal)
-        by_omega += np.einsum("kpr,rk->kp", by_force, contact.by_omega)
-        return Motion(modal, contact, transfer, by_unknowns, by_omega)
+        by_force = -inverse @ rows.T / modes.mass
+        by_unknowns = np.einsum("kar,rkl->karl", by_force, slope).reshape(*modal.shape, -1)
+
+        # By the frequency change the dynamic stiffness and the forces of laws that depend on the velocity.
+        waves = k[:, None, None]
+        change = 1j * waves * (damping + omega * damping_slope)
+        change = change - 2 * omega * waves**2 * np.eye(modes.omega.size)
+        by_omega = -np.einsum("kab,kbc,kc->ka", inverse, change, modal)
+        by_omega += np.einsum("kar,rk->ka", by_force, contact.by_omega)
+        return Motion(modal, contact.force, inverse, by_unknowns, by_omega)
 
     def evaluate(self, x, omega: float, level: float) -> Equations:
         """Evaluate the balance.
@@ -179,20 +169,14 @@ class HarmonicBalance:
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         """
         h = (x.size // len(self.rows) - 1) // 2
-        stiffness, by_omega = self.make_stiffness(omega, h)
-        linear = LinearPart(invert_matrices(stiffness), by_omega)
-        exciting = np.zeros((h + 1, self.modes.omega.size), complex)
-        if h:
-            exciting[1] = 1j * level * self.modes.base
-        motion = self.find_motion(x, omega, linear, exciting, self.rows)
-        by_level = np.zeros((h + 1, len(self.rows)), complex)
-        if h:
-            by_level[1] = -1j * motion.transfer[1] @ self.modes.base
+        unit = 1j * np.outer(np.arange(h + 1) == 1, self.modes.base)
+        motion = self.find_motion(x, omega, level * unit)
+        by_level = np.einsum("kab,kb->ka", motion.inverse, unit)
         return Equations(
             x - split_equations(motion.modal @ self.rows.T),
-            np.eye(x.size) - split_equations(motion.by_unknowns),
-            -split_equations(motion.by_omega),
-            split_equations(by_level),
+            np.eye(x.size) - split_equations(self.rows @ motion.by_unknowns),
+            -split_equations(motion.by_omega @ self.rows.T),
+            -split_equations(by_level @ self.rows.T),
             motion,
         )
 
@@ -245,7 +229,7 @@ class HarmonicBalance:
         """Return harmonics H + 1 to 2 H (i, H) of the slides that follow from the forces of slides q (i, H + 1) [m]."""
         h = q.shape[1] - 1
         force = find_harmonics(self.group.compute_forces(q, omega, self.samples), 2 * h)
-        stiffness = self.make_stiffness(omega, 2 * h, has_springs=False)[0][h + 1 :]
+        stiffness = self.make_stiffness(omega, 2 * h)[h + 1 :]
         modal_force = -force[:, h + 1 :].T @ self.rows / self.modes.mass
         return np.einsum("ia,kab,kb->ik", self.rows, invert_matrices(stiffness), modal_force)
 

@@ -1,4 +1,4 @@
-"""Periodic stretch of a friction law with one state along a cycle, and its derivatives (compiled).
+"""Periodic stretch of a friction law with one state along a cycle (compiled).
 
 From one node of the cycle to the next the slide changes linearly; the force is evaluated at the nodes.
 """
@@ -12,7 +12,6 @@ from ...friction.laws import stretch_kernels as law
 MAX_STRETCH_CYCLES = 60  # largest number of cycles until the stretch is periodic
 CLOSED_RATIO = 1e-14  # change over a cycle, relative to the stretch, that is round-off
 MIN_FADING = 1e-9  # smallest part of a stretch that fades in a cycle for Newton's method
-MIN_FADED = 1e-12  # the same for derivatives of a periodic stretch
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -67,26 +66,3 @@ def solve_cycle(numbers, q, velocity, dt, stretch, steps, force, slopes):
         force[i] = rates.force
         slopes[0, i] = rates.force_by_stretch
         slopes[1, i] = rates.force_by_velocity
-
-
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def solve_recursion(decay, source):
-    """Solve z[i + 1] = decay[i] z[i] + source[i] for the periodic z, which replaces the source; 0 if z does not fade.
-
-    Parameters
-    ----------
-    decay : (M,) array
-        Factor from one node to the next.
-    source : (M,) complex array
-        Source at each node, and z afterwards.
-    """
-    kept = 1.0
-    now = 0.0 + 0.0j
-    for i in range(source.size):
-        now = decay[i] * now + source[i]
-        kept *= decay[i]
-    now = now / (1 - kept) if kept < 1 - MIN_FADED else 0.0 + 0.0j
-    for i in range(source.size):
-        change = source[i]
-        source[i] = now
-        now = decay[i] * now + change

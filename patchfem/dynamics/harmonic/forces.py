@@ -33,16 +33,19 @@ class LawGroup:
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of `modes`, or
     participations (n,); a law alone acts on interface 0. An Element is converted to its law; None means bonds that are
     no single element.
-    rows: (i, n); laws: a tuple of laws for every row; modes: the modal basis.
+    modes: the modal basis; parts: pairs (row, law); rows: (i, n); laws: a tuple of laws for every row.
     """
 
     def __init__(self, modes, parts):
+        self.modes = modes
+        self.parts = []
         rows = {}
         laws = {}
         for part in parts if isinstance(parts, list) else [parts]:
             is_pair = isinstance(part, tuple) and not isinstance(part, Element)
             row, law = part if is_pair else (0, part)
             law = make_law(law) if law is None or isinstance(law, Element) else law
+            self.parts.append((row, law))
 
             # Equal rows and equal numbers share a key, as their laws act side by side on one slide.
             if np.ndim(row):
@@ -57,7 +60,6 @@ class LawGroup:
 
         if not rows:
             raise PatchfemError("harmonic balance needs a friction law on at least one interface")
-        self.modes = modes
         self.rows = frozen_array(np.array(list(rows.values())))
         self.laws = [tuple(group) for group in laws.values()]
 
@@ -66,18 +68,12 @@ class LawGroup:
 
         change: function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both of the new elements.
         """
-
-        def replace_elements(law):
-            """Return a law with other elements, or the law itself if it has none."""
+        parts = []
+        for row, law in self.parts:
             if isinstance(law, Jenkins):
-                return Jenkins(*change(law.stiffness, law.limit_slide))
-            return law
-
-        copy = object.__new__(LawGroup)
-        copy.modes = self.modes
-        copy.rows = self.rows
-        copy.laws = [tuple(map(replace_elements, laws)) for laws in self.laws]
-        return copy
+                law = Jenkins(*change(law.stiffness, law.limit_slide))
+            parts.append((row, law))
+        return LawGroup(self.modes, parts)
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
         """Return the number of samples per cycle, a power of two, that resolves harmonics and corners of the forces.

@@ -6,9 +6,11 @@ exact up to their number, so only the corners of the force alias, by (slope jump
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from ...compiled import instantiate, load
 from ...core import PatchfemError, frozen_array
@@ -19,6 +21,9 @@ from .slides import Slides
 # Number of samples while an element passes from one friction limit to the other.
 SAMPLES_PER_STICK = 48
 MAX_SAMPLES_PER_CYCLE = 65536  # largest number of samples per cycle
+MIN_FADED = (
+    1e-12  # smallest part of a stretch that fades in a cycle, for derivatives of a periodic stretch
+)
 MAX_WAVES = 1000.0  # largest number of passed wavelengths for which the samples are increased
 
 
@@ -76,124 +81,103 @@ class Law:
         raise NotImplementedError
 
 
-class _Reversal(NamedTuple):
-    """Reversal in the memory of parallel elements.
-
-    Contains its number in the cycle, the slide [m], the force [N], the stretch times the limit [N m] and the derivatives
-    (r,) of the force by the slides at all reversals.
-    """
-
-    number: int
-    slide: float
-    force: float
-    stretch: float
-    holds: np.ndarray
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class Jenkins(Law):
     """Parallel elastic-plastic (Jenkins) elements, by Masing's rules.
 
     On first loading to the slide x the force is B(x) = sum k min(x, w). From a reversal at (q_r, F_r) in the direction
-    d it is F_r + 2 d B(d (q - q_r)/2), until the branch before the last one is met.
+    d it is F_r + 2 d B(d (q - q_r)/2), until the branch before the last one is met. The stretch times the limit follows
+    the same rules with k w in place of k.
 
-    stiffness: (t,) [N/m] >= 0; limit_slide: (t,) slides w [m] >= 0 at which the elements yield.
+    Parameters
+    ----------
+    stiffness : (t,) array_like
+        [N/m], >= 0.
+    limit_slide : (t,) array_like
+        Slides w [m] >= 0 at which the elements yield.
     """
 
-    stiffness: np.ndarray
-    limit_slide: np.ndarray
-    curve: tuple[np.ndarray, ...] = ()
+    def __init__(self, stiffness, limit_slide):
+        k = frozen_array(np.atleast_1d(stiffness))
+        w = frozen_array(np.atleast_1d(limit_slide))
+        self.stiffness = k
+        self.limit_slide = w
+        self.total = float(k.sum())
+        # Sum of the slip forces [N]
+        self.limit = float(k @ w)
 
-    def __post_init__(self):
-        k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
-        object.__setattr__(self, "stiffness", frozen_array(k))
-        object.__setattr__(self, "limit_slide", frozen_array(w))
-
-        # Corners of the curve of first loading; before each of them the elements beyond it stick.
-        ends, which = np.unique(w, return_inverse=True)
-        parts = np.bincount(which, k)
-        sticking = np.cumsum(parts[::-1])[::-1]
-        rises = np.diff(ends, prepend=0.0)
-        forces = np.append(0.0, np.cumsum(sticking * rises))
-        limits = np.cumsum((parts * ends)[::-1])[::-1]
-        stretches = np.append(0.0, np.cumsum(limits * rises))
-        corners = np.append(0.0, ends)
-        object.__setattr__(self, "curve", (corners, forces, stretches, np.append(sticking, 0.0)))
-
-    @property
-    def total(self) -> float:
-        """Tangent stiffness at rest [N/m]."""
-        return float(self.stiffness.sum())
-
-    @property
-    def limit(self) -> float:
-        """Sum of the slip forces [N]."""
-        return float(self.stiffness @ self.limit_slide)
+        # Corners of the curve of first loading: slides, forces, stretches times limit, and stiffness after each of them.
+        corners = np.append(0.0, np.unique(w))
+        reached = np.minimum.outer(corners, w)
+        self.curve = (corners, reached @ k, reached @ (k * w), (w > corners[:, None]) @ k)
 
     def count_samples(self, amplitude: float) -> int:
         """Return the number of samples that resolve the phases of stick at an amplitude [m]."""
         yield_slide = self.limit / max(self.total, 1e-300)
         return _count_stick_samples(yield_slide / max(amplitude, 1e-300))
 
-    def load_first(self, x) -> np.ndarray:
-        """Return force, stretch times limit, and stiffness (3, ...) on first loading to slides x >= 0 [m]."""
+    def load_first(self, x) -> tuple[np.ndarray, np.ndarray]:
+        """Return force and stretch times limit (2, ...), and stiffness (...), on first loading to slides x >= 0 [m]."""
         corners, forces, stretches, sticking = self.curve
-        number = np.searchsorted(corners[1:], x, side="right")
-        loaded = (np.interp(x, corners, forces), np.interp(x, corners, stretches), sticking[number])
-        return np.array(loaded)
+        values = np.array([np.interp(x, corners, forces), np.interp(x, corners, stretches)])
+        return values, sticking[np.searchsorted(corners, x, side="right") - 1]
 
     def evaluate(self, slides: Slides, row: int) -> LawForce:
         """Return the steady force for the slide of an interface that starts from an unstretched contact."""
         q = slides.q[row]
         turns = slides.reversals[row]
         if not turns.size:
-            force, stretch, slope = self.load_first(np.abs(q))
-            return LawForce(np.sign(q) * force, slope, 0.0, 0.0, self.limit, np.sign(q) * stretch)
+            values, slope = self.load_first(np.abs(q))
+            force, stretch = np.sign(q) * values
+            return LawForce(force, slope, limit=self.limit, stretch=stretch)
 
         # The largest slide erases the memory of all others; the cycle begins there.
-        first = int(np.argmax(np.abs(q[turns])))
-        sign = np.sign(q[turns[first]])
-        force, stretch, slope = self.load_first(abs(q[turns[first]]))
-        holds = slope * (np.arange(turns.size) == first)
-        memory = [_Reversal(first, q[turns[first]], sign * force, sign * stretch, holds)]
-        out = np.empty((3 + turns.size, q.size))
-        for begin in (first + np.arange(turns.size)) % turns.size:
-            end = (begin + 1) % turns.size
-            count = (turns[end] - turns[begin] - 1) % q.size + 1
-            nodes = (turns[begin] + 1 + np.arange(count)) % q.size
-            self._follow_branches(q[nodes], nodes, memory, out)
-            force, slope, stretch = out[:3, turns[end]]
-            holds = out[3:, turns[end]] + slope * (np.arange(turns.size) == end)
-            memory.append(_Reversal(end, q[turns[end]], force, stretch, holds))
-        return LawForce(out[0], out[1], 0.0, out[3:], self.limit, out[2])
+        turns = np.roll(turns, -int(np.argmax(np.abs(q[turns]))))
+        largest = q[turns[0]]
+        values, slope = self.load_first(abs(largest))
+        known = np.append(np.sign(largest) * values, np.zeros(turns.size))
+        known[2] = slope
+        memory = [(0, largest, known)]
 
-    def _follow_branches(self, q, nodes, memory: list[_Reversal], out) -> None:
-        """Write the force between two reversals, and remove the reversals that are passed from the memory.
+        # Rows: force, stretch times limit, and derivatives of the force by the slides at the reversals.
+        out = np.empty((2 + turns.size, q.size))
+        slopes = np.empty(q.size)
+        for end, (begin, stop) in enumerate(pairwise([*turns, turns[0]]), 1):
+            count = (stop - begin - 1) % q.size + 1
+            nodes = (begin + 1 + np.arange(count)) % q.size
+            self._follow_branches(q[nodes], nodes, memory, out, slopes)
+            known = out[:, stop].copy()
+            known[2 + end % turns.size] += slopes[stop]
+            memory.append((end % turns.size, q[stop], known))
+        holds = out[2 + np.argsort(turns)]
+        return LawForce(out[0], slopes, holds=holds, limit=self.limit, stretch=out[1])
+
+    def _follow_branches(self, q, nodes, memory: list, out, slopes) -> None:
+        """Write the forces between two reversals, and remove the reversals that are passed from the memory.
 
         Parameters
         ----------
         q, nodes : (k,) array
             Slides [m] after the last reversal in the memory up to the next one, and their columns in `out`.
-        memory : list of _Reversal
-            Reversals that are not yet passed, the last one at the end.
-        out : (3 + r, M) array
-            Force, stiffness, stretch times limit, and derivatives by the slides at reversals.
+        memory : list
+            Reversals that are not yet passed, the last one at the end: number, slide [m] and column (2 + r,) of `out`.
+        out : (2 + r, M) array
+            Force, stretch times limit, and derivatives by the slides at reversals.
+        slopes : (M,) array
+            Stiffness of the elements that stick [N/m].
         """
-        direction = np.sign(q[-1] - memory[-1].slide)
+        direction = np.sign(q[-1] - memory[-1][1])
         done = 0
         while done < q.size:
-            last = memory[-1]
+            number, slide, known = memory[-1]
             end = q.size
             if len(memory) > 2:
-                end = int(np.sum(direction * (q - memory[-2].slide) <= 0))
+                end = int(np.sum(direction * (q - memory[-2][1]) <= 0))
             part = nodes[done:end]
-            x = np.maximum(direction * (q[done:end] - last.slide) / 2, 0.0)
-            force, stretch, slope = self.load_first(x)
-            out[0, part] = last.force + 2 * direction * force
-            out[1, part] = slope
-            out[2, part] = last.stretch + 2 * direction * stretch
-            out[3:, part] = last.holds[:, None]
-            out[3 + last.number, part] -= slope
+            x = np.maximum(direction * (q[done:end] - slide) / 2, 0.0)
+            values, slopes[part] = self.load_first(x)
+            out[:, part] = known[:, None]
+            out[:2, part] += 2 * direction * values
+            out[2 + number, part] -= slopes[part]
             done = end
             if done < q.size:
                 del memory[-2:]
@@ -201,29 +185,16 @@ class Jenkins(Law):
 
 @dataclass(frozen=True, slots=True)
 class Spring(Law):
-    """Spring across an interface with a linear stiffness [N/m] and a cubic stiffness [N/m3]."""
+    """Spring of the force k L/(2 pi) sin(2 pi q/L) + c q^3.
+
+    - stiffness: k [N/m]
+    - cubic: c [N/m3]
+    - wavelength: L of interlocking surface peaks [m]; infinite for a linear spring
+    """
 
     stiffness: float = 0.0
     cubic: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """Tangent stiffness at rest [N/m]."""
-        return self.stiffness
-
-    def evaluate(self, slides: Slides, row: int) -> LawForce:
-        """Return the force of the spring."""
-        q = slides.q[row]
-        force = q * (self.stiffness + self.cubic * q * q)
-        return LawForce(force, self.stiffness + 3 * self.cubic * q * q)
-
-
-@dataclass(frozen=True, slots=True)
-class Interlock(Law):
-    """Force k L/(2 pi) sin(2 pi q/L) of interlocking surface peaks, of stiffness k [N/m] and wavelength L [m]."""
-
-    stiffness: float
-    wavelength: float
+    wavelength: float = np.inf
 
     @property
     def total(self) -> float:
@@ -235,10 +206,11 @@ class Interlock(Law):
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, MAX_WAVES))
 
     def evaluate(self, slides: Slides, row: int) -> LawForce:
-        """Return the force of the interlocking peaks."""
-        wave = 2 * np.pi / self.wavelength
-        angle = wave * slides.q[row]
-        return LawForce(self.stiffness / wave * np.sin(angle), self.stiffness * np.cos(angle))
+        """Return the force of the spring."""
+        q = slides.q[row]
+        waves = 2 * q / self.wavelength
+        force = q * (self.stiffness * np.sinc(waves) + self.cubic * q * q)
+        return LawForce(force, self.stiffness * np.cos(np.pi * waves) + 3 * self.cubic * q * q)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -308,14 +280,13 @@ class FlowLaw(Law):
             [N s].
         """
         h = slides.harmonics.shape[1] - 1
-        solve = load_kernels("flow_kernels", self.element.kernels).solve_recursion
         decay, by_increment, by_time = states.steps
         by_stretch, by_velocity = states.slopes
 
         def find_force_harmonics(source, velocity) -> np.ndarray:
             """Return the harmonics of the force (2, H + 1) for real and negative imaginary part of the changes."""
-            solve(decay, source)
-            force = (by_stretch * source + by_velocity * velocity)[slides.is_sample]
+            changes = by_stretch * solve_recursion(decay, source) + by_velocity * velocity
+            force = changes[slides.is_sample]
             return find_harmonics(np.array([force.real, -force.imag]), h)
 
         by_slide = np.empty((h + 1, 2 * h + 1), complex)
@@ -326,8 +297,28 @@ class FlowLaw(Law):
             by_slide[:, k] = real
             if k:
                 by_slide[:, h + k] = imaginary
-        source = -by_time * slides.widths / slides.omega**2 + 0j
+        source = -by_time * slides.widths / slides.omega**2
         return by_slide, find_force_harmonics(source, slides.rate[row])[0]
+
+
+def solve_recursion(decay, source) -> np.ndarray:
+    """Return the periodic z (M,) with z[i + 1] = decay[i] z[i] + source[i]; 0 if it does not fade within a cycle.
+
+    Parameters
+    ----------
+    decay : (M,) array
+        Factor from one node to the next, from 0 to 1.
+    source : (M,) array
+        Change from one node to the next.
+    """
+    kept = np.cumprod(decay)
+    if kept[-1] >= 1 - MIN_FADED:
+        return np.zeros_like(source)
+    # The solution that begins at 0, and the part of it that a cycle leaves.
+    bands = np.array([np.ones(decay.size), -np.roll(decay, -1)])
+    end = solve_banded((1, 0), bands, source)
+    first = end[-1] / (1 - kept[-1])
+    return np.roll(end + kept * first, 1)
 
 
 def _count_stick_samples(stick_ratio: float) -> int:

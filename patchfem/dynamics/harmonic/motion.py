@@ -7,7 +7,7 @@ import numpy as np
 from ...core import Response
 from ...structure.histories import make_response
 from .forces import LawGroup
-from .laws import Interlock, Jenkins, LawForce
+from .laws import Jenkins, LawForce, Spring
 from .series import half_range
 from .slides import Slides, make_slides
 
@@ -73,9 +73,9 @@ class SteadyMotion:
 def sum_friction(laws: tuple[object, ...], forces: list[LawForce]) -> np.ndarray:
     """Return the friction force (M,) [N] of an interface row.
 
-    The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not friction.
+    Springs are parallel to the contact, such as the interlock of [structure.bonded], so their forces are not friction.
     """
-    friction = [force.force for law, force in zip(laws, forces) if not isinstance(law, Interlock)]
+    friction = [force.force for law, force in zip(laws, forces) if not isinstance(law, Spring)]
     return sum(friction or [force.force for force in forces])
 
 

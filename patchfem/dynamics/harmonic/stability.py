@@ -7,10 +7,11 @@ the slide is at rest there, so the shift has no effect to first order. Elements 
 that never slips is a spring, whose offset (multiplier 1) is left out. A law with one state has one state per row.
 
 In each cell between two nodes of the cycle the coefficients are constant and the motion is a matrix exponential: order 2
-in the width of the cells. Successive cells of equal coefficients become one.
+in the width of the cells.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,28 +40,37 @@ def add_stability(motion: SteadyMotion, modes) -> SteadyMotion:
     modes : ModalBasis
         Modes of the structure without the contact.
     """
-    values = find_multipliers(find_monodromy(motion, modes))
+    values = np.linalg.eigvals(find_monodromy(motion, modes))
+    values = values[np.argsort(-np.abs(values))]
     is_stable = bool(np.abs(values).max(initial=0.0) <= MAX_STABLE_MULTIPLIER)
     return replace(motion, multipliers=values, stable=is_stable)
 
 
-def find_multipliers(monodromy) -> np.ndarray:
-    """Return the eigenvalues (s,) of a monodromy matrix in order of decreasing magnitude."""
-    values = np.linalg.eigvals(monodromy)
-    return values[np.argsort(-np.abs(values))]
+class _Memory(NamedTuple):
+    """State of a law in the cells of a cycle.
+
+    - row: number of the interface row
+    - gain, loss (M,): the state obeys u' = gain q' - loss u [1], [1/rad]
+    - stiffness (M,): force per state [N/m]
+    - node: node at which the state becomes the slide; -1 for a state that changes in all cells
+    """
+
+    row: int
+    gain: np.ndarray
+    loss: np.ndarray
+    stiffness: np.ndarray
+    node: int = -1
 
 
-def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
+def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     """Return the derivative of the state (z, dz/dtheta, memories) after a cycle by that before, theta = omega t from 0.
 
     Parameters
     ----------
     motion : SteadyMotion
-        Solution of the harmonic balance.
+        Solution of the harmonic balance. As many cells as its samples, and at least MIN_CELLS, make up the cycle.
     modes : ModalBasis
         Modes of the structure without the contact.
-    cells : int
-        Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
 
     Returns
     -------
@@ -68,19 +78,18 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
         s = 2 n + number of memories.
     """
     n = modes.omega.size
-    group = motion.group
+    rows = motion.group.rows
     omega = motion.omega
-    slides = motion.sample(cells or max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
+    slides = motion.sample(max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
     widths = slides.widths
 
-    # Coefficients of each cell: of the accelerations by the slides, their rates and memories.
-    slope, damping = np.zeros((2, len(group.rows), widths.size))
-    turns = []
+    # Coefficients of each cell: of the accelerations by the slides and their rates, and those of the memories.
+    slope, damping = np.zeros((2, len(rows), widths.size))
     memories = []
-    for i, forces in enumerate(group.evaluate(slides)):
+    for i, forces in enumerate(motion.group.evaluate(slides)):
         for force in forces:
             if force.states is not None:
-                memories.append((i, *_find_fading(force.states, widths)))
+                memories.append(_Memory(i, *_find_fading(force.states, widths)))
                 damping[i] += _average(force.states.slopes[1])
                 continue
             weight = _weigh_ends(slides.q[i], force)
@@ -88,56 +97,43 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
             damping[i] += _average(force.by_velocity)
             if np.ndim(force.holds):
                 held = _average(force.holds - force.holds.max(axis=1, keepdims=True), weight)
-                moves = held.any(axis=1)
-                turns += [(i, *turn) for turn in zip(slides.reversals[i][moves], held[moves])]
-
-    # Successive cells of equal coefficients are one, but for those that begin with a reversal.
-    coefficients = [
-        slope,
-        damping,
-        *(turn[2] for turn in turns),
-        *(part for memory in memories for part in memory[1:]),
-    ]
-    table = np.vstack(coefficients)
-    is_first = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
-    is_first[[node for _, node, _ in turns]] = True
-    first = np.flatnonzero(is_first)
+                still = np.zeros(widths.size)
+                for node, stiffness in zip(slides.reversals[i], held):
+                    if stiffness.any():
+                        memories.append(_Memory(i, still, still, stiffness, node))
 
     # Matrices of the rates of the state by theta.
-    size = 2 * n + len(turns) + len(memories)
-    to_rate = group.rows.T / (modes.mass * omega**2)
-    rates = np.zeros((first.size, size, size))
+    size = 2 * n + len(memories)
+    to_rate = rows.T / (modes.mass * omega**2)
+    rates = np.zeros((widths.size, size, size))
     rates[:, :n, n : 2 * n] = np.eye(n)
     rates[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2
-    rates[:, n : 2 * n, :n] -= (to_rate * slope.T[first, None]) @ group.rows
+    rates[:, n : 2 * n, :n] -= (to_rate * slope.T[:, None]) @ rows
     rates[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega
-    rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[first, None]) @ group.rows
-    for k, (i, _, held) in enumerate(turns, 2 * n):
-        rates[:, n : 2 * n, k] = -np.outer(held[first], to_rate[:, i])
-    for k, (i, gain, loss, stiffness) in enumerate(memories, 2 * n + len(turns)):
-        rates[:, n : 2 * n, k] = -np.outer(stiffness[first], to_rate[:, i])
-        rates[:, k, n : 2 * n] = np.outer(gain[first], group.rows[i])
-        rates[:, k, k] = -loss[first]
+    rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[:, None]) @ rows
+    for k, memory in enumerate(memories, 2 * n):
+        rates[:, n : 2 * n, k] = -np.outer(memory.stiffness, to_rate[:, memory.row])
+        rates[:, k, n : 2 * n] = np.outer(memory.gain, rows[memory.row])
+        rates[:, k, k] = -memory.loss
 
-    steps = _find_cell_steps(rates, np.add.reduceat(widths, first), n)
-
-    # A reversal ends a cell; its memory is the slide there.
-    for k, (i, node, _) in enumerate(turns, 2 * n):
-        last = np.searchsorted(first, node) - 1
-        steps[last, k] = group.rows[i] @ steps[last, :n]
-    return _multiply(steps)
-
-
-def _find_cell_steps(rates, widths, n: int) -> np.ndarray:
-    """Return the transition matrices (c, s, s) of cells from the rates of the state by theta and the widths (c,) [rad].
-
-    Velocities, the coordinates n to 2 n, are divided by a scale, which balances the entries of stiff modes and contacts.
-    """
+    # Transition matrices of the cells. Velocities divided by a scale balance the entries of stiff modes and contacts.
     scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
-    sizes = np.ones(rates.shape[1])
+    sizes = np.ones(size)
     sizes[n : 2 * n] = scale
     balanced = rates * (sizes / sizes[:, None])
-    return find_exponentials(balanced * widths[:, None, None]) * (sizes[:, None] / sizes)
+    steps = find_exponentials(balanced * widths[:, None, None]) * (sizes[:, None] / sizes)
+
+    # A reversal ends a cell; its memory is the slide there.
+    for k, memory in enumerate(memories, 2 * n):
+        if memory.node >= 0:
+            steps[memory.node - 1, k] = rows[memory.row] @ steps[memory.node - 1, :n]
+
+    # Product of the matrices by pairs, the first one rightmost.
+    while len(steps) > 1:
+        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
+        pairs = steps[: len(steps) - len(unpaired)]
+        steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
+    return steps[0]
 
 
 def _average(values, weight=0.5):
@@ -171,12 +167,3 @@ def _find_fading(states: FlowStates, widths) -> np.ndarray:
     left = -np.log(np.maximum(decay, 1e-300))
     gain = by_slide * np.divide(left, 1 - decay, out=np.ones_like(left), where=left > MIN_FADING)
     return np.array([gain, left / np.maximum(widths, 1e-300), _average(states.slopes[0])])
-
-
-def _multiply(steps) -> np.ndarray:
-    """Return the product of matrices (k, s, s), the first one rightmost, by pairs."""
-    while len(steps) > 1:
-        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
-        pairs = steps[: len(steps) - len(unpaired)]
-        steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
-    return steps[0]

@@ -134,7 +134,7 @@ def make_motion(balance: HarmonicBalance, x, drive, coarser=None, n_steps: int =
         drive.omega,
         drive.acceleration,
         slides,
-        equations.motion.contact.force,
+        equations.motion.force,
         equations.motion.modal,
         balance.samples,
         error,

@@ -65,7 +65,11 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
         if curve.low is not None:
             ends = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
             axes.errorbar(curve.x, curve.y, ends, fmt="none", ecolor=colour)
-        _draw_points(curve, colour, axes)
+        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
+        for symbol, marker in MARKERS.items():
+            points = (values[symbols == symbol] for values in (curve.x, curve.y))
+            label = curve.name if symbol == "circle" else None  # the entry of the legend
+            axes.plot(*points, marker, color=colour, label=label, zorder=3)
         return
     axes.plot(curve.x, curve.y, color=colour, label=curve.name)
     filling = {"color": colour, "alpha": BAND_OPACITY, "lw": 0}
@@ -73,15 +77,6 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
         axes.fill_between(curve.x, curve.low, curve.high, **filling)
     if style == "area":
         axes.fill_between(curve.x, curve.y, **filling)
-
-
-def _draw_points(curve: Curve, colour: str, axes) -> None:
-    """Draw the points of a curve with their symbols."""
-    symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-    for symbol, marker in MARKERS.items():
-        is_drawn = symbols == symbol
-        label = curve.name if symbol == "circle" else None  # the entry of the legend
-        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, color=colour, label=label, zorder=3)
 
 
 def _draw_map(panel: Panel, axes) -> None:
@@ -184,7 +179,17 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
 
 
 def draw_panels(panels: list[Panel], axes, caller: str):
-    """Draw the first panel on Axes, or all of them in a new figure; return the first Axes. Parameters as `draw_charts`."""
+    """Draw the first panel on Axes, or all of them in a new figure; return the first Axes.
+
+    Parameters
+    ----------
+    panels : list of Panel
+        At least one.
+    axes : matplotlib Axes or None
+        Where to draw the first panel alone; None for a new figure.
+    caller : str
+        Function that the message about wrong `axes` names.
+    """
     check_axes(axes, caller)
     return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 

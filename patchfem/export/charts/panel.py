@@ -1,7 +1,6 @@
 """A chart with its data in display units, which plotly.js or matplotlib draws."""
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
@@ -113,16 +112,15 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
 
 def thin(values: np.ndarray, count: int = MAX_CURVE_POINTS) -> np.ndarray:
     """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
-    if values.ndim > 1 or values.size <= 2 * count:
-        return np.arange(len(values))
+    if values.size <= 2 * count:
+        return np.arange(values.size)
     edges = np.linspace(0, values.size, count + 1).astype(int)
-    picks = ((np.argmin, np.inf), (np.argmax, -np.inf))  # an unknown value is no extreme
-    extremes = [
-        start + pick(np.where(np.isnan(values[start:end]), unknown, values[start:end]))
-        for start, end in pairwise(edges)
-        for pick, unknown in picks
-    ]
-    return np.unique([0, *extremes, values.size - 1])
+    extremes = [0, values.size - 1]
+    for part in np.split(np.arange(values.size), edges[1:-1]):
+        # an unknown value is no extreme
+        extremes.append(part[np.nan_to_num(values[part], nan=np.inf).argmin()])
+        extremes.append(part[np.nan_to_num(values[part], nan=-np.inf).argmax()])
+    return np.unique(extremes)
 
 
 def join_names(*names: str) -> str:

@@ -72,17 +72,14 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
 
     curves = []
     for label, data in selected.items():
-        own = [
-            replace(curve, is_line=names is chart.lines)
-            for names in (chart.y, chart.lines)
-            for name, own_x in _split_names(names)
-            for curve in _make_curves(data, chart, name, own_x, axes)
-        ]
-        own_names = [""] if len(own) == 1 else [curve.name for curve in own]
-        curves += [
-            replace(curve, name=join_names(label, name))
-            for curve, name in zip(own, own_names, strict=True)
-        ]
+        own = []
+        for names in (chart.y, chart.lines):
+            for name, own_x in _split_names(names):
+                drawn = _make_curves(data, chart, name, own_x, axes)
+                own += [replace(curve, is_line=names is chart.lines) for curve in drawn]
+        for curve in own:
+            name = join_names(label, curve.name if len(own) > 1 else "")
+            curves.append(replace(curve, name=name))
     marks = [_as_floats(first[name]).ravel() for name in chart.marks.split() if name in first]
     marks = np.concatenate([*marks, np.zeros(0)]) * axes[0].scale
     marks = marks[np.isfinite(marks)].tolist()

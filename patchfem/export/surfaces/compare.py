@@ -292,8 +292,12 @@ def _make_abbott(heights) -> dict[str, Variable]:
     if not all(values.size for values in known):
         return {}
     curves = [np.quantile(values, 1 - MATERIAL_RATIOS) for values in known]
-    data = make_variables("material_ratio", "1", material_ratio=MATERIAL_RATIOS)
-    return data | make_variables("material_ratio", abbott_before=curves[0], abbott_after=curves[1])
+    return make_variables(
+        "material_ratio",
+        material_ratio=(MATERIAL_RATIOS, "1"),
+        abbott_before=curves[0],
+        abbott_after=curves[1],
+    )
 
 
 def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
@@ -302,8 +306,7 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
     data = dict(answer.data)
     for side, (places, stress) in runs.pressures().items():
         x = f"x_pressed_{side}"
-        data |= make_variables(x, **{x: places})
-        data |= make_variables(x, "Pa", **{f"pressure_{side}": stress})
+        data |= make_variables(x, **{x: places, f"pressure_{side}": (stress, "Pa")})
     warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
     return replace(
         answer,

@@ -102,10 +102,11 @@ def _count(rows: list[dict]) -> str:
 
 def _make_data(rows: list[dict]) -> dict[str, Variable]:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    data = make_variables("pair", "1", line=np.array([float(row["line"]) for row in rows]))
+    lines = np.array([float(row["line"]) for row in rows])
+    data = make_variables("pair", line=(lines, "1"))
     for name, unit in CHARTED_QUANTITIES.items():
         cells = [row.get(name, {}) for row in rows]
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             values = np.array([cell.get(key) for cell in cells], float)
-            data |= make_variables("pair", unit, **{name + suffix: values})
+            data |= make_variables("pair", **{name + suffix: (values, unit)})
     return data

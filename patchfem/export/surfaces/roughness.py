@@ -236,9 +236,9 @@ def _find_moments(each: RoughnessReport) -> dict | None:
 
 def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
-    data = make_variables("file", "", file=np.array([each.source for each in reports]))
+    data = make_variables("file", file=(np.array([each.source for each in reports]), ""))
     curves = [abbott_curve(each.heights) for each in reports]
-    data |= make_variables("material_ratio", "1", material_ratio=curves[0][0])
+    data |= make_variables("material_ratio", material_ratio=(curves[0][0], "1"))
     heights = np.array([height for _, height in curves])
     data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
     # Only Abbott curves can be compared over files.
@@ -255,8 +255,5 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
             "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
         )
     spectrum = surface.spectrum
-    return (
-        data
-        | make_variables("wavelength", wavelength=spectrum.waves)
-        | make_variables("wavelength", "m3", density=spectrum.density)
-    )
+    density = (spectrum.density, "m3")
+    return data | make_variables("wavelength", wavelength=spectrum.waves, density=density)

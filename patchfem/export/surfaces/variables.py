@@ -34,12 +34,15 @@ TEXTS = {
 }
 
 
-def make_variables(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Variable]:
-    """Return arrays (n,) along one dimension as variables by name; missing numbers are NaN."""
-    return {
-        name: Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
-        for name, values in arrays.items()
-    }
+def make_variables(
+    dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
+) -> dict[str, Variable]:
+    """Return arrays (n,) [m], or pairs of an array and its unit, along one dimension as variables; NaN is missing."""
+    data = {}
+    for name, values in arrays.items():
+        values, unit = values if isinstance(values, tuple) else (values, "m")
+        data[name] = Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
+    return data
 
 
 def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> dict[str, Variable]:

@@ -71,25 +71,23 @@ class Writer:
         case : int
             Index of the case in `results`.
         """
+        # a case without a model has no effects
         kind = "linear"
         title = ""
-        effects = []
-        not_in_scene = []
+        names = []
+        absent = ()
         if isinstance(model, Model):
             kind = model.kind
             title = model.source.title
-            effects = [
-                {"effect": name, "equations": EFFECTS[name].equations}
-                for name in model.source.effects
-            ]
-            not_in_scene = list(model.absent)
+            names = model.source.effects
+            absent = model.absent
 
         # the keys are those of a single run; effects have no CPU time, because cases are computed together
         details = {
             "outcome": str(results.outcome[case]),
-            "effects": effects,
-            "not_in_scene": not_in_scene,
-            "seconds": {"total": float(results.seconds[case])},
+            "effects": [{"effect": name, "equations": EFFECTS[name].equations} for name in names],
+            "not_in_scene": absent,
+            "seconds": {"total": results.seconds[case]},
             "numerics": results.numerics.get(case, {}),
             "case": self._name_case(number),
         }

@@ -113,33 +113,23 @@ class CaseResults:
         return self.messages, self.warnings, self.notes, self.numerics
 
     def insert(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Insert the results of a subset of the cases."""
+        """Insert the results of a subset of the cases, in place of those that they have."""
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
         self.faults += part.faults
         for name, unit in part.units.items():
             self.add_measure(name, unit)
-            for columns, part_columns in zip(self._result_columns, part._result_columns):
-                columns[name][indices] = part_columns.get(name, np.nan)
-        new_indices = dict(enumerate(indices.tolist()))
-        for name, reasons in part.reasons.items():
-            self.reasons.setdefault(name, {}).update(_renumber(reasons, new_indices))
-        for texts, part_texts in zip(self._result_texts, part._result_texts):
-            texts.update(_renumber(part_texts, new_indices))
+        for columns, part_columns in zip(self._result_columns, part._result_columns):
+            for name, column in columns.items():
+                column[indices] = part_columns.get(name, np.nan)
 
-    def remove(self, cases: Sequence[int]) -> None:
-        """Remove the results of selected cases, and measures that no other case has."""
-        for columns in self._result_columns:
-            for column in columns.values():
-                column[cases] = np.nan
-        for case in cases:
-            for texts in (self.warnings, self.notes, self.numerics, *self.reasons.values()):
-                texts.pop(case, None)
-        for name, column in list(self.values.items()):
-            if np.isnan(column).all() and not self.reasons.get(name):
-                for columns in (*self._result_columns, self.units):
-                    columns.pop(name)
+        new_indices = dict(enumerate(indices.tolist()))
+        for name in {**self.reasons, **part.reasons}:
+            own = self.reasons.setdefault(name, {})
+            _replace_texts(own, part.reasons.get(name, {}), new_indices)
+        for texts, part_texts in zip(self._result_texts, part._result_texts):
+            _replace_texts(texts, part_texts, new_indices)
 
     def select(self, cases: np.ndarray) -> CaseResults:
         """Return measures, outcomes and messages of selected cases, in a form for `insert`."""
@@ -158,7 +148,14 @@ class CaseResults:
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
-def _renumber(texts: dict, new_indices: dict) -> dict:
+def _replace_texts(texts, part_texts, new_indices) -> None:
+    """Replace texts by case by those of a part of the cases, given the new index of each of them."""
+    for case in new_indices.values():
+        texts.pop(case, None)
+    texts.update(_renumber(part_texts, new_indices))
+
+
+def _renumber(texts, new_indices) -> dict[int, str]:
     """Return texts by case with new case indices, without the cases that have none."""
     return {new_indices[case]: text for case, text in texts.items() if case in new_indices}
 

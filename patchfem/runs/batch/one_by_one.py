@@ -84,5 +84,4 @@ def replace_by_single_runs(
     """
     indices = np.flatnonzero(cases)
     if indices.size:
-        results.remove(indices.tolist())
         results.insert(indices, solve(select_models(models, indices), report))

@@ -58,8 +58,7 @@ def solve_contact_on_meshes(interface, tolerance: float) -> Patches:
         With the scene key of the interface that is in error.
     """
     patch_model = interface.patch
-    files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
-    key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
+    key = ("face", store.content_key(patch_model), tolerance)
     try:
         return store.get_or_compute(
             key, lambda: mesh_levels.solve_with_coarser(patch_model, tolerance)

@@ -134,8 +134,7 @@ def make_base_grids(patch_model) -> BaseGrids:
     -------
     BaseGrids
     """
-    has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
-    key = ("base grids", patch_model if has_files else store.content_key(patch_model))
+    key = ("base grids", store.content_key(patch_model))
     return store.get_or_compute(key, lambda: _search_contact_region(patch_model))
 
 

@@ -19,11 +19,18 @@ from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
-from ..results import patch_rows
-from ..results.patch_rows import MESH_MEASURES, TABLE, Measures, Values
+from ..results.patch_rows import (
+    EXTRAPOLATED_SOURCE,
+    FINEST_MESH_SOURCE,
+    MESH_MEASURES,
+    TABLE,
+    Measures,
+    Values,
+    make_measure,
+)
 from .condensed import condense_on_same_meshes
 from .limits import extrapolate_to_zero_cell_length
-from .press import Estimate, Estimates, Patch, Patches, solve_patch_contact
+from .press import Patch, Patches, solve_patch_contact
 from .values import (
     compute_static_values,
     edge_cell_lengths,
@@ -91,7 +98,7 @@ def estimate_static_measures(
     # The series over the meshes gives a value, its limit and their errors.
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_edge_rounding_pressure(fine)
-        estimates = extrapolate_static_measures(
+        out = extrapolate_static_measures(
             [*(compute_static_values(patch) for patch in reversed(coarse)), finest],
             estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest),
             tolerance,
@@ -101,15 +108,16 @@ def estimate_static_measures(
         )
     else:
         error = 0.0 if coarse else None
-        estimates = {name: Estimate(value, error) for name, value in finest.items()}
-
-    out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
+        out = {
+            name: make_measure(name, value, error, FINEST_MESH_SOURCE)
+            for name, value in finest.items()
+        }
 
     # Errors and reasons that no series over meshes shows.
     if coarse and fine.averaging is not None:
         out |= _widen_errors_by_corner_pressure(out, fine, coarse[0])
     if fine.points is not None:
-        out |= _select_more_accurate_point_measures(out, fine.points.measures)
+        out |= _select_more_accurate_measures(out, fine.points.measures)
     reason = _reason_for_unbounded_pressure(fine)
     for name in PEAK_MEASURES if reason else ():
         out[name] = replace(out[name], value=None, error=None, reason=reason)
@@ -141,27 +149,20 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
     return replace(fine, measures=measures), *coarse
 
 
-def _select_more_accurate_point_measures(
-    measures_by_name: Measures, estimates: Estimates
-) -> Measures:
+def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Measures:
     """Return the measures that profile points determine more accurately than the mesh.
 
     Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
     peak pressure, and therefore a small absolute error.
     """
     out = {}
-    for name, estimate in estimates.items():
-        measure = measures_by_name[name]
+    for name, measure in by_points.items():
+        other = by_mesh[name]
         ratio = 1.0
-        if name in PEAK_MEASURES and measure.value and estimate.value:
-            ratio = measure.value / float(estimate.value)
-        if ratio * estimate.error < measure.error:
-            out[name] = replace(
-                measure,
-                value=float(estimate.value),
-                error=float(estimate.error),
-                engine=patch_rows.HALF_SPACE_SOURCE,
-            )
+        if name in PEAK_MEASURES and measure.value and other.value:
+            ratio = other.value / measure.value
+        if ratio * measure.error < other.error:
+            out[name] = measure
     return out
 
 
@@ -229,7 +230,7 @@ def extrapolate_static_measures(
     nested: bool = True,
     min_relative_error: float = MIN_ERROR,
     error_factor: float = 1.0,
-) -> Estimates:
+) -> Measures:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
@@ -253,7 +254,7 @@ def extrapolate_static_measures(
     Returns
     -------
     dict
-        Estimate by name.
+        Measure by name.
     """
     out = {}
     for name, finest in values_by_mesh[-1].items():
@@ -275,14 +276,15 @@ def extrapolate_static_measures(
                 error = extrapolated_error
 
         error = max(error, min_relative_error * abs(finest))
-        out[name] = Estimate(value, error, value != finest)
+        engine = FINEST_MESH_SOURCE if value == finest else EXTRAPOLATED_SOURCE
+        out[name] = make_measure(name, value, error, engine)
 
     # The loaded fraction is mean pressure / peak pressure, so that it has the relative error of the
     # peak at least.
     peak, fraction = (out[name] for name in PEAK_MEASURES)
     relative = peak.error / peak.value if peak.value > 0 else 0.0
     fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
-    out["loaded_fraction"] = fraction._replace(error=fraction_error)
+    out["loaded_fraction"] = replace(fraction, error=fraction_error)
     return out
 
 

@@ -60,8 +60,7 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         meshes = make_given_meshes(patch_model)[: None if estimate else 1]
         pairs = [condense(patch_model, *level) for level in meshes]
         return solve_on_pairs(patch_model, pairs, tolerance)
-    patches = store.get_or_compute_in_sweep(
-        patch_model,
+    patches = store.get_or_compute(
         ("patches", store.content_key(patch_model), tolerance, estimate),
         lambda: solve_on_pairs(
             patch_model, condense_on_shared_meshes(patch_model), tolerance, estimate

@@ -21,11 +21,10 @@ from ...contact.press import (
     strip_offsets,
 )
 from ...contact.strip_compliance import StripCompliance
-from ...core import Compliance, ContactState, Measure, PatchfemError, frozen_array
+from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel, PatchStrips
-from ..results import patch_rows
-from ..results.patch_rows import TABLE, Arrays, Measures, Values
+from ..results.patch_rows import Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -47,32 +46,6 @@ class Surface(NamedTuple):
     unloaded_gap: np.ndarray
 
 
-class Estimate(NamedTuple):
-    """Value and error estimate of a static measure.
-
-    - value: number.
-    - error: error estimate; None without a coarser mesh.
-    - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
-      that of the finest mesh.
-    """
-
-    value: float
-    error: float | None
-    is_extrapolated: bool = False
-
-    def to_measure(self, name: str) -> Measure:
-        """Convert the estimate to a Measure with the floor of the measure table."""
-        row = TABLE[name]
-        engine = patch_rows.FINEST_MESH_SOURCE
-        if self.is_extrapolated:
-            engine = patch_rows.EXTRAPOLATED_SOURCE
-        error = None if self.error is None else float(self.error)
-        return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
-
-
-Estimates = dict[str, Estimate]  # by the name of the measure
-
-
 class PointSolution(NamedTuple):
     """Contact solution on equally spaced points of a profile, which are finer than the mesh.
 
@@ -81,7 +54,7 @@ class PointSolution(NamedTuple):
     - intervals (k, 2): contact intervals [m].
     """
 
-    measures: Estimates
+    measures: Measures
     surface: Surface
     intervals: np.ndarray
 
@@ -105,7 +78,7 @@ class SolvedContact(NamedTuple):
     state: StripsState
 
 
-@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class Patch:
     """Contact patch with the solution of its static contact problem.
 

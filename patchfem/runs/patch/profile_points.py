@@ -29,7 +29,7 @@ from ...mesh.grid import TensorGrid
 from ...model import profile
 from ...model.patch import PatchPiece
 from ...model.pieces import make_elastic_layers
-from ..results.patch_rows import Values
+from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
 from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
@@ -38,7 +38,7 @@ from .measures import (
     extrapolate_static_measures,
     increase_error_by_peak_error,
 )
-from .press import Estimate, Estimates, PointSolution, Surface
+from .press import PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
@@ -185,7 +185,7 @@ def _is_next_level_expensive(level: PointLevel) -> bool:
 
 def _combine_refinement_series(
     end_levels: list[PointLevel], point_levels: list[PointLevel]
-) -> Estimates:
+) -> Measures:
     """Combine two series of refinements into one estimate of each measure.
 
     The first series halves the cells at the ends. The second doubles the points, with the shortest
@@ -201,14 +201,15 @@ def _combine_refinement_series(
     for name, estimate in by_points.items():
         if name not in PEAK_MEASURES or not finest.has_corner_peak:
             value = estimate.value + by_ends[name].value - end_levels[-1].values[name]
-            out[name] = Estimate(float(value), float(estimate.error + by_ends[name].error))
+            error = estimate.error + by_ends[name].error
+            out[name] = make_measure(name, value, error, HALF_SPACE_SOURCE)
     peak = out.get("pressure_peak")
     if peak is not None and peak.value > 0:
         # The loaded fraction is the mean pressure divided by the peak.
         mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
         fraction = mean / peak.value
         error = increase_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
-        out["loaded_fraction"] = Estimate(float(fraction), float(error))
+        out["loaded_fraction"] = make_measure("loaded_fraction", fraction, error, HALF_SPACE_SOURCE)
     return out
 
 

@@ -212,10 +212,8 @@ def notes_on_neglected_effects(face) -> list[str]:
         if coarse[-1] is not None:
             mesh = patch_model.mesh
             other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[0]
-        out += store.get_or_compute_in_sweep(
-            patch_model,
-            ("plane band", other),
-            lambda: note_on_plane_state(patch_model, other),
+        out += store.get_or_compute(
+            ("plane band", other), lambda: note_on_plane_state(patch_model, other)
         )
     return out
 

@@ -26,21 +26,6 @@ def get_or_compute(key: Key, make: Callable[[], Result]) -> Result:
     return result
 
 
-def get_or_compute_in_sweep(patch_model, key: Key, make: Callable[[], Result]) -> Result:
-    """Return the result of a key, cached only if other cases of a sweep may use it.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch to which the result belongs.
-    key : tuple
-        What the result depends on.
-    make : callable
-        Function without parameters that computes the result.
-    """
-    return get_or_compute(key, make) if can_share_results(patch_model) else make()
-
-
 def store_result(key: Key, result) -> None:
     """Cache a result as the most recently used one.
 
@@ -58,12 +43,15 @@ def clear_cache() -> None:
 
 
 def content_key(patch_model) -> Key:
-    """Return a cache key that is equal for patch models with equal contents."""
+    """Return a cache key that is equal for patch models with equal contents.
+
+    A patch with files is equal to itself alone, because the files may change.
+    """
     gap = patch_model.gap
     mesh = patch_model.mesh
     interface = patch_model.interface
-    shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
-    heights = (gap.profile, gap.average, gap.limit, gap.is_rough, gap.side, gap.material)
+    if mesh.file is not None or gap.profile is not None:
+        return (patch_model,)
     return (
         patch_model.pieces,
         patch_model.loading,
@@ -71,18 +59,6 @@ def content_key(patch_model) -> Key:
         interface.skin and tuple(interface.skin),
         replace(mesh, shared=None),
         mesh.shared and mesh.shared.name,
-        shapes,
-        heights,
-    )
-
-
-def can_share_results(patch_model) -> bool:
-    """Return whether other cases of a sweep may use the results of a patch model.
-
-    This requires shared meshes, and neither mesh nor profile from a file.
-    """
-    return (
-        patch_model.mesh.shared is not None
-        and patch_model.mesh.file is None
-        and patch_model.gap.profile is None
+        tuple((name, tuple(part)) for name, part in gap.shapes),
+        (gap.average, gap.limit, gap.is_rough, gap.side),
     )

@@ -7,8 +7,8 @@ mesh file have equal meshes in all cases anyway.
 """
 
 from dataclasses import replace
-from hashlib import sha256
 from itertools import chain, pairwise
+from uuid import uuid4
 
 import numpy as np
 
@@ -104,16 +104,8 @@ def choose_shared_meshes(
 
 
 def name_shared_meshes(levels) -> SharedMeshes:
-    """Return SharedMeshes whose name is the hash of their contents."""
-    digest = sha256()
-    for body in chain.from_iterable(levels):
-        arrays = ()
-        if body is not None:
-            nodes = (body.interface, body.far, *body.blocks.values())
-            arrays = (body.points, body.is_coating, *nodes)
-        for array in arrays:
-            digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-    return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
+    """Return SharedMeshes with a name of their own, which stays the same in all processes of a sweep."""
+    return SharedMeshes(tuple(levels), uuid4().hex)
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:

@@ -4,8 +4,8 @@ In: a `Patch`. Out: values by name, such as peak pressure, contact length and st
 peak pressure at rounded ends that the mesh does not resolve.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from .press import Patch
 MAX_CURVATURE_RATIO = 2.0
 # Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
 MIN_ROUNDING_CELLS = 4
-
-# Values of the patches in use: refinement, error estimates and notes need the same ones
-_VALUES_BY_PATCH: WeakKeyDictionary = WeakKeyDictionary()
 
 
 class EdgeValues(NamedTuple):
@@ -156,11 +153,11 @@ def compute_static_values(patch: Patch) -> Values:
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
     this node on either side of the step. `patch_rows` defines the measures.
     """
-    if patch not in _VALUES_BY_PATCH:
-        _VALUES_BY_PATCH[patch] = _compute_static_values(patch)
-    return _VALUES_BY_PATCH[patch].copy()
+    return _compute_static_values(patch).copy()
 
 
+# Refinement, error estimates and notes need the values of a patch on its last meshes; more patches would keep their memory
+@lru_cache(4)
 def _compute_static_values(patch: Patch) -> Values:
     """Return the values of all static measures of a solved patch by name, in SI units."""
     # A node at the edge of a step belongs to both sides of it: the values are the weighted mean of

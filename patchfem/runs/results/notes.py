@@ -213,6 +213,16 @@ def _note_on_groove_slope(facts: LawFacts) -> Iterator[str]:
     )
 
 
+def _note_on_rigid_pieces(facts: LawFacts) -> Iterator[str]:
+    """Note that the stiffness of the pieces has no effect on a motion that treats them as rigid in shear."""
+    model = facts.model
+    if facts.patch is not None and model.friction is not None and not model.partial_slip:
+        yield (
+            "tangential_stiffness is that of the pieces while the whole patch sticks; the motion does not use it, because "
+            "pieces are rigid in shear without [contact.shear]"
+        )
+
+
 LAW_WARNINGS = (
     _warn_of_infinite_traction,
     _warn_of_slow_forming,
@@ -221,7 +231,7 @@ LAW_WARNINGS = (
     _warn_of_created_energy,
     _warn_of_work_check,
 )
-LAW_NOTES = (_note_on_growth, _note_on_groove_slope)
+LAW_NOTES = (_note_on_growth, _note_on_groove_slope, _note_on_rigid_pieces)
 
 
 def find_bonds(model):

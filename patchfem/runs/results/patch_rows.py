@@ -187,6 +187,23 @@ MESH_MEASURES = tuple(row.name for row in ROWS if row.has("mesh"))
 POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].minimum == 0.0)
 
 
+def make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
+    """Return a measure of a patch or of wear, with the unit and the floor of its row.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure.
+    value, error : float
+        In the unit of the row; the error is None without an estimate.
+    engine : str
+        Method that computed the value.
+    """
+    row = TABLE[name]
+    error = None if error is None else float(error)
+    return Measure(float(value), row.unit, error, row.floor, engine=engine)
+
+
 def find_unknown_measures(measures: Measures) -> list[str]:
     """Return the positive measures that control the mesh and whose error exceeds their value."""
     names = []

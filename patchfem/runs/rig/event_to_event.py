@@ -244,7 +244,7 @@ class LumpedEvaluator(RunEvaluator):
             rtol=numerics.local,
             n_steps=numerics.steps,
         )
-        return engine.run_case(case, start=state, fills_histories=numerics.whole)
+        return engine.run_case(case, start=state)
 
     def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
         """Choose the times of the samples and of `frames` snapshots."""
@@ -514,7 +514,7 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
 
 def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:
     """Return the time 0 and the slides [m] (k, 2) of the origin and of the reversals that a law remembers."""
-    memory = state.memory[0, interface]
+    memory = state.memory[interface]
     stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
     slides = memory[Memory.ORIGIN] + np.append(0.0, stack)
     return np.stack([np.zeros(slides.size), slides], axis=1)

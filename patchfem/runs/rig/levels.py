@@ -4,16 +4,21 @@ In: the runs of successive levels. Out: a `Level` with errors for each of them, 
 found by bisection, and the joined run.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import Measure, SineDrive
+from ...response.coarser import ComparisonRuns, estimate_errors
+from ...response.errors import split_errors
 from ...response.events import join_events
 from ...response.levels import Level, bracket_onset, make_no_onset_reason, make_onset_test
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
+from .solution import Fields
 
 # Relative error of the measures of an event-driven run, which has round-off only.
 EXACT_RELATIVE_ERROR = 1e-9
@@ -21,7 +26,9 @@ EXACT_RELATIVE_ERROR = 1e-9
 MAX_BISECTIONS = 40
 
 
-def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
+def add_level_errors(
+    levels: Sequence[Level], coarser_runs: ComparisonRuns, solutions
+) -> tuple[Level, ...]:
     """Add the differences from coarse runs to the errors of each drive level.
 
     A measure that a coarse run does not have gets its absolute value as error.
@@ -35,31 +42,30 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     solutions : dict
         Solution of each coarse run by its Numerics.
     """
-
     levels_with_errors = []
     for number, level in enumerate(levels):
-        parts = []
-        for kind in coarser_runs:
-            reference = level.values
-            if kind.reference is not None:
-                reference = _find_level_values(solutions[kind.reference], number)
-            coarse_values = [_find_level_values(solutions[run], number) for run in kind.runs]
-            parts.append(kind.rule(reference, *coarse_values))
-        errors = {}
-        for name, value in level.values.items():
-            error = sum(part.get(name, abs(value)) for part in parts)
-            errors[name] = level.errors.get(name, 0.0) + error
+        # A run that ended earlier has no measures at this level.
+        none = replace(level, values={})
+        solved = {
+            key: (*run.levels, *[none] * len(levels))[number] for key, run in solutions.items()
+        }
+        sources, _ = estimate_errors(None, level.values, coarser_runs, solved)
+        errors = dict(level.errors)
+        for name, causes in split_errors(level.values, sources).items():
+            errors[name] = errors.get(name, 0.0) + sum(causes.parts.values())
         levels_with_errors.append(replace(level, errors=errors))
     return tuple(levels_with_errors)
 
 
-def _find_level_values(solution, number: int) -> dict:
-    """Return the measures of a Solution at one drive level; {} if the run ended earlier."""
-    return solution.levels[number].values if number < len(solution.levels) else {}
+class Onset(NamedTuple):
+    """Drive level of the onset, and half the width of its bracket [m s-2]."""
+
+    level: float
+    error: float
 
 
-def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | None:
-    """Find the drive level [m s-2] of the onset by bisection, with its uncertainty.
+def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
+    """Find the drive level [m s-2] of the onset by bisection, with its uncertainty; None if no level reaches the onset.
 
     The bisection starts between the last level before the onset and the first level after it, and
     ends when the bracket is smaller than `tolerance` times the level. If there is no level before
@@ -76,11 +82,6 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | No
         Largest width of the bracket relative to the level.
     is_past_onset : callable
         Function of a Level that returns whether the onset is reached.
-
-    Returns
-    -------
-    tuple or None
-        None if no level reaches the onset.
     """
     bracket = bracket_onset(levels, is_past_onset)
     if bracket is None:
@@ -97,7 +98,7 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | No
             high = middle
         else:
             low = middle
-    return (low + high) / 2, (high - low) / 2
+    return Onset((low + high) / 2, (high - low) / 2)
 
 
 def measure_onset_level(rig, solution, tolerance: float) -> Measure:
@@ -115,8 +116,8 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     unit = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
-    def find(run) -> tuple | None:
-        """Return the onset level and its uncertainty in a run."""
+    def find(run) -> Onset | None:
+        """Return the onset in a run."""
         return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
     onset = find(solution)
@@ -128,12 +129,12 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
         coarse_onset = find(run)
         reference = onset if beside is None else find(beside)
         is_missing = coarse_onset is None or reference is None
-        error += level if is_missing else abs(coarse_onset[0] - reference[0])
+        error += level if is_missing else abs(coarse_onset.level - reference.level)
     factor = _find_level_factor(rig)
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
-def convert_to_scene_units(rig, levels) -> tuple:
+def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:
     """Convert drive levels [m s-2] to the unit of the scene, [m s-2] or [N]."""
     unit_factor = _find_level_factor(rig)
     unit = _find_level_unit(rig)
@@ -150,7 +151,7 @@ def _find_level_factor(rig) -> float:
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def run_levels(evaluator, integrate, progress=None) -> tuple:
+def run_levels(evaluator, integrate, progress=None) -> tuple[Any, Fields]:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
@@ -211,7 +212,7 @@ def remove_incomplete_cycle(run):
     return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
 
 
-def join_runs(runs: list, duration: float):
+def join_runs(runs, duration: float):
     """Join the runs of successive drive levels to a single run.
 
     The window and the friction loop are those of the last level.
@@ -232,7 +233,7 @@ def join_runs(runs: list, duration: float):
     )
 
 
-def _join_histories(histories: list, shifts: list[float]):
+def _join_histories(histories, shifts: list[float]):
     """Join the histories of successive runs and shift them by their start times [s]."""
     last = histories[-1]
     # The last sample of a run equals the first sample of the next run.
@@ -257,7 +258,7 @@ def _join_histories(histories: list, shifts: list[float]):
     return replace(last, extra=extra, **columns)
 
 
-def _continue_energies(ledgers: list) -> list:
+def _continue_energies(ledgers) -> list[np.ndarray]:
     """Return the energies (4, k) [J] of successive runs with work, dissipated and created energy since the first start."""
     continued = []
     before = np.zeros((4, 1))

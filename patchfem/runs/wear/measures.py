@@ -9,13 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...core import Measure, Outcome, frozen_array
+from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_error, convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
-from ..results.patch_rows import TABLE, WORN_SOURCE, Arrays, Measures, Values
+from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, Values, make_measure
 from ..results.result import WearHistory
 from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
@@ -81,24 +81,6 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     )
 
 
-def _make_wear_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
-    """Return a measure of wear with the unit and the floor of the measure table.
-
-    Parameters
-    ----------
-    name : str
-        Name in the measure table.
-    value : float
-        Value in the unit of the measure table.
-    error : float or None
-        Error in the same unit; None without estimates.
-    engine : str
-        Method that computed the value.
-    """
-    row = TABLE[name]
-    return Measure(value, row.unit, error, row.floor, engine=engine)
-
-
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures:
     """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
@@ -112,7 +94,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     rate = (depth - float(before.depth.flat[deepest])) / (last.cycle - before.cycle)
     cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
     name = "worn_through_cycle"
-    return {name: _make_wear_measure(name, last.cycle, cycle_error)}
+    return {name: make_measure(name, last.cycle, cycle_error)}
 
 
 def _note_on_earlier_run(model) -> list[str]:
@@ -264,13 +246,13 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
                 + start_error
                 + float(convergence_error(strips[name] - value, ratio=ratio))
             )
-        measures[name] = _make_wear_measure(name, value, error, WORN_SOURCE)
+        measures[name] = make_measure(name, value, error, WORN_SOURCE)
 
     amplitude = evolved.moments[-1].values.get("groove_amplitude")
     if amplitude is not None:
         error = measures["worn_volume"].error
         error = None if error is None else error / float(area.sum())
-        measures["groove_amplitude"] = _make_wear_measure(
+        measures["groove_amplitude"] = make_measure(
             "groove_amplitude", amplitude, error, WORN_SOURCE
         )
     return measures
@@ -310,7 +292,7 @@ def _measure_worn_friction(model, evolved, motion: Measures, error: float | None
         value = getattr(law, key)
         if value is not None:
             changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
-            measures[name] = _make_wear_measure(name, value, max(changes, default=None))
+            measures[name] = make_measure(name, value, max(changes, default=None))
 
     if depth_error is None:
         return measures
@@ -398,7 +380,7 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
     error = None
     if estimate:
         error = (path_error + _relative_slip_error(result.measures) + WORN_ROUND_OFF) * volume
-    return {"worn_volume": _make_wear_measure("worn_volume", volume, error, WORN_SOURCE)}
+    return {"worn_volume": make_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
 def _add_wear_frames(result, evolved):

@@ -20,7 +20,6 @@ from yielding_points import jenkins_forces
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (
-    Interlock,
     LawGroup,
     Spring,
     find_cycle_energies,
@@ -99,11 +98,11 @@ def test_always_bonds_agree_with_recursion(seed, count, scale):
         Jenkins([10.0, 3.0], [0.08, 0.2]),
         make_bond_law(0.8, 0.1),
         Spring(2.0, 5.0),
-        Interlock(3.0, 0.5),
+        Spring(3.0, wavelength=0.5),
         make_speed_law(0.8, 0.3),
         make_lugre_law(),
     ],
-    ids=["Jenkins", "Bonds", "Spring", "Interlock", "SpeedLaw", "LuGre"],
+    ids=["Jenkins", "Bonds", "Spring", "interlocking", "SpeedLaw", "LuGre"],
 )
 def test_exact_derivatives_of_forces_agree_with_differences(law):
     """The derivatives of the forces with respect to the slide and the frequency agree with central
@@ -152,7 +151,7 @@ def test_exact_rigid_and_undamped_modes_agree_with_linear_response():
         )
         assert np.abs(point.modal[0]).max() < 1e-12
     frictional = find_steady_motion(
-        modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4
+        modes, SineDrive(1.0, 1.0), Jenkins([0.5, 3.0], [1e9, 0.4]), tolerance=1e-4
     )
     check_cycle(
         modes, SineDrive(1.0, 1.0), frictional, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4
@@ -298,7 +297,7 @@ def test_order_of_truncation_error():
 
 @pytest.mark.parametrize(
     "law",
-    [make_bond_law(0.8, 0.05), make_speed_law(0.4, 0.05), Interlock(1.0, 0.5)],
+    [make_bond_law(0.8, 0.05), make_speed_law(0.4, 0.05), Spring(1.0, wavelength=0.5)],
     ids=lambda law: type(law).__name__,
 )
 def test_exact_balance_satisfies_equation_of_motion(law):
@@ -307,7 +306,7 @@ def test_exact_balance_satisfies_equation_of_motion(law):
     modes = make_sdof(0.05)
     drive = SineDrive(1.0, 1.2)
     point = find_steady_motion(
-        modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5
+        modes, drive, law, tolerance=1e-7 if isinstance(law, Spring) else 1e-5
     )
     response = make_cycle_response(point, modes, drive, 512)
     k = np.arange(point.modal.shape[0])[:, None]

@@ -10,9 +10,12 @@ import xarray as xr
 from command_line import run_cli
 from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
+from sweep_tables import make_table
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
+from patchfem.export.sweeps import store as store_chunks
+from patchfem.runs import CaseResults
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -153,3 +156,15 @@ def test_exact_partial_files_of_killed_writers_are_removed(scene_file, tmp_path)
     with Folder(tmp_path / "run", resume=True) as run:
         (run.path / "summary.json").write_text("{}", "utf-8")
     assert not list((tmp_path / "run").rglob(".*")) and (tmp_path / "run" / "summary.json").exists()
+
+
+def test_exact_faults_of_batches_are_read_from_chunks(tmp_path):
+    """The sentences on faults after which cases ran one by one are kept in the chunks, once for the whole sweep."""
+    results = CaseResults.blank(2)
+    results.outcome[:] = "done"
+    results.faults.append("2 cases are run one by one, because of a fault")
+    path = store_chunks.write_chunk(tmp_path, np.arange(2), results)
+    table = make_table({"normal.load": [1.0, 2.0]}, {})
+    for _ in range(2):
+        table.insert([0, 1], store_chunks.read_chunk(path)[1])
+    assert list(table.faults) == results.faults

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import hostile, scenes, tables
+from . import hostile, scenes
 from .trial import Trial
 
 
@@ -22,8 +22,6 @@ class Campaign(NamedTuple):
 CAMPAIGNS = {
     "grammar": Campaign(7000, scenes.run_grammar_trial),  # scenes with wrong keys and values
     "bytes": Campaign(3000, scenes.run_bytes_trial),  # scenes with wrong bytes
-    "profiles": Campaign(1000, tables.run_profiles_trial),  # traces of a surface
-    "tables": Campaign(3000, tables.run_table_trial),  # drives, slides, rows and loops
     "hostile": Campaign(240, hostile.run_trial),  # files made to harm
 }
 

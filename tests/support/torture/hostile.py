@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from .tables import RIG, RUBS
 from .toml import to_toml
 from .trial import Trial, TrialFailure
 
@@ -20,6 +19,19 @@ BOMB = (
     + b"]><VTKFile>&j;</VTKFile>"
 )
 OUTSIDE = b"<?xml version='1.0'?><!DOCTYPE x [<!ENTITY y SYSTEM 'file:///etc/passwd'>]><VTKFile>&y;</VTKFile>"
+
+
+RUBS = {
+    "normal": {"load": "20 N"},
+    "friction": {"law": "coulomb", "static": 0.3},
+    "accuracy": {"tolerance": 1e-2},
+}
+RIG = RUBS | {
+    "structure": {
+        "moving_mass": "1 kg",
+        "mode": [{"name": "m", "frequency": "100 Hz", "damping": 0.01, "slide": 1.0}],
+    }
+}
 
 
 class MaliciousPickle:

@@ -13,7 +13,7 @@ import numpy as np
 from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
-from ....dynamics.harmonic.laws import Interlock, Spring
+from ....dynamics.harmonic.laws import Spring
 from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
@@ -143,9 +143,10 @@ class BalanceFinder:
         if model.friction is not None:
             parts.append((0, make_single_law(model, numerics, patch)))
         if rig.springs.interlock is not None:
-            parts.append((0, Interlock(*rig.springs.interlock)))
+            stiffness, wavelength = rig.springs.interlock
+            parts.append((0, Spring(stiffness, wavelength=wavelength)))
         if rig.springs.cubic is not None:
-            parts.append((rig.modes.output, Spring(0.0, rig.springs.cubic)))
+            parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
         self.model = model
         self.modes = rig.modes
         self.patch = patch

@@ -16,7 +16,7 @@ from ....dynamics.curve_points import sample_adaptively
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
-from ....hybrid.records import Clock, Status, Window
+from ....hybrid.records import Status, Window
 from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
@@ -92,8 +92,7 @@ class ShootingFinder:
         )
         if motion.grows:
             return motion
-        status = Status(int(motion.batch.states.clock[0, Clock.STATUS]))
-        if status != Status.DONE or not motion.change <= motion.tolerance:
+        if motion.run.status != Status.DONE or not motion.change <= motion.tolerance:
             raise NotConverged(
                 f"no periodic motion was found: the motion still changes by {motion.change:.2g} of its amplitude from "
                 'one cycle to the next; use accuracy.method = "auto"'
@@ -115,7 +114,7 @@ class ShootingFinder:
             return replace(solution, steady=(None, None), errors=errors, periodic=periodic_data)
 
         motion = self.find_periodic_motion(drive, guess)
-        state = None if motion.grows else motion.batch.states
+        state = None if motion.grows else motion.run.final
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
         run = self.evaluator.integrate(drive, cycles, state, self.frames)
         is_stuck = self.evaluator.is_stuck(run)
@@ -161,7 +160,7 @@ class ShootingFinder:
             steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
         )
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
-        start = None if motion.grows else motion.batch.states
+        start = None if motion.grows else motion.run.final
         other_run = other.integrate(drive, run.cycles_done, start, 0)
         coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
         step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
@@ -185,7 +184,7 @@ class ShootingFinder:
         if is_stuck:
             return "stuck"
         laws = [law for law, _ in self.joints.laws]
-        faces = motion.batch.records.faces[0, 0, : len(laws)]
+        faces = motion.run.record.faces[: len(laws)]
         if laws and all(law.law == "masing" for law in laws):
             limits = np.array([law.numbers[2] for law in laws])
             forces = np.maximum(faces[:, Window.MAX_FORCE], -faces[:, Window.MIN_FORCE])
@@ -219,9 +218,8 @@ class ShootingFinder:
         if motion.grows:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
-        windows = motion.batch.windows[0]
-        values = {name: float(windows[name][0]) for name in COLUMN_MEASURES.values()}
-        faces = motion.batch.records.faces[0, 0, : len(self.joints.laws)]
+        values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
+        faces = motion.run.record.faces[: len(self.joints.laws)]
         slips = faces[:, Window.MAX_SLIP] - faces[:, Window.MIN_SLIP]
         is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
         regime = self._name_regime(motion, is_stuck=is_stuck)
@@ -233,7 +231,7 @@ class ShootingFinder:
             regime=regime if is_stable else f"{regime}, unstable",
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=is_stable,
-            guess=motion.batch.states,
+            guess=motion.run.final,
         )
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion | None:
