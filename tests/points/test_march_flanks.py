@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scene_texts
 from march_paths import follow_path
 from modal_bases import make_modal_basis
 from scene_texts import BLOCK, SHEAR, STRUCTURE, TRIANGLE, make_friction_table
@@ -166,7 +167,8 @@ def test_exact_tractions_of_scene_sum_to_friction_force(law):
     including the force of the grooves, within 1e-6."""
     text = (
         BLOCK
-        + 'element_size = "1 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n'
+        + 'element_size = "1 mm"\n'
+        + scene_texts.GROOVES
         + SHEAR
         + make_friction_table(law)
         + "[accuracy]\nsteps_per_cycle = 100\n"

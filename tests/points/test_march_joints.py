@@ -1,6 +1,5 @@
 """Several interfaces, nonlinear springs and rigid friction in one march: closed forms, the motion from event to event."""
 
-
 import numpy as np
 import problems
 import pytest
@@ -199,21 +198,3 @@ def test_order_for_coupled_stops_with_kinetic_below_static(seed, n_interfaces, n
     )
     errors = find_errors(basis, SineDrive(1.0, 0.8), limit, 0.4 * limit, 5, (400, 1600, 6400))
     assert errors[0] < 1e-3 and np.all(errors[1:] < np.maximum(errors[:-1] / 3, EVENT_ERROR))
-
-
-def test_exact_stuck_slide_has_zero_speed():
-    """While the slide sticks its speed is zero within 1e-13, and the force does not exceed the static limit."""
-    rng = np.random.default_rng(3)
-    n = int(rng.integers(3, 5))
-    rng.normal(size=(n, n))
-    slide = np.append(1.0, rng.uniform(0.3, 1.0, n - 1) * rng.choice([-1, 1], n - 1))
-    omega = np.sort(rng.uniform(0.5, 6.0, n))
-    modes = make_modal_basis(omega, 0.02, slide, rng.uniform(-1, 1, n))
-    contact = make_contact([Coulomb(0.05, 0.1).element(1.0)], modes.interfaces)
-    result = march(modes, SineDrive(1.0, 0.45), contact, 6, 400, window=6)
-    response = result.response
-    stuck = np.flatnonzero(np.diff(response.slide) == 0.0)
-    speed = np.abs(response.slide_rate)
-    assert stuck.size > 50 and speed[stuck + 1].max() <= 1e-13 * speed.max()
-    assert np.abs(response.force).max() <= 0.1 * (1 + 1e-12)
-    assert energy_balance(result.ledger) < 1e-10

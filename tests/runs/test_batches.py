@@ -197,6 +197,13 @@ def test_always_fault_of_batch_falls_back_to_single_runs(fault, monkeypatch):
     assert results.faults == sentences
 
 
+def test_always_internal_fault_of_case_keeps_results_of_others():
+    """A case that ends with an unexpected exception fails with a message that asks to report it; the others are run."""
+    results = one_by_one.solve([None, pf.build(BENCH)])
+    assert results.outcome[0] == FAILED_OUTCOME != results.outcome[1]
+    assert "internal fault, please report it: " in results.messages[0]
+
+
 # ---- shared meshes
 
 TILTED = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING

@@ -3,43 +3,13 @@ outcomes."""
 
 import numpy as np
 import pytest
+from scene_texts import GROOVED, SLIDE, STRUCTURE
 
 import patchfem as pf
 from patchfem.core import Outcome
 
-GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
-GROOVED_POINT = f"""
-[normal]
-load = "115 N"
-{GROOVES}
-[friction]
-law = "coulomb"
-static = 0.4
-"""
-BENCH = (
-    GROOVED_POINT
-    + """
-[slide]
-kind = "triangle"
-amplitude = "30 um"
-speed = "1 mm/s"
-"""
-)
-RIG = (
-    GROOVED_POINT
-    + """
-[structure]
-moving_mass = "1.2 kg"
-mode = [{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}]
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
-[accuracy]
-steps_per_cycle = 100
-"""
-)
+BENCH = GROOVED + SLIDE.replace("10 um", "30 um").replace("5 mm/s", "1 mm/s")
+RIG = GROOVED + STRUCTURE + "[accuracy]\nsteps_per_cycle = 100\n"
 WAVE = 2 * np.pi / 80e-6
 
 

@@ -3,30 +3,13 @@ integrations from rest."""
 
 import numpy as np
 import pytest
-from scene_texts import KEYS
+from scene_texts import GROOVED, KEYS, STRUCTURE
 
 import patchfem as pf
 from patchfem import build
 from patchfem.scene import loads
 
-RIG = """
-[normal]
-load = "115 N"
-grooves = {wavelength = "80 um", amplitude = "7.5 um"}
-[friction]
-law = "coulomb"
-static = 0.4
-[structure]
-moving_mass = "1.2 kg"
-mode = [{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}]
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
-[accuracy]
-method = "harmonic"
-"""
+RIG = GROOVED + STRUCTURE + '[accuracy]\nmethod = "harmonic"\n'
 MAIN_MEASURES = ("relative_displacement_amplitude", "loop_area", "friction_force_peak")
 
 

@@ -3,29 +3,21 @@ motion."""
 
 import numpy as np
 import pytest
+from scene_texts import BLOCK, COULOMB, GROOVES
 from scipy.integrate import quad, solve_ivp
 
 from patchfem import build
 from patchfem.runs.run import run as run_plan
 from patchfem.scene import loads
 
-MU, LOAD, KAPPA, WAVE, AREA = 0.4, 115.65, 2e-14, 2 * np.pi / 80e-6, 12.7e-3**2
-PIECES = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115.65 N"
-substrate = "Ti-8Al-1Mo-1V"
-element_size = "1 mm"
-grooves = {wavelength = "80 um", amplitude = "7.5 um"}
-[friction]
-law = "coulomb"
-static = 0.4
-[wear]
-coefficient = "2e-14 m^2/N"
-cycles = 4e6
-"""
+MU, LOAD, KAPPA, WAVE, AREA = 0.4, 115.0, 2e-14, 2 * np.pi / 80e-6, 12.7e-3**2
+PIECES = (
+    BLOCK
+    + 'element_size = "1 mm"\n'
+    + GROOVES
+    + COULOMB.replace("0.3", "0.4")
+    + '[wear]\ncoefficient = "2e-14 m^2/N"\ncycles = 4e6\n'
+)
 SLIDE = '[slide]\nkind = "triangle"\namplitude = "15 um"\nspeed = "1 mm/s"\ncycles = 2\n'
 RIG = """
 [structure]

@@ -1,5 +1,4 @@
-"""Pieces of unlike lengths and with shaped ends: corners, rounded punches, force balance and
-exchanged pieces."""
+"""Pieces of unlike lengths and with shaped ends: corners, and exchanged pieces."""
 
 from __future__ import annotations
 
@@ -56,9 +55,8 @@ def graded_columns(place: float, half: float, smallest: float, growth: float = 1
     return frozen_array(np.concatenate([-x[:0:-1], x]))
 
 
-def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
-    """Return the patch solved on columns x of its interface, with rows graded alike and every
-    element halved `halvings` times."""
+def solve_on_columns(patch, x, growth: float = 1.2):
+    """Return the patch solved on columns x of its interface, with rows graded alike."""
     pieces = (
         (patch.pieces.lower,)
         if patch.pieces.are_alike
@@ -70,8 +68,6 @@ def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
         for piece in pieces
     ]
     bodies = [extend_grid(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
-    for _ in range(halvings):
-        bodies = [body.refine() for body in bodies]
     return solve_patch_contact(patch, condense(patch, *bodies))
 
 

@@ -31,7 +31,9 @@ BLOCK = PIECE.replace("6.35 mm", "6 mm") + 'load = "115 N"\nsubstrate = "Ti-8Al-
 COATING = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "6 mil"\n'
 COATED = PIECE + 'load = "26 lbf"\nelement_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 SHEAR = "[contact.shear]\n"
+GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n'
 COULOMB, PLASTIC, NONLOCAL = map(make_friction_table, ("coulomb", "elastic-plastic", "nonlocal"))
+GROOVED = '[normal]\nload = "115 N"\n' + GROOVES + COULOMB.replace("0.3", "0.4")
 GROWING = """\
 [friction]
 law = "nonlocal"
