@@ -12,8 +12,7 @@ from scipy.special import ellipk
 from patchfem.core import PatchfemError
 from patchfem.friction import Grooves
 from patchfem.hybrid import cases, drives, runs
-from patchfem.hybrid.laws import grooves as rigid
-from patchfem.hybrid.laws import smooth_grooves
+from patchfem.hybrid.laws.grooves import make_grooves
 from patchfem.hybrid.records import Status
 
 RTOL = 1e-11
@@ -25,11 +24,7 @@ def run_on_grooves(case, tones, period, cycles, *, speed=None, position=0.0, for
     modes = type(modes)(**{**{f: getattr(modes, f) for f in modes.__slots__}, "mass": case.mass})
     shape = Grooves(case.wavelength, case.amplitude, case.phase, case.lifted)
     keys = SimpleNamespace(static=case.static, kinetic=case.kinetic, reference_speed=speed)
-    law = (
-        rigid.make_grooves(keys, shape)
-        if speed is None
-        else smooth_grooves.make_grooves(keys, shape)
-    )
+    law = make_grooves(keys, shape)
     signal = drives.make_tones(tones, period)
     if force:
         signal = drives.make_record(

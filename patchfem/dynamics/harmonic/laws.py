@@ -316,7 +316,7 @@ def solve_recursion(decay, source) -> np.ndarray:
         return np.zeros_like(source)
     # The solution that begins at 0, and the part of it that a cycle leaves.
     bands = np.array([np.ones(decay.size), -np.roll(decay, -1)])
-    end = solve_banded((1, 0), bands, source)
+    end = solve_banded((1, 0), bands, source, check_finite=False)
     first = end[-1] / (1 - kept[-1])
     return np.roll(end + kept * first, 1)
 
