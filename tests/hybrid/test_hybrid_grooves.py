@@ -13,6 +13,7 @@ from patchfem.core import PatchfemError
 from patchfem.friction import Grooves
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws.grooves import make_grooves
+from patchfem.hybrid.measures import compute_energies
 from patchfem.hybrid.records import Status
 
 RTOL = 1e-11
@@ -79,7 +80,7 @@ def test_exact_random_rigs_agree_with_dop853(seed):
         np.testing.assert_allclose(
             motion.rows[at, 1 + column], expected[:, column], rtol=0, atol=1e-7 * scale
         )
-    energies = motion.find_energies()
+    energies = compute_energies(motion.case, motion.final)
     assert energies["friction"] == pytest.approx(expected[-1, 2], rel=1e-7)
     assert energies["work_in"] == pytest.approx(expected[-1, 3], rel=1e-7)
     assert motion.values["energy_balance"] < 1e-9

@@ -145,9 +145,7 @@ def compute_response_curve(modes, drive, find_point) -> list[CurvePoint]:
         point = find_point(sine, before and before[1].guess)
         return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
-    samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)[
-        1
-    ]
+    samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)
     return [point for _, point in samples]
 
 
