@@ -21,6 +21,7 @@ from scipy.optimize import brentq, newton
 
 from ..core import ModalBasis, NotConverged
 from .harmonic.backbone import FreeBalance, find_free_motions
+from .harmonic.equations import HarmonicBalance
 from .harmonic.forces import LawGroup
 from .harmonic.series import half_range
 
@@ -391,7 +392,7 @@ def _find_undamped_motions(
     """
     amplitudes, start = path
     samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])
-    equations = FreeBalance(modes, group, mode, harmonics, samples)
+    equations = FreeBalance(HarmonicBalance(modes, group, samples), mode, harmonics)
     found = find_free_motions(equations, amplitudes, mode=start)
     if None in found:
         return None

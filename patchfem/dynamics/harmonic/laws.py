@@ -151,7 +151,9 @@ class Jenkins(Law):
         holds = out[2 + np.argsort(turns)]
         return LawForce(out[0], slopes, holds=holds, limit=self.limit, stretch=out[1])
 
-    def _follow_branches(self, q, nodes, memory: list, out, slopes) -> None:
+    def _follow_branches(
+        self, q, nodes, memory: list[tuple[int, float, np.ndarray]], out, slopes
+    ) -> None:
         """Write the forces between two reversals, and remove the reversals that are passed from the memory.
 
         Parameters
