@@ -8,7 +8,6 @@ at the first points.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,19 +18,12 @@ MIN_VALUE_RATIO = 1e-3
 MIN_INTERVAL_RATIO = 1e-6
 
 
-class CurvePoints(NamedTuple):
-    """Increasing abscissas (k,) of a sampled curve, and the result computed at each of them."""
-
-    abscissas: np.ndarray
-    results: list[tuple]
-
-
 def sample_adaptively(
     compute: Callable[[float, tuple | None], tuple],
     abscissas,
     tolerance: float = 0.01,
     max_points: int = 2000,
-) -> CurvePoints:
+) -> list[tuple]:
     """Sample a curve at adaptive points until linear interpolation meets a tolerance.
 
     Parameters
@@ -49,8 +41,8 @@ def sample_adaptively(
 
     Returns
     -------
-    CurvePoints
-        No point is added next to a value that is not finite.
+    list of tuple
+        Results in the order of the abscissas. No point is added next to a value that is not finite.
     """
     abscissas = [float(abscissa) for abscissa in abscissas]
     results = []
@@ -60,7 +52,7 @@ def sample_adaptively(
         values = np.array([result[0] for result in results], float)
         intervals = find_coarse_intervals(np.array(abscissas), values, tolerance)
         if not intervals.size or len(abscissas) >= max_points:
-            return CurvePoints(np.array(abscissas), results)
+            return results
         # The intervals are split from the last to the first, so that
         # the other indices remain valid.
         for k in intervals[::-1][: max_points - len(abscissas)]:

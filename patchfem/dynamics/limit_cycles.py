@@ -21,6 +21,7 @@ from scipy.optimize import brentq, newton
 
 from ..core import ModalBasis, NotConverged
 from .harmonic.backbone import FreeBalance, find_free_motions
+from .harmonic.equations import HarmonicBalance
 from .harmonic.forces import LawGroup
 from .harmonic.series import half_range
 
@@ -126,27 +127,45 @@ def find_relay_cycles(
     list of LimitCycle
         In increasing amplitude.
     """
+    relay = _Relay(modes, row, slip_force, stick_force)
     cycles = []
     for mode in find_unstable_modes(modes):
-        cycles += _find_mode_relay_cycles(modes, row, (slip_force, stick_force), mode)
+        cycles += relay.find_cycles(mode)
     return sorted(cycles)
 
 
-class _ForcedFlow(NamedTuple):
-    """Motion y' = A (y - e) of n modes under a constant force, as a sum of exponentials of 2 n eigenvectors.
+class _Relay:
+    """Modes with rigid friction on a row, whose states y = (z, z') obey y' = A (y - e) between two reversals.
 
-    - row: (n,) slide per coordinate
-    - matrix: (2 n, 2 n) matrix A of the states (z, z')
-    - rates: (2 n,) its eigenvalues [1/s]
-    - vectors: (2 n, 2 n) its eigenvectors, in columns
-    - rest: (2 n,) parts of the state of rest e in the eigenvectors
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes, none of which is rigid.
+    row : ndarray
+        (n,) slide per coordinate.
+    slip_force, stick_force : float
+        Kinetic and static friction force [N].
     """
 
-    row: np.ndarray
-    matrix: np.ndarray
-    rates: np.ndarray
-    vectors: np.ndarray
-    rest: np.ndarray
+    def __init__(self, modes: ModalBasis, row, slip_force: float, stick_force: float):
+        n = modes.omega.size
+        self.modes = modes
+        self.row = np.asarray(row, float)
+        self.stick_force = stick_force
+        rest = np.append(row * slip_force / (modes.mass * modes.omega**2), np.zeros(n))
+
+        # Both eigenvectors of a critically damped mode are equal; with a little more damping they differ.
+        for change in (0.0, CRITICAL_CHANGE):
+            damping = (1 + change) * modes.damping_matrix
+            self.matrix = np.block(
+                [[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -damping]]
+            )
+            self.rates, self.vectors = np.linalg.eig(self.matrix)
+            scaled = self.vectors * np.append(modes.omega, np.ones(n))[:, None]
+            if np.linalg.cond(scaled) <= MAX_MODES_CONDITION:
+                break
+        # Parts of the state of rest e in the eigenvectors
+        self.rest = np.linalg.solve(self.vectors, rest)
 
     def find_reversals(self, half_periods) -> np.ndarray:
         """Return the parts (2 n, k) of states from which the motion goes to their opposites in half periods (k,) [s].
@@ -162,45 +181,55 @@ class _ForcedFlow(NamedTuple):
         slides = np.abs(self.row) @ np.abs(states[:n])
         return self.row @ states[n:] * half_periods / np.maximum(slides, 1e-300)
 
+    def find_cycles(self, mode: int) -> list[LimitCycle]:
+        """Return the limit cycles whose frequency is close to that of a mode."""
+        half_periods = np.pi / self.modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
+        speeds = self.find_reversal_speeds(half_periods)
 
-def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
-    """Return the motion of modes under a force [N] on a row (n,)."""
-    n = modes.omega.size
-    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+        def find_speed(half_period: float) -> float:
+            return float(self.find_reversal_speeds(np.array([half_period]))[0])
 
-    # Both eigenvectors of a critically damped mode are equal; with a little more damping they differ.
-    for change in (0.0, CRITICAL_CHANGE):
-        damping = (1 + change) * modes.damping_matrix
-        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -damping]])
-        rates, vectors = np.linalg.eig(matrix)
-        scaled = vectors * np.concatenate([modes.omega, np.ones(n)])[:, None]
-        if np.linalg.cond(scaled) <= MAX_MODES_CONDITION:
-            break
-    parts = np.linalg.solve(vectors, rest)
-    return _ForcedFlow(np.asarray(row, float), matrix, rates, vectors, parts)
+        cycles = []
+        for k in np.flatnonzero(speeds[:-1] * speeds[1:] <= 0):
+            half_period = brentq(find_speed, *half_periods[k : k + 2], xtol=1e-16, rtol=1e-14)
+            # Where an undamped mode is in resonance, the interface does not stop at the reversal.
+            if abs(find_speed(half_period)) < REST_TOL:
+                cycles.append(self.make_cycle(half_period))
+        return [cycle for cycle in cycles if cycle is not None]
 
+    def make_cycle(self, half_period: float) -> LimitCycle | None:
+        """Return the limit cycle that has a given half period [s].
 
-def _find_mode_relay_cycles(
-    modes: ModalBasis, row, forces: tuple[float, float], mode: int
-) -> list[LimitCycle]:
-    """Find the limit cycles under rigid friction whose frequency is close to that of a given mode.
+        The result is None if the interface reverses within the half period, or if the static friction holds it.
+        """
+        row = self.row
+        n = row.size
+        output = self.modes.output
+        times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
+        away = self.find_reversals([half_period])[:, 0] - self.rest
+        path = (away * np.exp(np.outer(times, self.rates)) + self.rest) @ self.vectors.T
+        path = path.real
 
-    forces: kinetic and static friction [N].
-    """
-    flow = _make_flow(modes, row, forces[0])
-    half_periods = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
-    speeds = flow.find_reversal_speeds(half_periods)
+        # The slide is falling, and at its start the interface needs a force -m a to stay at rest.
+        speeds = path[:, n:] @ row
+        slide = float(np.abs(row) @ np.abs(path[0, :n]))
+        hold = -self.modes.mass * (self.matrix @ path[0])[n:] @ row / (row @ row)
+        if speeds[1:-1].max() > 1e-9 * slide / half_period or hold <= self.stick_force:
+            return None
 
-    def find_speed(half_period: float) -> float:
-        return float(flow.find_reversal_speeds(np.array([half_period]))[0])
+        # Largest magnitude of the cubics through the samples of the output and of its velocity.
+        curve = CubicHermiteSpline(times, path[:, :n] @ output, path[:, n:] @ output)
+        extremes = curve(np.append(times, curve.derivative().roots(extrapolate=False)))
+        amplitude = float(np.nanmax(np.abs(extremes)))
 
-    cycles = []
-    for k in np.flatnonzero(speeds[:-1] * speeds[1:] <= 0):
-        half_period = brentq(find_speed, *half_periods[k : k + 2], xtol=1e-16, rtol=1e-14)
-        # Where an undamped mode is in resonance, the interface does not stop at the reversal.
-        if abs(find_speed(half_period)) < REST_TOL:
-            cycles.append(_make_relay_cycle(modes, flow, forces[1], half_period))
-    return [cycle for cycle in cycles if cycle is not None]
+        # A time shift of the reversal absorbs part of a perturbation, so the map is from reversal to reversal.
+        growth = np.exp(half_period * self.rates)
+        speed = (self.vectors @ (self.rates * growth * away)).real
+        step = ((self.vectors * growth) @ np.linalg.inv(self.vectors)).real
+        face = np.append(np.zeros(n), row)
+        reversal_map = step - np.outer(speed, face @ step) / (face @ speed)
+        is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
+        return LimitCycle(amplitude, LIMIT_CYCLE_TOL * amplitude, np.pi / half_period, is_stable)
 
 
 def trace_relay_backbone(
@@ -235,7 +264,7 @@ def trace_relay_backbone(
         """Return the cycle under a damping of all coordinates; NotConverged if the interface would stick."""
         added = (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size)
         sustained = replace(modes, damping=modes.damping_matrix - added)
-        cycles = _find_mode_relay_cycles(sustained, row, forces, mode)
+        cycles = _Relay(sustained, row, *forces).find_cycles(mode)
         cycles = [cycle for cycle in cycles if cycle.amplitude > 0]
         if not cycles:
             raise NotConverged("the interface sticks at its reversals")
@@ -263,44 +292,6 @@ def trace_relay_backbone(
         return cycle, float((modal_rate + np.exp(log_rate)) / (2 * cycle.omega))
 
     return [find_motion(float(amplitude)) for amplitude in amplitudes]
-
-
-def _make_relay_cycle(
-    modes: ModalBasis, flow: _ForcedFlow, stick_force: float, half_period: float
-) -> LimitCycle | None:
-    """Return the limit cycle that has a given half period [s].
-
-    The result is None if the interface reverses within the half period, or if the static friction [N] holds it.
-    """
-    row = flow.row
-    n = row.size
-    times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
-    away = flow.find_reversals([half_period])[:, 0] - flow.rest
-    path = ((away * np.exp(np.outer(times, flow.rates)) + flow.rest) @ flow.vectors.T).real
-
-    # The slide is falling, and at its start the interface needs a force -m a to stay at rest.
-    speeds = path[:, n:] @ row
-    slide = float(np.abs(row) @ np.abs(path[0, :n]))
-    hold = -modes.mass * (flow.matrix @ path[0])[n:] @ row / (row @ row)
-    if speeds[1:-1].max() > 1e-9 * slide / half_period or hold <= stick_force:
-        return None
-    amplitude = _find_largest(times, path[:, :n] @ modes.output, path[:, n:] @ modes.output)
-
-    # A time shift of the reversal absorbs part of a perturbation, so the map is from reversal to reversal.
-    growth = np.exp(half_period * flow.rates)
-    speed = (flow.vectors @ (flow.rates * growth * away)).real
-    step = ((flow.vectors * growth) @ np.linalg.inv(flow.vectors)).real
-    face = np.concatenate([np.zeros(n), row])
-    reversal_map = step - np.outer(speed, face @ step) / (face @ speed)
-    is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
-    return LimitCycle(amplitude, LIMIT_CYCLE_TOL * amplitude, np.pi / half_period, is_stable)
-
-
-def _find_largest(times, motion, speeds) -> float:
-    """Return the largest magnitude of the cubics through samples (k,) of a motion [m] and of its velocity [m/s]."""
-    curve = CubicHermiteSpline(times, motion, speeds)
-    turns = curve.derivative().roots(extrapolate=False)
-    return float(max(np.abs(motion).max(), np.nanmax(np.abs(curve(turns)), initial=0.0)))
 
 
 def find_balance_cycles(
@@ -401,7 +392,7 @@ def _find_undamped_motions(
     """
     amplitudes, start = path
     samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])
-    equations = FreeBalance(modes, group, mode, harmonics, samples)
+    equations = FreeBalance(HarmonicBalance(modes, group, samples), mode, harmonics)
     found = find_free_motions(equations, amplitudes, mode=start)
     if None in found:
         return None

@@ -137,6 +137,8 @@ def write_probes(rig, state, t, y, probes):
     n = rig.modes.shape[1]
     find_rates(rig, state, t, y, state.rows[RATES])
     acceleration = state.rows[RATES, n : 2 * n]
+
+    # Motion of the points that are measured; the base moves an accelerometer too.
     output = rig.modes[Mode.OUTPUT]
     probes[Probe.SPEED] = project(output, y[n : 2 * n])
     probes[Probe.TRAVEL] = rig.settings[Setting.TRAVEL] - abs(project(output, y[:n]))
@@ -144,6 +146,8 @@ def write_probes(rig, state, t, y, probes):
     probes[Probe.ACCELERATION] = project(output, acceleration)
     if rig.settings[Setting.BASE_MOVES] > 0:
         probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
+
+    # Every interface; a law slips where the irreversible part of its velocity exceeds the elastic one.
     integrals = find_integrals(rig, y)
     for i in range(rig.faces.shape[0]):
         point = look(rig, state, i, t, y)

@@ -46,22 +46,19 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
     whole, faces = (np.where(np.isinf(row), np.nan, row) for row in (record.whole, record.faces))
     span = whole[Whole.SPAN]
     has_cycle = span > period * (1 - 1e-6)
-    harmonic_1 = np.hypot(whole[Whole.COS_1], whole[Whole.SIN_1]) * 2 / span
-    harmonic_3 = np.hypot(whole[Whole.COS_3], whole[Whole.SIN_3]) * 2 / span
+    harmonic_1 = harmonic_3 = np.nan
+    if has_cycle:
+        harmonic_1 = np.hypot(whole[Whole.COS_1], whole[Whole.SIN_1]) * 2 / span
+        harmonic_3 = np.hypot(whole[Whole.COS_3], whole[Whole.SIN_3]) * 2 / span
+    distortion = harmonic_3 / harmonic_1 if harmonic_1 > MIN_ACCELERATION else np.nan
     values = {
         "relative_displacement_amplitude": (whole[Whole.MAX] - whole[Whole.MIN]) / 2,
         "absolute_acceleration_peak": max(
             whole[Whole.MAX_ACCELERATION], -whole[Whole.MIN_ACCELERATION]
         ),
         "absolute_acceleration_fundamental": harmonic_1,
-        "acceleration_distortion": harmonic_3 / harmonic_1
-        if harmonic_1 > MIN_ACCELERATION
-        else np.nan,
+        "acceleration_distortion": distortion,
     }
-    if not has_cycle:
-        values |= dict.fromkeys(
-            ("absolute_acceleration_fundamental", "acceleration_distortion"), np.nan
-        )
     values |= _compute_work(case, state)
     if not case.n_friction:
         return values
@@ -72,7 +69,8 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
         suffix = f"_{i + 1}" if i else ""
         # A reversal without stick takes a time of the size of round-off.
         stuck = row[Window.STUCK] / span
-        stuck = 0.0 if stuck <= FULL_STICK else 1.0 if stuck >= 1 - FULL_STICK else stuck
+        if min(abs(stuck), abs(stuck - 1)) <= FULL_STICK:
+            stuck = round(stuck)
         values |= {
             f"slip_amplitude{suffix}": (row[Window.MAX_SLIP] - row[Window.MIN_SLIP]) / 2,
             f"stick_fraction{suffix}": stuck,

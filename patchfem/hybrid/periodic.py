@@ -29,6 +29,7 @@ MAX_STABLE_MULTIPLIER = 1 + 1e-3
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
 UNDAMPED_TOL = 2e-6
 NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
+SINGULAR_TOL = 1e-13  # the same for a correction
 N_GROWTH_CYCLES = (
     60  # cycles of each of three runs, in which a growing motion increases by similar amounts
 )
@@ -160,7 +161,7 @@ class _Shooting:
         self.state = make_arrays(case)[0]
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
-        self.slopes: tuple | None = None
+        self.map: _Map | None = None
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
@@ -197,23 +198,23 @@ class _Shooting:
             if change < tolerance:
                 if self.has_same_regime(before):
                     break
-                self.slopes = None
+                self.map = None
                 continue
 
             # A correction that did not help is given up for some periods of the motion itself.
             if change > best:
                 self.relax(N_RELAXED)
-                self.slopes = None
+                self.map = None
                 best = np.inf
                 continue
 
             # The derivatives of a correction that was nearly exact serve for the next one.
             if best < np.inf and change > MAX_REMAINDER * best:
-                self.slopes = None
+                self.map = None
             best = change
             self.correct(before)
         if best < np.inf and change > MAX_REMAINDER * best:
-            self.slopes = None
+            self.map = None
         return before, change
 
     def check(self, before: State, tolerance: float) -> tuple[np.ndarray, float]:
@@ -274,55 +275,60 @@ class _Shooting:
         changed[self.n :] &= is_used.ravel()
         return np.flatnonzero(changed)
 
-    def _differentiate(self, before: State) -> tuple[np.ndarray, ...]:
-        """Return the unknowns' indices, change over a period, derivatives of the map, and their scales.
+    def _differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
+        """Return the derivatives of the map of a period from a state, and the change over this period, in scaled unknowns.
 
-        The derivatives of the last correction are used again as long as `slopes` has them.
+        The derivatives of the last correction are used again as long as `map` has them.
         """
         columns = self._columns(before)
         start = _pack(before, self.n)
         end = _pack(self.state, self.n)
-        scale = np.append(self._scales(), np.abs(start[self.n :]))[columns]
-        if self.slopes is None or not np.array_equal(self.slopes[0], columns):
-            self.slopes = columns, self._compute_slopes(before, columns, scale, end)
-        return columns, (end - start)[columns], self.slopes[1], scale
-
-    def _compute_slopes(self, before: State, columns, scale, end) -> np.ndarray:
-        """Return the derivatives (k, k) of the map of a period with respect to the unknowns, by differences.
-
-        `end` is the end of the period.
-        """
-        steps = self.difference * scale
-        slopes = np.empty((columns.size, columns.size))
-        for k, (column, step) in enumerate(zip(columns, steps)):
-            packed = _pack(before, self.n)
-            packed[column] += step
-            after = _pack(self.advance(_unpack(before, packed)), self.n)
-            slopes[:, k] = (after - end)[columns] / step
-        return slopes
+        if self.map is None or not np.array_equal(self.map.columns, columns):
+            scale = np.append(self._scales(), np.abs(start[self.n :]))[columns]
+            slopes = np.empty((columns.size, columns.size))
+            for k, column in enumerate(columns):
+                packed = start.copy()
+                packed[column] += self.difference * scale[k]
+                after = _pack(self.advance(_unpack(before, packed)), self.n)
+                slopes[:, k] = (after - end)[columns] / (self.difference * scale)
+            self.map = _Map(columns, slopes, scale)
+        return self.map, (end - start)[columns] / self.map.scale
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
-        columns, change, slopes, scale = self._differentiate(before)
-        square = slopes * scale / scale[:, None]
-        if not np.isfinite(square).all():
-            return np.full(columns.size, np.nan), np.inf
+        found, change = self._differentiate(before)
+        if not np.isfinite(found.slopes).all():
+            return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
-        step = np.linalg.lstsq(np.eye(columns.size) - square, change / scale, rcond=NEUTRAL_TOL)[0]
-        return np.linalg.eigvals(square), float(np.abs(step).max(initial=0.0))
+        step = _solve_newton(found, change, NEUTRAL_TOL)
+        return np.linalg.eigvals(found.slopes), float(np.abs(step).max(initial=0.0))
 
     def correct(self, before: State) -> None:
-        """Replace the state by a Newton step from another one, which a period takes to it."""
-        columns, change, slopes, scale = self._differentiate(before)
-        # Newton step for a state that a period does not change. The matrix is singular where a state does not matter, such
-        # as bonds that have long been forgotten.
-        matrix = slopes * scale / scale[:, None]
-        step = np.linalg.lstsq(np.eye(columns.size) - matrix, change / scale, rcond=1e-13)[0]
+        """Replace the state by a Newton step from another one, which a period takes to it.
 
-        # Regimes are those at the end of the period, where the motion has brought them.
+        Regimes are those at the end of the period, where the motion has brought them.
+        """
+        found, change = self._differentiate(before)
         packed = _pack(self.state, self.n)
-        packed[columns] = _pack(before, self.n)[columns] + step * scale
+        step = _solve_newton(found, change, SINGULAR_TOL) * found.scale
+        packed[found.columns] = _pack(before, self.n)[found.columns] + step
         self.state = _unpack(self.state, packed)
+
+
+class _Map(NamedTuple):
+    """Linear map of a period: indices (k,) and scales (k,) of the unknowns, and derivatives (k, k) in scaled unknowns."""
+
+    columns: np.ndarray
+    slopes: np.ndarray
+    scale: np.ndarray
+
+
+def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
+    """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).
+
+    The matrix is singular where a state does not matter, such as bonds that have long been forgotten.
+    """
+    return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 
 
 def _copy(state: State) -> State:

@@ -12,7 +12,7 @@ from .. import compiled
 from ..core import ModalBasis, Response
 from ..structure.histories import make_response
 from .cases import Case, make_arrays
-from .measures import compute_energies, compute_measures, split_integrals
+from .measures import compute_measures, split_integrals
 from .records import (
     N_INTEGRALS,
     Clock,
@@ -96,10 +96,6 @@ class Motion:
         is_own = (self.event_rows[:, -2] == interface) & (self.event_rows[:, -1] == Margin.MOTION)
         rows = np.concatenate([self.rows[:1], self.event_rows[is_own]])
         return np.stack([rows[:, 0], self._slides(rows)[:, interface]], axis=1)
-
-    def find_energies(self) -> dict[str, float]:
-        """Return the energies [J] of the whole motion, see `measures.compute_energies`."""
-        return compute_energies(self.case, self.final)
 
     def make_response(self, modes: ModalBasis, drive) -> Response:
         """Return the stored samples as histories.

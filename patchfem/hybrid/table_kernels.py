@@ -43,6 +43,15 @@ def _join(name: str, function):
     return function
 
 
+def _compile_helpers(law: str) -> None:
+    """Replace the functions that the functions of a law call by compiled ones."""
+    module = import_module(f"{__package__}.laws.{law}")
+    for name in getattr(module, "HELPERS", ()):
+        setattr(module, name, njit(**NJIT_KERNEL)(getattr(module, name)))
+
+
+for _law in LAWS:
+    _compile_helpers(_law)
 force_and_rates = _join("force_and_rates", _no_force)
 write_law_margins = _join("write_margins", _no_margins)
 switch_law = _join("switch", _no_switch)

@@ -69,16 +69,12 @@ class FreeBalance:
 
     Parameters
     ----------
-    modes : ModalBasis
-        Modes of the structure without the contact.
-    group : LawGroup
-        Laws of the interfaces.
+    balance : HarmonicBalance
+        Modes and laws, with a number of samples per cycle.
     mode : int
         Index of the coordinate.
     harmonics : int
         Number of harmonics H.
-    samples : int
-        Samples per cycle.
     excitation : (n, n) array, optional
         Matrix E of a force 2 zeta omega m E z' in the first harmonic alone, such as that of a shaker; default: the
         negative damping of all coordinates in all harmonics.
@@ -88,9 +84,11 @@ class FreeBalance:
     """
 
     def __init__(
-        self, modes, group, mode: int, harmonics: int, samples: int, excitation=None, output=None
+        self, balance: HarmonicBalance, mode: int, harmonics: int, excitation=None, output=None
     ):
-        self.balance = HarmonicBalance(modes, group, samples)
+        modes = balance.modes
+        group = balance.group
+        self.balance = balance
         self.mode = mode
         self.output = output
         self.stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
@@ -296,7 +294,8 @@ def make_free_balance(
     reach = 1.0 if output is None else abs(float(output @ shape))
     widest = np.abs(group.rows @ shape) * max_amplitude / reach
     samples = min(factor * group.samples_for(harmonics, widest), MAX_SAMPLES_PER_CYCLE)
-    return FreeBalance(modes, group, mode, harmonics, samples, excitation, output)
+    balance = HarmonicBalance(modes, group, samples)
+    return FreeBalance(balance, mode, harmonics, excitation, output)
 
 
 def find_free_motions(

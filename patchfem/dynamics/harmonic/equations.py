@@ -96,9 +96,16 @@ class HarmonicBalance:
         return unpack_harmonics(x, len(self.rows))
 
     def make_stiffness(self, omega: float, harmonics: int, damping=None) -> np.ndarray:
-        """Return the dynamic stiffness S_k (H + 1, n, n) at a frequency [rad/s].
+        """Return the dynamic stiffness S_k (H + 1, n, n).
 
-        damping: (H + 1, n, n) matrices [1/s]; default: that of the modes.
+        Parameters
+        ----------
+        omega : float
+            [rad/s].
+        harmonics : int
+            Number of harmonics H.
+        damping : (H + 1, n, n) array, optional
+            Damping matrices [1/s]; default: that of the modes.
         """
         modes = self.modes
         k_omega = omega * np.arange(harmonics + 1)[:, None, None]

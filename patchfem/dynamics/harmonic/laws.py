@@ -151,7 +151,9 @@ class Jenkins(Law):
         holds = out[2 + np.argsort(turns)]
         return LawForce(out[0], slopes, holds=holds, limit=self.limit, stretch=out[1])
 
-    def _follow_branches(self, q, nodes, memory: list, out, slopes) -> None:
+    def _follow_branches(
+        self, q, nodes, memory: list[tuple[int, float, np.ndarray]], out, slopes
+    ) -> None:
         """Write the forces between two reversals, and remove the reversals that are passed from the memory.
 
         Parameters
@@ -316,7 +318,7 @@ def solve_recursion(decay, source) -> np.ndarray:
         return np.zeros_like(source)
     # The solution that begins at 0, and the part of it that a cycle leaves.
     bands = np.array([np.ones(decay.size), -np.roll(decay, -1)])
-    end = solve_banded((1, 0), bands, source)
+    end = solve_banded((1, 0), bands, source, check_finite=False)
     first = end[-1] / (1 - kept[-1])
     return np.roll(end + kept * first, 1)
 

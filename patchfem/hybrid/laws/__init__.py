@@ -7,10 +7,10 @@ A law has three functions of plain numbers and arrays, which `table_kernels` com
   positive within the regime of the law, and relative to the scales of the point.
 - `switch(p, memory, point, s, which)` changes the regime after a margin has vanished; it returns whether the run ends.
 
-`p` are the numbers of the law, `memory` is a row of `records.Memory`. Within a regime force and rates must be smooth. A
-law needs no tangent, no solver and no error formula. `RIGID` says whether it rests without displacement. A law of a
-table [friction] has `from_keys(friction, load, speed)`, which returns its `records.LawNumbers` for a mean load [N] and an
-expected speed [m/s].
+They may call functions of their module that HELPERS lists. `p` are the numbers of the law, `memory` is a row of
+`records.Memory`. Within a regime force and rates must be smooth. A law needs no tangent, no solver and no error formula.
+`RIGID` says whether it rests without displacement. A law of a table [friction] has `from_keys(friction, load, speed)`,
+which returns its `records.LawNumbers` for a mean load [N] and an expected speed [m/s].
 
 LAWS lists the modules; the number of a law is its place. LAW_OF_NAME gives the module for each `friction.law`, and
 VARYING_LAW_OF_NAME that under a load that varies.

@@ -13,17 +13,50 @@ turn there without an event: the piece is left at its end, or at the reversal fr
 ALL_REVERSALS each turn is an event all the same.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
+HELPERS = ("find_branch",)
 POINTS = 5  # first of the n + 1 displacements among the numbers
 TURNS_FREELY = (
     -1.0
 )  # beta of a linear curve whose first piece is left without an event at reversals
 ALL_REVERSALS = -2.0  # beta of a linear curve that has an event at each reversal
 MIN_BRANCH = 1e-13  # shortest branch between two reversals, relative to phi_max
+
+
+class Branch(NamedTuple):
+    """Current branch: number of reversals, ratio of the scales of first loading and of the branch, force at its start [N],
+    displacement [m] from its origin on the curve of first loading, and from the origin of the interface."""
+
+    count: int
+    ratio: float
+    start_force: float
+    x: float
+    q: float
+
+
+def find_branch(memory, point):
+    """Return the `Branch` that starts at the last reversal, or at the origin before the first one.
+
+    Parameters
+    ----------
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    """
+    count = int(memory[Memory.COUNT])
+    direction = memory[Memory.DIRECTION]
+    q = point.slide - memory[Memory.ORIGIN]
+    if count == 0:
+        return Branch(count, 1.0, 0.0, direction * q, q)
+    last = Memory.STACK + 2 * count - 2
+    return Branch(count, 0.5, memory[last + 1], 0.5 * direction * (q - memory[last]), q)
 
 
 def force_and_rates(p, memory, point, s, rates):
@@ -52,17 +85,9 @@ def force_and_rates(p, memory, point, s, rates):
     if k >= pieces:
         return Friction(direction * p[2], point.velocity, p[2] * direction * point.velocity)
 
-    # Displacement x on the curve of first loading, from the last reversal at half the scale.
-    n = int(memory[Memory.COUNT])
-    half = 1.0
-    start = start_force = 0.0
-    if n > 0:
-        half = 0.5
-        start = memory[Memory.STACK + 2 * n - 2]
-        start_force = memory[Memory.STACK + 2 * n - 1]
-    x = half * direction * (point.slide - memory[Memory.ORIGIN] - start)
-
-    # Force and slope of first loading.
+    # Force and slope of first loading, from the last reversal at half the scale.
+    branch = find_branch(memory, point)
+    x = branch.x
     if p[1] >= 0:
         scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2)) / p[3]
         power = max(x / p[3], 0.0) ** (p[0] + 1)
@@ -78,7 +103,8 @@ def force_and_rates(p, memory, point, s, rates):
     # Elements without a slip force hold nothing, so that the whole displacement is slip.
     fraction = slipping / p[2] if p[2] > 0 else 1.0
     loss = slipping * direction * point.velocity
-    return Friction(start_force + direction / half * force, fraction * point.velocity, loss)
+    force = branch.start_force + direction / branch.ratio * force
+    return Friction(force, fraction * point.velocity, loss)
 
 
 def write_margins(p, memory, point, s, margins):
@@ -99,12 +125,10 @@ def write_margins(p, memory, point, s, margins):
     """
     direction = memory[Memory.DIRECTION]
     margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
-    n = int(memory[Memory.COUNT])
+    branch = find_branch(memory, point)
+    n = branch.count
+    x = branch.x
     k = int(memory[Memory.FLAG])
-    q = point.slide - memory[Memory.ORIGIN]
-    half = 0.5 if n > 0 else 1.0
-    start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
-    x = half * direction * (q - start)
     if k == 0 and p[1] == TURNS_FREELY:
         # Without a reversal the elastic range extends to both sides of the origin.
         before = p[POINTS + 1] if n == 0 else 0.0
@@ -117,7 +141,7 @@ def write_margins(p, memory, point, s, margins):
     margins[Margin.LIMIT] = (p[POINTS + k + 1] - x) / p[3]
     if n > 2 or (n == 2 and memory[Memory.VIRGIN] > 0):
         end = memory[Memory.STACK + 2 * n - 4]
-        margins[Margin.BRANCH] = direction * (end - q) / p[3]
+        margins[Margin.BRANCH] = direction * (end - branch.q) / p[3]
 
 
 def switch(p, memory, point, s, which):
@@ -188,9 +212,7 @@ def switch(p, memory, point, s, which):
     memory[Memory.COUNT] = n
 
     # Piece of the curve on the new branch.
-    half = 0.5 if n > 0 else 1.0
-    start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
-    x = half * direction * (q - start)
+    x = find_branch(memory, point).x
     k = 0
     while k < pieces and x >= p[POINTS + k + 1]:
         k += 1
@@ -204,23 +226,15 @@ def from_elements(stiffness, yield_displacement):
     Elements that yield at the same displacement form one point of the curve. Without a load the elements have no force,
     and their yield displacement is that of a single element of 1 m.
     """
-    if not np.any(np.multiply(stiffness, yield_displacement)):
-        stiffness = [0.0]
-        yield_displacement = [1.0]
-    pairs = {}
-    for k, x in zip(stiffness, yield_displacement):
-        pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)
-    points = sorted(pairs)
-    edges = [0.0]
-    forces = [0.0]
-    slope = sum(pairs.values())
-    for x in points:
-        forces.append(forces[-1] + slope * (x - edges[-1]))
-        edges.append(x)
-        slope -= pairs[x]
-    numbers = (0.0, TURNS_FREELY, forces[-1], edges[-1], len(points), *edges, *forces)
-    total = sum(pairs.values())
-    return LawNumbers("masing", numbers, length=forces[-1] / total if total > 0 else edges[-1])
+    k = np.array(stiffness, float)
+    x = np.array(yield_displacement, float)
+    if not k @ x:
+        k = np.zeros(1)
+        x = np.ones(1)
+    edges = np.append(0.0, np.unique(x))
+    forces = np.minimum.outer(edges, x) @ k
+    numbers = (0.0, TURNS_FREELY, forces[-1], edges[-1], edges.size - 1, *edges, *forces)
+    return LawNumbers("masing", numbers, length=forces[-1] / k.sum() if k.any() else edges[-1])
 
 
 def with_all_reversals(law: LawNumbers) -> LawNumbers:

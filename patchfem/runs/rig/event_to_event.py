@@ -21,6 +21,7 @@ from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
+from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
 from ...response.events import (
@@ -307,7 +308,7 @@ class LumpedEvaluator(RunEvaluator):
             window=window,
             extremes=motion.extremes,
             phasors=motion.phasors,
-            ledger=motion.find_energies() | {"steps": float(motion.n_steps)},
+            ledger=compute_energies(motion.case, motion.final) | {"steps": float(motion.n_steps)},
             outcome=None,
             message="",
             end=motion.final,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...hybrid.cases import Load
-from ...hybrid.laws import make_law, smooth_grooves
+from ...hybrid.laws import make_law
 from ...hybrid.laws.grooves import make_grooves
 from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_reversals
 from ...hybrid.records import LawNumbers
@@ -95,9 +95,7 @@ def _make_whole_law(model: Model, patch) -> tuple[LawNumbers, Load]:
     if model.grooves is not None:
         slide = rig.modes.slide
         model.grooves.check_lifted_mass(friction.static, rig.modes.mass / float(slide @ slide))
-        is_rigid = law_has_trait(friction.law, "set-valued")
-        make = make_grooves if is_rigid else smooth_grooves.make_grooves
-        return make(friction, model.grooves), load
+        return make_grooves(friction, model.grooves), load
     if law_has_trait(friction.law, "averaged"):
         static = friction.static * averaged_law.slip_force_ratio(model, patch)
         return LawNumbers("coulomb", (static, static)), load

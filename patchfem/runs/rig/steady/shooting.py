@@ -305,7 +305,7 @@ class ShootingFinder:
             return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
         frequencies = choose_start_frequencies(self.modes, drive)
-        samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)[1]
+        samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)
         return ResponseCurve([point for _, point in samples])
 
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
