@@ -55,10 +55,12 @@ PUBLIC = {
         "make_onset_test",
     ),
     "loops": (
+        "CycleLoop",
         "find_reversals",
         "interface_loop",
         "mean_half_range",
         "reversal_force_rule",
+        "sample_loop",
         "secant_stiffness",
     ),
     "measures": (

@@ -224,7 +224,9 @@ def remove_errors(measures: Measures) -> Measures:
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 
-def classify_periodic(amplitudes, extremes, window: int, steady, limits: tuple) -> tuple:
+def classify_periodic(
+    amplitudes, extremes, window: int, steady, limits
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Classify n motions under periodic drives, and estimate their steady amplitudes.
 
     A motion is steady only if both the difference from its steady estimate and the remaining free motion are
@@ -460,7 +462,7 @@ def note_on_changing_drive(outcome: Outcome, drive) -> list[str]:
     ]
 
 
-def estimate_steady(drive, amplitudes, phasors) -> tuple:
+def estimate_steady(drive, amplitudes, phasors) -> tuple[float | None, ...]:
     """Return the steady amplitude [m] and its error; (None, None) without a periodic drive.
 
     The amplitudes of a released or struck rig are not extrapolated, because it comes to rest. Under a drive

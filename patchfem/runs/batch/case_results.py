@@ -38,10 +38,10 @@ class CaseResults:
     errors: Arrays = field(default_factory=dict)
     floors: Arrays = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
-    reasons: dict = field(default_factory=dict)
-    messages: dict = field(default_factory=dict)
-    warnings: dict = field(default_factory=dict)
-    notes: dict = field(default_factory=dict)
+    reasons: dict[str, dict[int, str]] = field(default_factory=dict)
+    messages: dict[int, str] = field(default_factory=dict)
+    warnings: dict[int, list[str]] = field(default_factory=dict)
+    notes: dict[int, list[str]] = field(default_factory=dict)
     numerics: dict = field(default_factory=dict)
     seconds: np.ndarray = None
 
