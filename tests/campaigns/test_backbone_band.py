@@ -179,4 +179,4 @@ def test_exact_band_holds_the_other_curve_at_common_amplitudes_only():
 )
 def test_exact_span_of_missing_amplitudes_names_no_place_twice(amplitudes, words_of_span):
     """Amplitudes without a result lie between two places, or at one if both ends are the same in print."""
-    assert words._describe_span(np.array(amplitudes)) == words_of_span
+    assert words.describe_span(np.array(amplitudes)) == words_of_span
