@@ -479,6 +479,21 @@ class Response:
     slip: np.ndarray
     extra: dict[str, np.ndarray] = field(default_factory=dict)
 
+    @property
+    def slides(self) -> np.ndarray:
+        """Relative displacement (k, i) [m] of each interface."""
+        return self.extra.get("slides", self.slide[:, None])
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Friction force (k, i) [N] of each interface."""
+        return self.extra.get("forces", self.force[:, None])
+
+    @property
+    def slips(self) -> np.ndarray:
+        """Irreversible part (k, i) [m] of the displacement of each interface; all of it without slips of several."""
+        return self.extra.get("slips", self.extra.get("slides", self.slip[:, None]))
+
     def select(self, samples) -> "Response":
         """Return the response at selected samples.
 

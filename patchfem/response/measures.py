@@ -343,15 +343,14 @@ def peak_sampling_errors(window: Response) -> Values:
     window : Response
         Equally spaced samples.
     """
-    forces = np.abs(window.extra.get("forces", window.force[:, None]))
-    slips = window.extra.get("slips", window.slip[:, None])
+    forces = np.abs(window.forces)
     errors = {
         "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
     }
 
     for name, sampling_errors in (
         ("friction_force_peak", interpolate_peaks(forces)[1]),
-        ("slip_amplitude", interpolate_ranges(slips)[1] / 2),
+        ("slip_amplitude", interpolate_ranges(window.slips)[1] / 2),
     ):
         for k, error in enumerate(sampling_errors):
             errors[f"{name}_{k + 1}" if k else name] = error

@@ -319,7 +319,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         Relative tolerance of the scene.
     """
     time = window.time
-    forces = np.column_stack([window.extra.get("forces", window.force)])
+    forces = window.forces
     magnitude = np.abs(forces)
     largest_force = magnitude.max(axis=0)
     if time[-1] - time[0] < 1.5 * period:

@@ -156,20 +156,17 @@ class LastCycles:
 
     def further_interfaces(self) -> "list[LastCycles]":
         """Return the last cycles of each interface after the first one."""
-        extra = self.window.extra
-        if self.load is None or self.is_single_interface or "slides" not in extra:
+        whole = self.window
+        if self.load is None or self.is_single_interface:
             return []
-
-        slips = extra.get("slips", extra["slides"])
-        count = extra["slides"].shape[1]
         interfaces = []
-        for k in range(1, count):
+        for k in range(1, whole.slides.shape[1]):
             window = replace(
-                self.window,
-                slide=extra["slides"][:, k],
-                slide_rate=extra["slide_rates"][:, k],
-                force=extra["forces"][:, k],
-                slip=slips[:, k],
+                whole,
+                slide=whole.slides[:, k],
+                slide_rate=whole.extra["slide_rates"][:, k],
+                force=whole.forces[:, k],
+                slip=whole.slips[:, k],
             )
 
             # The area is the only measure of the loops of further interfaces, so that they need no harmonics.

@@ -59,8 +59,7 @@ class Face(NamedTuple):
 
     def slide(self, response) -> np.ndarray:
         """Return the relative displacement (k,) [m] of the interface in a Response."""
-        slides = response.extra.get("slides")
-        return slides[:, self.number] if self.name and slides is not None else response.slide
+        return response.slides[:, self.number] if self.name else response.slide
 
 
 def merge_sentences(

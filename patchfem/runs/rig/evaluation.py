@@ -240,9 +240,8 @@ def compute_sampled_work(response) -> Values:
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
     """
-    slides = response.extra.get("slides", response.slide[:, None])
-    forces = response.extra.get("forces", response.force[:, None])
-    parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
+    pairs = zip(response.slides.T, response.forces.T)
+    parts = [path_work.sampled_work(slide, force) for slide, force in pairs]
     sampled = sum(float(part.sum()) for part in parts)
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 

@@ -373,7 +373,7 @@ class LumpedEvaluator(RunEvaluator):
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
 
-        slides = response.extra.get("slides", response.slide[:, None])
+        slides = response.slides
         at = np.searchsorted(response.time, times)
 
         # Between two reversals all elements move alike, so that the reversals determine their stretches.
@@ -460,8 +460,7 @@ class LumpedEvaluator(RunEvaluator):
         # The part of the motion in which no interface slips.
         motion = run.response
         if not is_linear:
-            slips = motion.extra.get("slips", motion.slip[:, None])
-            moves = np.abs(np.diff(slips, axis=0)).max(axis=1) > 0
+            moves = np.abs(np.diff(motion.slips, axis=0)).max(axis=1) > 0
             last = np.flatnonzero(moves)[-1] + 1 if moves.any() else 0
             motion = motion.select(motion.time >= motion.time[last])
         vibration = []
