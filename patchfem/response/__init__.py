@@ -65,7 +65,6 @@ PUBLIC = {
     ),
     "measures": (
         "MIN_SLIDE_RANGE",
-        "compute_harmonic",
         "compute_ledger_measures",
         "compute_peak",
         "compute_step_harmonic",
@@ -84,7 +83,6 @@ PUBLIC = {
         "find_ringing",
         "is_ringing_visible",
         "note_on_changing_drive",
-        "check_piece_length",
         "classify_periodic",
         "steady_estimate_error",
         "estimate_steady",

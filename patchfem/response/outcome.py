@@ -336,28 +336,6 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     return bool(np.any(last_mean - first_mean > tolerance * largest_force))
 
 
-def check_piece_length(
-    outcome: Outcome | None, max_displacement: float, length: float
-) -> Outcome | None:
-    """Return LEAVES_CONTACT if the displacement exceeds the piece length, else the outcome.
-
-    Beyond this displacement, the pieces do not overlap, so that the outcome of the later motion has no
-    meaning. NOT_CONVERGED is not replaced, because its displacement has no meaning either.
-
-    Parameters
-    ----------
-    outcome : Outcome or None
-        Outcome of the motion so far.
-    max_displacement : float
-        Largest absolute relative displacement in the run [m].
-    length : float
-        Length of the piece [m].
-    """
-    if max_displacement > length and outcome is not Outcome.NOT_CONVERGED:
-        return Outcome.LEAVES_CONTACT
-    return outcome
-
-
 def find_ringing(solution, measures: Measures, limits: tuple[float, float], drive) -> float:
     """Return the free vibration [m] of a rig whose interfaces stick under a periodic drive; 0 if none is visible.
 
