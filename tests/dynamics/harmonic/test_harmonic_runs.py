@@ -17,8 +17,7 @@ from patchfem.dynamics import (
 )
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.response import compute_peak, interface_loop
-from patchfem.response.measures import compute_harmonic
-from patchfem.response.measures import compute_slip_measures
+from patchfem.response.measures import compute_harmonic, compute_slip_measures
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
