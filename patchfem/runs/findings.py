@@ -26,12 +26,12 @@ from .rig import costs, engines
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
 PROPOSED_TOLERANCE_RATIO = 0.1
 # Largest number of halvings of the time step to which the observed order is extrapolated.
-MAX_HALVINGS = 4
+MAX_EXTRAPOLATED_HALVINGS = 4
 # Fraction of the allowed error that the time steps may have if the other causes alone exceed it.
 MIN_STEP_ERROR_FRACTION = 0.2
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
-MAX_STRIPS = 64
+MAX_PROPOSED_STRIPS = 64
 # Measures whose error is of first order in the width of the strips: the pressure peak of the outermost strip is
 # computed at its centre.
 FIRST_ORDER_MEASURES = (
@@ -126,7 +126,7 @@ def find_missed_measures(
     for name, measure in measures.items():
         # `notes.LAW_WARNINGS` has a larger work check, with its remedy.
         is_warned_of = name == "work_check" and (measure.value or 0.0) > notes.MAX_WORK_CHECK
-        ratio = min(measure.error_ratio(model.accuracy.tolerance), refine.MAX_EXCESS)
+        ratio = min(measure.error_ratio(model.accuracy.tolerance), refine.MAX_ERROR_EXCESS)
         if ratio > 1 and not is_warned_of:
             excess[name] = ratio
 
@@ -176,7 +176,9 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     is_wear_unbounded = "worn_depth_max" in missed.find_names() and peak is not None
     is_wear_unbounded = is_wear_unbounded and peak.value is None
     # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
-    is_zero = max(missed.excess.values()) >= refine.MAX_EXCESS and patch_model.mesh.is_automatic
+    is_zero = (
+        max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic
+    )
     if is_wear_unbounded or is_zero:
         return NO_ADVICE
     if patch_model.mesh.file is None and strips is not None and strips.count > 1:
@@ -198,7 +200,7 @@ def _advise_strips(patch_model, excess: Mapping) -> Advice:
     orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
     ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
     count = ceil(patch_model.interface.strips.count * ratio)
-    if count > MAX_STRIPS:
+    if count > MAX_PROPOSED_STRIPS:
         return NO_ADVICE
     also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
     return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
@@ -298,7 +300,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
         allowed = total / missed.excess[name]
         target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
         halvings = max(1, ceil(log2(parts["steps"] / target) / order))
-        if halvings <= MAX_HALVINGS or not can_choose:
+        if halvings <= MAX_EXTRAPOLATED_HALVINGS or not can_choose:
             proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
             return Advice.set_key(STEPS_KEY, proposed)
 

@@ -215,7 +215,9 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     return total
 
 
-def _match_stiffness(patches, stiffness: StickStiffness | None, n_errors: float) -> Sequence:
+def _match_stiffness(
+    patches: Sequence, stiffness: StickStiffness | None, n_errors: float
+) -> Sequence:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:
         return list(patches)

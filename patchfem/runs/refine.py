@@ -25,9 +25,9 @@ MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_se
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
-MIN_GAIN = 1.5
+MIN_ERROR_GAIN = 1.5
 MIN_SHARE = 0.5  # Smallest share of an axis in an error that its refinement reduces noticeably.
-MAX_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
+MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
 MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.
 FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
@@ -146,7 +146,7 @@ def find_worst_measure(measures: Measures, tolerance: float, axes: Iterable[str]
     """
     worst = WorstMeasure()
     for name, measure in measures.items():
-        excess = min(measure.error_ratio(tolerance), MAX_EXCESS)
+        excess = min(measure.error_ratio(tolerance), MAX_ERROR_EXCESS)
         if excess > max(worst.excess, 1.0):
             axis = find_refinable_axis(measure, name, tolerance, axes)
             if axis:
@@ -183,7 +183,7 @@ def judge_pass(given: Model, done, total_seconds: float, excesses: list[float]) 
         # The mesh has no effect on static measures at the points of a profile.
         main = {name: one for name, one in main.items() if name not in PATCH_TABLE}
     excess, name, axis = find_worst_measure(main, model.accuracy.tolerance, axes)
-    if not axis or (excesses and excess * MIN_GAIN > excesses[-1]):
+    if not axis or (excesses and excess * MIN_ERROR_GAIN > excesses[-1]):
         return Verdict(excess)
 
     # Each further pass divides the error by ERROR_RATIO and multiplies the time by COST_RATIO.

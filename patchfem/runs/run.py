@@ -31,7 +31,7 @@ from .rig import engines, rig
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
-NO_MOTION = "no friction acts and no motion was computed"
+NO_FRICTION_MESSAGE = "no friction acts and no motion was computed"
 NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed patch at rest"
 
 
@@ -216,7 +216,7 @@ class _Passes:
         )
 
         if _is_open(inputs.patch) and model.kind != "patch":
-            warnings.append(NO_MOTION)
+            warnings.append(NO_FRICTION_MESSAGE)
             result = patch_result.make_static_result(inputs)
         elif _has_no_load(model):
             result = _make_result_without_load(inputs)
@@ -339,7 +339,7 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
         Outcome.NO_CONTACT,
         {"normal_load": Measure(0.0, "N", 0.0)},
         inputs.seconds,
-        [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_MOTION],
+        [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
         inputs.notes,
     )
 

@@ -25,7 +25,7 @@ from .patch_rows import Arrays, Measures, Values
 N_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
 # Change of slip / largest change; above it, a node without friction limit slips.
 MIN_SLIP_FRACTION = 1e-2
-ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
+TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 # Folder of an absolute path at the start of a remark.
 _FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
 
@@ -360,10 +360,10 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
         moved[1] = 0.0
-    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else ROUND_OFF
+    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
     slips = moved > min_fraction * max(moved.max(), 1e-300)
     if rule.limit is not None and not rule.starts_at_rest:
-        slips[1] = np.abs(tau[1]) >= (1 - ROUND_OFF) * rule.limit
+        slips[1] = np.abs(tau[1]) >= (1 - TRACTION_ROUND_OFF) * rule.limit
     return np.where(active, np.where(slips, 2, 1), 0).astype(np.int8)
 
 

@@ -24,7 +24,7 @@ from .engines import ENGINES, find_obstacle_of_map
 from .hybrid_laws import list_elements
 from .solution import first_interface_load
 
-EQUAL_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
+SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
 HALF_LIMIT_SPEED = 0.5493
 SINGLE_POINT_WARNING = (
@@ -146,7 +146,7 @@ def _warn_of_peak_at_sweep_end(run) -> Iterator[str]:
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
     for key, end in ends.items():
-        if abs(peak.value - end) <= EQUAL_FREQUENCY_TOL * end:
+        if abs(peak.value - end) <= SAME_FREQUENCY_TOL * end:
             side, move = ("upper", "raise") if end == max(ends.values()) else ("lower", "lower")
             yield (
                 f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {side} end of the swept "
