@@ -74,7 +74,7 @@ def solve_without_joint(model: Model) -> FreeRig:
     return remove_joint(model, solve_patch(model))
 
 
-def solve_patch(model: Model) -> Sequence:
+def solve_patch(model: Model) -> tuple:
     """Return the patch of a model on its meshes, from fine to coarse.
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
@@ -215,9 +215,7 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     return total
 
 
-def _match_stiffness(
-    patches: Sequence, stiffness: StickStiffness | None, n_errors: float
-) -> Sequence:
+def _match_stiffness(patches: Sequence, stiffness: StickStiffness | None, n_errors: float) -> list:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:
         return list(patches)

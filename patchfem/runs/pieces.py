@@ -11,7 +11,7 @@ import numpy as np
 from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
-from .patch.strength import YIELDING_NEGLECTED, Strength, min_von_mises_ratio, yield_strength
+from .patch.strength import YIELDING_NEGLECTED, min_von_mises_ratio, yield_strength
 from .results.patch_rows import Arrays
 from .results.result import patch_surface
 
@@ -209,7 +209,7 @@ def add_yielding_notes(result, pieces: Pieces) -> None:
     notes += [text for text in yielding.values() if text not in notes]
 
 
-def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[Strength, str]:
+def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
     """Find the materials whose von Mises stress exceeds their yield strength in any frame.
 
     Parameters
@@ -253,7 +253,7 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[St
     return {strength: _describe_yielding(strength, places[strength]) for strength in places}
 
 
-def _describe_yielding(strength: Strength, places) -> str:
+def _describe_yielding(strength, places: list) -> str:
     """Return the note on a material that yields, with its largest stress and the position."""
     stress, side, (x, y) = max(places, key=lambda place: place[0])
     both = "; the other piece exceeds its yield strength too" * (len(places) > 1)
