@@ -201,6 +201,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
         )
         return friction_errors(values, choice.error, scale)
 
+    # The change of the motion adds to the bound where strips or the tail are coarse.
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
         finer = replace(
