@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -413,8 +413,8 @@ class MeasureDefinition(NamedTuple):
     - name, unit: name in files and on pages, and SI unit.
     - floor: absolute floor of the allowed error.
     - text: meaning in one sentence.
-    - function: function of the solution that returns the value; None if only an engine or another kind of run computes
-      it.
+    - function: function of the `LastCycles` that returns the value, or the name of their property that holds values by
+      name; None if only an engine or another kind of run computes it.
     - sample_error: error due to sampling, multiplied by the number of samples per cycle.
     - group: group of related measures: motion, friction, energy, patch or wear.
     - larger_term: for a measure that is a small difference of larger terms, the name of these terms and a function that
@@ -435,7 +435,7 @@ class MeasureDefinition(NamedTuple):
     unit: str
     floor: float
     text: str
-    function: Callable | None = None
+    function: Callable[[Any], float | None] | str | None = None
     sample_error: float = 0.0
     group: str = "motion"
     larger_term: tuple[str, Callable] | None = None
@@ -478,6 +478,21 @@ class Response:
     force: np.ndarray
     slip: np.ndarray
     extra: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def slides(self) -> np.ndarray:
+        """Relative displacement (k, i) [m] of each interface."""
+        return self.extra.get("slides", self.slide[:, None])
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Friction force (k, i) [N] of each interface."""
+        return self.extra.get("forces", self.force[:, None])
+
+    @property
+    def slips(self) -> np.ndarray:
+        """Irreversible part (k, i) [m] of the displacement of each interface; all of it without slips of several."""
+        return self.extra.get("slips", self.extra.get("slides", self.slip[:, None]))
 
     def select(self, samples) -> "Response":
         """Return the response at selected samples.

@@ -94,7 +94,7 @@ VARIABLES = {
         "time",
         "N m",
         "moment about +z of the friction on the upper piece, sum of y f_x - x f_y",
-        "response.yaw_moment",
+        "response.extra.yaw_moment",
     ),
     "friction_work": Row(
         "time",
@@ -299,9 +299,9 @@ def _collect_loop(result: Result) -> Variables:
         return {}
     slide = window.slide
     force = window.force
-    if result.plan.model.rig is not None and "slides" in window.extra:
-        slide = window.extra["slides"].T
-        force = window.extra["forces"].T
+    if result.plan.model.rig is not None and window.slides.shape[1] > 1:
+        slide = window.slides.T
+        force = window.forces.T
 
     # the window may have several cycles
     period = result.motion.period

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .measures import ArrayPair, slip_round_off
+from .measures import slip_round_off
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
 STOP = 0
@@ -74,14 +74,6 @@ def join_events(parts: list[Events], shifts: list[float]) -> Events:
     return sort_events(rows)
 
 
-def slips_and_displacements(response) -> ArrayPair:
-    """Return the slip and the relative displacement (k, i) [m] of each interface."""
-    extra = response.extra
-    if "slides" in extra:
-        return extra.get("slips", extra["slides"]), extra["slides"]
-    return response.slip[:, None], response.slide[:, None]
-
-
 def find_segment_borders(drive) -> list[float]:
     """Return the times [s] at which a drive changes from one segment to the next."""
     return [segment.start for segment in drive.segments[1:]]
@@ -92,5 +84,5 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
 
     The limit applies to half the range of the slip, and is at least its round-off.
     """
-    slips = np.column_stack([window.slip, slips_and_displacements(window)[0]])
+    slips = np.column_stack([window.slip, window.slips])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))

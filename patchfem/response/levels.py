@@ -53,17 +53,15 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
     """Return the reason why no onset of slip was found in a sequence of drive levels."""
-    amplitude_text = (
-        f"has an amplitude of more than {format_length(length)} at the output" if length else ""
-    )
-    event = {"slip": "slips", "gauge": amplitude_text}.get(
-        kind,
-        f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic",
-    )
+    event = f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic"
+    if kind == "slip":
+        event = "slips"
+    elif kind == "gauge":
+        event = f"has an amplitude of more than {format_length(length)} at the output"
     return f"no level of the increasing sequence {event}"
 
 
-def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | None:
+def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple[int, int] | None:
     """Return the indices of the drive levels just below and just above the onset of slip.
 
     Only the levels before the first decrease are considered.

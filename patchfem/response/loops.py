@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF, Values, find_reversal_steps
+from .measures import COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
 
 EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -179,6 +179,40 @@ def secant_stiffness(reversals) -> float | None:
         if high.slide > low.slide and None not in (low.force, high.force):
             stiffnesses.append((high.force - low.force) / (high.slide - low.slide))
     return float(np.mean(stiffnesses)) if stiffnesses else None
+
+
+class CycleLoop(NamedTuple):
+    """First harmonics and work of the friction loop of one cycle.
+
+    - slide, force: first harmonics of relative displacement [m] and friction force [N].
+    - work: friction work per cycle [J].
+    """
+
+    slide: complex
+    force: complex
+    work: float
+
+
+def sample_loop(time, slide, force, omega: float, work: float) -> CycleLoop:
+    """Return the friction loop of samples over whole cycles at any spacing, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time, slide : (k,)
+        Samples of time [s] and relative displacement [m].
+    force : (k,) or complex
+        Samples of the friction force [N], or its first harmonic if it is known more accurately.
+    omega : float
+        Angular frequency of the drive [rad/s].
+    work : float
+        Friction work per cycle [J].
+    """
+    step = np.diff(time)
+    weight = np.append(step, 0.0) + np.append(0.0, step)
+    moved = slide - np.average(slide, weights=weight)
+    if np.ndim(force):
+        force = compute_harmonic(time, weight, force, omega)
+    return CycleLoop(compute_harmonic(time, weight, moved, omega), force, work)
 
 
 def interface_loop(

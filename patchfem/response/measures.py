@@ -275,6 +275,7 @@ def interpolate_peaks(magnitude) -> ArrayPair:
     middle = np.clip(largest, 1, max(last - 1, 1))
     samples = magnitude[np.clip(middle + np.arange(-2, 3)[:, None], 0, last), columns]
     curvatures = samples[:-2] - 2 * samples[1:-1] + samples[2:]
+
     # only second differences of samples inside the window are compared
     curvatures[0] = np.where(middle >= 2, curvatures[0], curvatures[1])
     curvatures[2] = np.where(middle <= last - 2, curvatures[2], curvatures[1])
@@ -287,6 +288,8 @@ def interpolate_peaks(magnitude) -> ArrayPair:
     value = magnitude[largest, columns]
     # a larger increase indicates a jump, not a smooth peak
     is_peak &= vertex < 1.01 * value
+
+    # Beside a jump or a kink, the largest sample is not the peak.
     jump = centre - np.maximum(left, right)
     kink = np.maximum(
         _extrapolate_to_kink(left, centre, right, samples[4]),
@@ -343,15 +346,14 @@ def peak_sampling_errors(window: Response) -> Values:
     window : Response
         Equally spaced samples.
     """
-    forces = np.abs(window.extra.get("forces", window.force[:, None]))
-    slips = window.extra.get("slips", window.slip[:, None])
+    forces = np.abs(window.forces)
     errors = {
         "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
     }
 
     for name, sampling_errors in (
         ("friction_force_peak", interpolate_peaks(forces)[1]),
-        ("slip_amplitude", interpolate_ranges(slips)[1] / 2),
+        ("slip_amplitude", interpolate_ranges(window.slips)[1] / 2),
     ):
         for k, error in enumerate(sampling_errors):
             errors[f"{name}_{k + 1}" if k else name] = error

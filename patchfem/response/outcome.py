@@ -224,7 +224,9 @@ def remove_errors(measures: Measures) -> Measures:
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 
-def classify_periodic(amplitudes, extremes, window: int, steady, limits: tuple) -> tuple:
+def classify_periodic(
+    amplitudes, extremes, window: int, steady, limits
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Classify n motions under periodic drives, and estimate their steady amplitudes.
 
     A motion is steady only if both the difference from its steady estimate and the remaining free motion are
@@ -317,7 +319,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         Relative tolerance of the scene.
     """
     time = window.time
-    forces = np.column_stack([window.extra.get("forces", window.force)])
+    forces = window.forces
     magnitude = np.abs(forces)
     largest_force = magnitude.max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
@@ -332,28 +334,6 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     first_mean = np.abs(np.trapezoid(forces[first], time[first], axis=0)) / period
     last_mean = np.abs(np.trapezoid(forces[last], time[last], axis=0)) / period
     return bool(np.any(last_mean - first_mean > tolerance * largest_force))
-
-
-def check_piece_length(
-    outcome: Outcome | None, max_displacement: float, length: float
-) -> Outcome | None:
-    """Return LEAVES_CONTACT if the displacement exceeds the piece length, else the outcome.
-
-    Beyond this displacement, the pieces do not overlap, so that the outcome of the later motion has no
-    meaning. NOT_CONVERGED is not replaced, because its displacement has no meaning either.
-
-    Parameters
-    ----------
-    outcome : Outcome or None
-        Outcome of the motion so far.
-    max_displacement : float
-        Largest absolute relative displacement in the run [m].
-    length : float
-        Length of the piece [m].
-    """
-    if max_displacement > length and outcome is not Outcome.NOT_CONVERGED:
-        return Outcome.LEAVES_CONTACT
-    return outcome
 
 
 def find_ringing(solution, measures: Measures, limits: tuple[float, float], drive) -> float:
@@ -460,7 +440,7 @@ def note_on_changing_drive(outcome: Outcome, drive) -> list[str]:
     ]
 
 
-def estimate_steady(drive, amplitudes, phasors) -> tuple:
+def estimate_steady(drive, amplitudes, phasors) -> tuple[float | None, ...]:
     """Return the steady amplitude [m] and its error; (None, None) without a periodic drive.
 
     The amplitudes of a released or struck rig are not extrapolated, because it comes to rest. Under a drive

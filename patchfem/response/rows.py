@@ -148,22 +148,25 @@ class LastCycles:
                 del measures[name]
         return measures
 
+    def evaluate(self, row: MeasureDefinition) -> float | None:
+        """Return the value of a measure; None if it has none."""
+        if isinstance(row.function, str):
+            return getattr(self, row.function).get(row.name)
+        return row.function(self)
+
     def further_interfaces(self) -> "list[LastCycles]":
         """Return the last cycles of each interface after the first one."""
-        extra = self.window.extra
-        if self.load is None or self.is_single_interface or "slides" not in extra:
+        whole = self.window
+        if self.load is None or self.is_single_interface:
             return []
-
-        slips = extra.get("slips", extra["slides"])
-        count = extra["slides"].shape[1]
         interfaces = []
-        for k in range(1, count):
+        for k in range(1, whole.slides.shape[1]):
             window = replace(
-                self.window,
-                slide=extra["slides"][:, k],
-                slide_rate=extra["slide_rates"][:, k],
-                force=extra["forces"][:, k],
-                slip=slips[:, k],
+                whole,
+                slide=whole.slides[:, k],
+                slide_rate=whole.extra["slide_rates"][:, k],
+                force=whole.forces[:, k],
+                slip=whole.slips[:, k],
             )
 
             # The area is the only measure of the loops of further interfaces, so that they need no harmonics.
@@ -213,7 +216,7 @@ def _random_rows(
         unit,
         floor,
         definition,
-        lambda s: s.random_response_measures.get(name),
+        "random_response_measures",
         group=group,
     )
 
@@ -224,7 +227,7 @@ def _random_rows(
         floor,
         f"half-width of the 95 % interval of {name}: the scatter between "
         "random drives of the same length with different seeds",
-        lambda s: s.random_response_measures.get(scatter),
+        "random_response_measures",
         group=group,
         larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
     )
@@ -284,7 +287,7 @@ ROWS = (
         "m s-2",
         MIN_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
-        lambda s: s.acceleration_measures.get("absolute_acceleration_fundamental"),
+        "acceleration_measures",
         flags="level curve sine",
     ),
     MeasureDefinition(
@@ -293,7 +296,7 @@ ROWS = (
         1e-6,
         "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
         "if the output does not move",
-        lambda s: s.acceleration_measures.get("acceleration_distortion"),
+        "acceleration_measures",
         flags="level curve sine",
     ),
     MeasureDefinition(
@@ -314,7 +317,7 @@ ROWS = (
         1e-10,
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
-        lambda s: s.slip_measures.get("slip_amplitude"),
+        "slip_measures",
         group="friction",
         flags="interface level displacement loop",
         friction_scale=lambda scale: scale.bond_length,
@@ -327,7 +330,7 @@ ROWS = (
         "as a "
         "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
         "patch, or some sliders of law 'iwan', may slip during this time",
-        lambda s: s.slip_measures.get("stick_fraction"),
+        "slip_measures",
         0.35,
         group="friction",
         larger_term=("1", lambda _: 1.0),
@@ -340,7 +343,7 @@ ROWS = (
         "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
         "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
         "starts at different phases of a half cycle",
-        lambda s: s.slip_measures.get("slip_start_phase"),
+        "slip_measures",
         1.0,
         group="friction",
         larger_term=("pi", lambda _: np.pi),
@@ -362,7 +365,7 @@ ROWS = (
         "friction work per cycle in this interface alone (the energy dissipated, if the loop closes); null if the drive "
         "is not periodic and the friction loop does not close, because the interface then stores or returns more energy "
         "than it dissipates",
-        lambda s: s.loop_measures.get("loop_area"),
+        "loop_measures",
         group="energy",
         flags="main interface level loop",
         friction_scale=lambda scale: scale.cycle_work,
@@ -373,7 +376,7 @@ ROWS = (
         1.0,
         "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
         "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
-        lambda s: s.loop_measures.get("equivalent_stiffness"),
+        "loop_measures",
         group="friction",
         larger_term=(
             "magnitude of the complex ratio of the two first harmonics",
@@ -388,7 +391,7 @@ ROWS = (
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
-        lambda s: s.loop_measures.get("secant_stiffness"),
+        "loop_measures",
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
         flags="level sine",
@@ -400,7 +403,7 @@ ROWS = (
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
-        lambda s: s.loop_measures.get("equivalent_damping"),
+        "loop_measures",
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
         flags="level sine loop",
@@ -411,7 +414,7 @@ ROWS = (
         1e-10,
         "work done on all interfaces together over the whole run; with method `harmonic`, "
         "over two cycles",
-        lambda s: s.final_energies.get("friction_work"),
+        "final_energies",
         group="energy",
         flags="run",
         friction_scale=lambda scale: scale.work,
@@ -431,7 +434,7 @@ ROWS = (
         1e-10,
         "energy dissipated by friction in all interfaces over the whole run; with "
         "method `harmonic`, over two cycles",
-        lambda s: s.final_energies.get("energy_dissipated"),
+        "final_energies",
         group="energy",
         flags="run",
         friction_scale=lambda scale: scale.work,
@@ -442,7 +445,7 @@ ROWS = (
         1e-10,
         "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
         "report; with method `harmonic`, over two cycles",
-        lambda s: s.final_energies.get("energy_created"),
+        "final_energies",
         group="energy",
     ),
     MeasureDefinition(
@@ -572,7 +575,7 @@ INTERNAL_ROWS = (
         "N m-1",
         0.0,
         "magnitude of the complex ratio of the first harmonics of friction force and slide",
-        lambda s: s.loop_measures.get("harmonic_force_ratio"),
+        "loop_measures",
         flags="sine",
     ),
 )
@@ -603,10 +606,10 @@ def compute_measures(last_cycles: LastCycles) -> Values:
         if row.name in known:
             values[row.name] = known[row.name]
         elif row.function is not None:
-            values[row.name] = row.function(last_cycles)
+            values[row.name] = last_cycles.evaluate(row)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
-            values[add_interface_number(name, number)] = TABLE[name].function(interface)
+            values[add_interface_number(name, number)] = interface.evaluate(TABLE[name])
     return {name: value for name, value in (values | known).items() if value is not None}
 
 

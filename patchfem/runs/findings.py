@@ -207,7 +207,7 @@ def _advise_strips(patch_model, excess: Mapping) -> Advice:
 
 
 def _advise_mesh(
-    missed: Missed, solved: list, name: str = "mesh of the motion", *, is_at_limit: bool = False
+    missed: Missed, solved, name: str = "mesh of the motion", *, is_at_limit: bool = False
 ) -> Advice:
     """Return the advice to refine the meshes of one or more interfaces.
 

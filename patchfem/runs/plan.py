@@ -6,6 +6,7 @@ automatic mesh is graded, and for the patch of a joint that was bolted when the 
 
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Any
 
 from ..core import PatchfemError
 from ..effects import EFFECTS, law_has_trait
@@ -67,7 +68,7 @@ class Plan:
     engine: str
     unknowns: dict[str, int]
     samples: int
-    chain: dict
+    chain: of_rig.Chain
     groups: Values
     verdict: tuple[str, ...]
 
@@ -77,12 +78,12 @@ class Plan:
         return self.model.kind
 
     @property
-    def effects(self) -> tuple:
+    def effects(self) -> tuple[str, ...]:
         """Names of the effects in the scene."""
         return self.model.source.effects
 
     @property
-    def not_in_scene(self) -> tuple:
+    def not_in_scene(self) -> tuple[str, ...]:
         """Names of the effects that the scene does not contain."""
         return self.model.absent
 
@@ -96,11 +97,11 @@ class Plan:
         ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
-    def modes(self, chain: dict) -> list:
+    def modes(self, chain: of_rig.Chain) -> list[dict[str, str | float | None]]:
         """Return name, free and stuck frequency [Hz] of each mode of a rig."""
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
-    def as_json(self) -> dict:
+    def as_json(self) -> dict[str, Any]:
         """Return the plan as the object that `patchfem plan --json` prints."""
         return {
             "kind": self.kind,
@@ -228,7 +229,7 @@ def _make_plan(model: Model) -> Plan:
     )
 
 
-def _interface_stiffnesses(model: Model) -> dict:
+def _interface_stiffnesses(model: Model) -> of_rig.Chain:
     """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
     load = model.nominal_load
     if not load > 0:

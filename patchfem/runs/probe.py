@@ -3,7 +3,7 @@
 In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each setting.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..response import rows
 from .plan import Plan
@@ -26,7 +26,7 @@ class Probe(NamedTuple):
     static: dict[str, float]
     sentences: tuple[str, ...]
 
-    def as_json(self) -> dict:
+    def as_json(self) -> dict[str, Any]:
         """Return the static measures with the times and sentences, as `plan --probe --json` prints them."""
         return self.static | {"seconds": self.seconds, "sentences": list(self.sentences)}
 

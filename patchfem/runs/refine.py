@@ -6,7 +6,7 @@ patches or the steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_
 tolerance within accuracy.max_seconds is not repeated.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from math import ceil, log
 from typing import NamedTuple, TypeVar
@@ -45,7 +45,7 @@ class Verdict(NamedTuple):
     """
 
     excess: float
-    finer: object = None
+    finer: Hashable = None
     seconds: float = 0.0
     reason: str = ""
 

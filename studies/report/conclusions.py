@@ -27,7 +27,7 @@ from figures_2_3 import STICK_SPEED, exact_cycle, newmark_run
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.response import compute_harmonic
+from patchfem.response.measures import compute_harmonic
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -111,4 +111,4 @@ def test_refuses_invalid_modes(scene, modes, message):
 )
 def test_exact_span_of_missing_amplitudes_names_no_place_twice(amplitudes, words_of_span):
     """Amplitudes without a result lie between two places, or at one if both ends are the same in print."""
-    assert words._describe_span(np.array(amplitudes)) == words_of_span
+    assert words.describe_span(np.array(amplitudes)) == words_of_span

@@ -9,7 +9,8 @@ import pytest
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import run
-from patchfem.response import compute_harmonic, loops
+from patchfem.response import loops
+from patchfem.response.measures import compute_harmonic
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA

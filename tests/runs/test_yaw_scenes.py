@@ -6,6 +6,7 @@ from scene_texts import DRIVE, MODE, PIECE
 from yielding_points import solve_all_points
 
 from patchfem import load
+from patchfem.export.run_data import collect_data
 from patchfem.runs.run import run
 
 SHEARED_TEXT = (
@@ -67,5 +68,6 @@ def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law):
         np.testing.assert_allclose(extra["forces"][:, k], force, atol=1e-9 * peak_force)
     np.testing.assert_allclose(extra["yaw_moment"], extra["forces"] @ y, atol=1e-15)
     assert np.abs(extra["yaw_moment"]).max() > 0.05
+    np.testing.assert_array_equal(collect_data(result)["yaw_moment"].values, extra["yaw_moment"])
     assert result.measures["energy_balance"].value < 1e-10
     assert "shear_stress" not in result.fields and any("no common" in note for note in result.notes)

@@ -73,7 +73,7 @@ def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[st
         ]
     return [
         f"method {method}: no force in phase resonance was found at {missing.size} of {curve.amplitude.size} amplitudes, "
-        f"{_describe_span(missing)}"
+        f"{describe_span(missing)}"
     ]
 
 
@@ -85,11 +85,11 @@ def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
         return []
     return [
         f"method {method}: {count} of {amplitudes.size} amplitudes have a result; those without lie "
-        f"{_describe_span(missing)}: {REASONS_OF_GAPS[method]}"
+        f"{describe_span(missing)}: {REASONS_OF_GAPS[method]}"
     ]
 
 
-def _describe_span(amplitudes) -> str:
+def describe_span(amplitudes) -> str:
     """Return where amplitudes (k,) [m] in increasing order lie: from the first to the last, or at one place."""
     first, last = (format_length(amplitudes[k], 3) for k in (0, -1))
     return f"at {first}" if first == last else f"from {first} to {last}"

@@ -87,7 +87,7 @@ def solve_models(
     return results
 
 
-def _forward_result(on_result: Callable, case_indices: Sequence[int], index: int, result) -> None:
+def _forward_result(on_result, case_indices: Sequence[int], index: int, result) -> None:
     """Call `on_result` with the index of a case in the whole study."""
     on_result(case_indices[index], result)
 
@@ -95,7 +95,7 @@ def _forward_result(on_result: Callable, case_indices: Sequence[int], index: int
 def _solve_group(
     group: Hashable | None,
     models: Sequence[Model],
-    solve_one_by_one: Callable,
+    solve_one_by_one: Callable[[Sequence[Model]], CaseResults],
     report: Callable | None,
 ) -> CaseResults:
     """Compute the results of a group together, or by single runs if it is None or if this fails."""

@@ -5,7 +5,7 @@ In: the models of the cases. Out: models with common meshes, fine enough for the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import replace
 
 from ...core import PatchfemError
@@ -51,7 +51,9 @@ class SharedMeshes:
         return replace(model, patch=model.patch.with_mesh(shared=meshes))
 
 
-def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
+def with_shared_meshes(
+    models: Sequence[Model | PatchfemError],
+) -> list[Model | PatchfemError]:
     """Return the models with common meshes for patches of the same geometry.
 
     A patch whose geometry occurs only once keeps the mesh of its single run.
@@ -70,6 +72,6 @@ def _may_share_meshes(model: Model | PatchfemError) -> bool:
     return model.patch.mesh.shared is None
 
 
-def _mesh_key(model: Model) -> tuple:
+def _mesh_key(model: Model) -> tuple[Hashable, float]:
     """Return the hashable key of a model's common mesh: patch geometry and tolerance."""
     return sweep_meshes.geometry_key(model.patch), model.accuracy.tolerance

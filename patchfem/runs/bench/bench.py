@@ -14,10 +14,10 @@ from ...response.loops import (
     interface_loop,
     mean_half_range,
     reversal_force_rule,
+    sample_loop,
     secant_stiffness,
 )
 from ...response.measures import (
-    compute_harmonic,
     compute_ledger_measures,
     compute_step_harmonic,
     work_difference,
@@ -177,11 +177,6 @@ def _compute_loop_measures(
     force = histories.force[cycle_start:]
     work = histories.ledger[0, cycle_start:]
 
-    # Weights of the trapezoidal rule [s] for the harmonics at unequal steps.
-    weight = np.zeros(time.size)
-    weight[1:] += np.diff(time) / 2
-    weight[:-1] += np.diff(time) / 2
-
     # The work of a step defines its mean force, dW/du; a step at rest has the mean of its ends.
     moves = np.diff(slide)
     mean_force = (force[1:] + force[:-1]) / 2
@@ -197,13 +192,9 @@ def _compute_loop_measures(
     )
 
     # Without a mode there is no stiffness that damping could refer to, hence the 0.
-    measures = interface_loop(
-        mean_half_range(reversals),
-        compute_harmonic(time, weight, slide - slide.mean(), omega),
-        compute_step_harmonic(time, means, omega),
-        work[-1] - work[0],
-        0.0,
-    )
+    harmonic = compute_step_harmonic(time, means, omega)
+    loop = sample_loop(time, slide, harmonic, omega, work[-1] - work[0])
+    measures = interface_loop(mean_half_range(reversals), *loop, 0.0)
     secant = secant_stiffness(reversals)
     if secant is not None:
         measures["secant_stiffness"] = secant

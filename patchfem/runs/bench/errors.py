@@ -67,7 +67,7 @@ class BenchErrors(NamedTuple):
     step_runs: list[StepRun]
 
 
-def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) -> BenchErrors:
+def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> BenchErrors:
     """Estimate the errors of a bench run from coarser runs.
 
     Parameters
@@ -118,7 +118,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     return BenchErrors(errors, seconds, step_runs)
 
 
-def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list[CoarserRuns]:
+def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]:
     """List the coarser runs from which the errors of a bench run are estimated.
 
     Two runs have half and a quarter of the steps. Further runs with a quarter of the steps have,

@@ -60,6 +60,8 @@ def run_prescribed(inputs: RunInputs) -> Result:
     peak_ratio = None
     if model.friction.static > 0 and not model.load_varies:
         peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static
+
+    # What the law shows in this motion decides on its warnings and notes.
     facts = LawFacts(
         model,
         patch,

@@ -4,7 +4,7 @@ In: solved patches. Out: `Face`s, and findings that name the interfaces to which
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +28,10 @@ class Face(NamedTuple):
     number: int
     name: str
     model: object
-    patches: tuple
+    patches: Sequence
     fields: dict | None = None
-    static: tuple = ()
-    unworn: tuple = ()
+    static: Sequence = ()
+    unworn: Sequence = ()
 
     @property
     def patch(self):
@@ -59,11 +59,12 @@ class Face(NamedTuple):
 
     def slide(self, response) -> np.ndarray:
         """Return the relative displacement (k,) [m] of the interface in a Response."""
-        slides = response.extra.get("slides")
-        return slides[:, self.number] if self.name and slides is not None else response.slide
+        return response.slides[:, self.number] if self.name else response.slide
 
 
-def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> list[str]:
+def merge_sentences(
+    model, faces: Iterable[Face], list_sentences: Callable[[Face], Iterable[str]]
+) -> list[str]:
     """Merge sentences that are equal for several interfaces, and name these interfaces.
 
     Parameters
@@ -79,7 +80,9 @@ def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> l
     return [finding.words for finding in findings]
 
 
-def merge_findings(model, faces: Iterable[Face], list_findings: Callable) -> list[Finding]:
+def merge_findings(
+    model, faces: Iterable[Face], list_findings: Callable[[Face], Iterable[Finding]]
+) -> list[Finding]:
     """Merge findings that are equal for several interfaces, and name these interfaces.
 
     Scene keys are written as they occur in the scene.

@@ -6,8 +6,8 @@ in which the pieces leave the contact.
 
 import numpy as np
 
+from ...core import Outcome
 from ...formatting import format_length
-from ...response.outcome import check_piece_length
 
 # Largest ratio of displacement to contact length at which the unchanged pressure is accurate.
 MAX_SLIDE_FRACTION = 0.1
@@ -65,4 +65,7 @@ def check_pieces_overlap(outcome, patch_model, patch, slide):
         return outcome
     pieces = patch_model.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    return check_piece_length(outcome, find_max_displacement(slide), mean_length)
+    # The displacement of a motion that did not converge has no meaning.
+    if find_max_displacement(slide) > mean_length and outcome is not Outcome.NOT_CONVERGED:
+        return Outcome.LEAVES_CONTACT
+    return outcome

@@ -150,7 +150,7 @@ def compute_holding_force(rig) -> float:
         return inf
 
 
-def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> bool:
+def is_bond_list_too_long(model: Model, numerics: Numerics, counters) -> bool:
     """Return whether the bond list is too long to halve the time step once more.
 
     This is the case if it gets a strip every few steps. Bonds that grow leave a strip in each step

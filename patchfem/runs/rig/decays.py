@@ -15,6 +15,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
+from ...response.coarser import ComparisonRuns
 from ...response.decay_curve import (
     MIN_HALF_CYCLE,
     DecayCurve,
@@ -94,7 +95,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
-def make_laws_on_mesh(model, patch, meshed: tuple = ()):
+def make_laws_on_mesh(model, patch, meshed=()) -> forces.LawGroup:
     """Return the friction laws of a rig, discretized on one of the meshes of its patches.
 
     Parameters
@@ -127,7 +128,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     )
 
 
-def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list:
+def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list[forces.LawGroup]:
     """Return a list of friction laws of a rig, each with one patch on its coarser mesh.
 
     Parameters
@@ -180,7 +181,7 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
     return tabulate_static_motions(modes, motions)
 
 
-def tabulate_static_motions(modes, motions: list) -> np.ndarray:
+def tabulate_static_motions(modes, motions) -> np.ndarray:
     """Return amplitude, frequency, damping ratio, loss and force (5, k) of quasi-static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
@@ -218,7 +219,7 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     )
 
 
-def _spread_elements(stiffness, slide) -> tuple:
+def _spread_elements(stiffness, slide) -> tuple[np.ndarray, np.ndarray]:
     """Spread friction elements at mesh nodes over the yield displacements between the nodes."""
     order = np.argsort(slide, kind="stable")
     return spread_elements(stiffness[order], slide[order])
@@ -325,7 +326,7 @@ def estimate_stuck_mode_mesh_errors(
     return DecayMeshErrors(_interpolate_over_amplitude(amplitude, at, errors), reason)
 
 
-def describe_unknown_mesh_error(reason: str, coarser_runs: list) -> str:
+def describe_unknown_mesh_error(reason: str, coarser_runs: ComparisonRuns) -> str:
     """Return a sentence on a decay curve whose mesh error is unknown.
 
     Parameters

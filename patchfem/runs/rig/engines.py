@@ -29,6 +29,7 @@ from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import prefers_time_steps
+from .solution import first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 MERGE_WIDTH_FACTOR = 0.5
@@ -187,7 +188,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
     def bound_errors(values: Values) -> Values:
         """Return the errors of the measures due to truncation of the sum over bonds."""
         friction = model.friction
-        load = patch.pressure.load if patch is not None else model.point.load
+        load = first_interface_load(model, patch)
         window = solution.window
         passed = np.abs(np.diff(window.extra["ledger"][0])).sum()
         span = max(window.time[-1] - window.time[0], 1e-300)
@@ -200,6 +201,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
         )
         return friction_errors(values, choice.error, scale)
 
+    # The change of the motion adds to the bound where strips or the tail are coarse.
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
         finer = replace(

@@ -6,7 +6,7 @@ quantities that their engine computes more accurately than from samples.
 
 import numpy as np
 
-from ...core import IntegratedMeasures, Outcome
+from ...core import Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response.events import is_all_stuck
@@ -34,7 +34,7 @@ class RunEvaluator:
     """Evaluation of the runs of a model that one engine has computed.
 
     The base class computes all measures from samples of the histories. Subclasses return more
-    accurate values of their engine by `compute_integrated_measures` and `collect_cycle_data`.
+    accurate values of their engine by `describe_cycles`.
 
     Parameters
     ----------
@@ -68,21 +68,7 @@ class RunEvaluator:
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 
-    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the measures that the engine integrates over the last cycles.
-
-        Parameters
-        ----------
-        run
-            Run of the engine, with all cycles or with those of a drive level.
-        drive
-            Drive of the run.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        return IntegratedMeasures()
-
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
+    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
 
         Parameters
@@ -112,16 +98,12 @@ class RunEvaluator:
         """
         model = self.model
         drive = drive or model.rig.drive.signal
-        fields = {
-            "window": run.window,
-            "run_energies": run.ledger,
-            "integrated": self.compute_integrated_measures(run, drive, stuck=stuck),
-        }
+        fields = {"window": run.window, "run_energies": run.ledger}
         if self.has_friction:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
 
         # What the engine knows better replaces what follows from samples.
-        fields |= self.collect_cycle_data(run, drive, stuck=stuck)
+        fields |= self.describe_cycles(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.extremes))
         last_cycles = LastCycles(
@@ -258,9 +240,8 @@ def compute_sampled_work(response) -> Values:
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
     """
-    slides = response.extra.get("slides", response.slide[:, None])
-    forces = response.extra.get("forces", response.force[:, None])
-    parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
+    pairs = zip(response.slides.T, response.forces.T)
+    parts = [path_work.sampled_work(slide, force) for slide, force in pairs]
     sampled = sum(float(part.sum()) for part in parts)
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 

@@ -374,7 +374,7 @@ class LumpedEvaluator(RunEvaluator):
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
 
-        slides = response.extra.get("slides", response.slide[:, None])
+        slides = response.slides
         at = np.searchsorted(response.time, times)
 
         # Between two reversals all elements move alike, so that the reversals determine their stretches.
@@ -396,10 +396,11 @@ class LumpedEvaluator(RunEvaluator):
             for number, k in enumerate(at)
         ]
 
-    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the measures of the engine.
 
-        Strips that slide independently have a single loop of their mean displacement, which is that of samples.
+        Strips that slide independently are parts of a single interface, whose loop of the mean displacement is that of
+        samples.
 
         Parameters
         ----------
@@ -415,18 +416,29 @@ class LumpedEvaluator(RunEvaluator):
         }
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
+        window = run.window
         if self.has_friction:
             values |= self._limit_loop_measures(run)
-            work = run.window.extra["ledger"][0]
-            energies = run.ledger | compute_sampled_work(run.window)
+            work = window.extra["ledger"][0]
+            energies = run.ledger | compute_sampled_work(window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
-        if self.strips_slide_apart:
-            names = ["slip_start_phase", "energy_stored"]
-            for group in STRIP_GROUPS:
-                names += select_names(group)
-            return IntegratedMeasures({name: values.get(name) for name in names})
-        values.pop("energy_stored", None)
-        return IntegratedMeasures(values)
+        if not self.strips_slide_apart:
+            values.pop("energy_stored", None)
+            return {"integrated": IntegratedMeasures(values)}
+
+        names = ["slip_start_phase", "energy_stored"]
+        for group in STRIP_GROUPS:
+            names += select_names(group)
+        # The yaw does work in addition to that of the mean displacement.
+        work = np.ptp(window.extra["ledger"][0, [0, -1]])
+        cycles = (window.time[-1] - window.time[0]) / drive.period
+        return {
+            "integrated": IntegratedMeasures({name: values.get(name) for name in names}),
+            "is_single_interface": True,
+            "loop": compute_sampled_loop(window, drive, float(work / cycles)),
+            # The other measures need samples of equal distances.
+            "window": window.select(find_numbers(window)[1]),
+        }
 
     def _limit_loop_measures(self, run) -> dict[str, None]:
         """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
@@ -437,29 +449,6 @@ class LumpedEvaluator(RunEvaluator):
         elif not first_mode_stiffness(self.model, run.window):
             missing = {"equivalent_damping": None}
         return missing
-
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
-        """Return the loop of strips that slide independently, which are parts of a single interface.
-
-        Parameters
-        ----------
-        run : LumpedRun
-            Run of the engine `hybrid`.
-        drive
-            Drive of this run, which may be a single level.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        if not self.strips_slide_apart:
-            return {}
-        # The yaw does work in addition to that of the mean displacement.
-        window = run.window
-        work = np.ptp(window.extra["ledger"][0, [0, -1]])
-        cycles = (window.time[-1] - window.time[0]) / drive.period
-        loop = compute_sampled_loop(window, drive, float(work / cycles))
-        # The other measures need samples of equal distances.
-        even = window.select(find_numbers(window)[1])
-        return {"is_single_interface": True, "loop": loop, "window": even}
 
     def collect_solution_fields(self, run, drive) -> Fields:
         """Return the vibration of a release after its last slip, in which the rig is linear."""
@@ -472,8 +461,7 @@ class LumpedEvaluator(RunEvaluator):
         # The part of the motion in which no interface slips.
         motion = run.response
         if not is_linear:
-            slips = motion.extra.get("slips", motion.slip[:, None])
-            moves = np.abs(np.diff(slips, axis=0)).max(axis=1) > 0
+            moves = np.abs(np.diff(motion.slips, axis=0)).max(axis=1) > 0
             last = np.flatnonzero(moves)[-1] + 1 if moves.any() else 0
             motion = motion.select(motion.time >= motion.time[last])
         vibration = []

@@ -12,9 +12,11 @@ from ...dynamics import limit_cycles
 from ...effects import law_has_trait
 from ...formatting import format_length
 from ...model.rig import MAX_TRAVEL
+from ...response.measures import Measures
 from ...response.rows import TABLE
 from .engines import find_obstacle_of_map
 from .interface import make_single_law
+from .solution import first_interface_load
 from .steady.balance import BalanceFinder
 
 FLUTTER_MEASURE = "flutter_amplitude"
@@ -42,12 +44,15 @@ NO_SLIDING_NOTE = (
 RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
 
 
-def compute_flutter_amplitude(run) -> tuple:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig.
+class Flutter(NamedTuple):
+    """Amplitude of the largest unstable limit cycle by the name of its measure, or the reason of its absence; and notes."""
 
-    The result is a dict with the measure, which has a value and an error or a reason, and a list of
-    notes.
-    """
+    measures: Measures
+    notes: list[str]
+
+
+def compute_flutter_amplitude(run) -> Flutter:
+    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig."""
     model = run.model
     unit = TABLE[FLUTTER_MEASURE].unit
     floor = TABLE[FLUTTER_MEASURE].floor
@@ -63,7 +68,8 @@ def compute_flutter_amplitude(run) -> tuple:
 
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
     if not unstable_cycles:
-        return {FLUTTER_MEASURE: Measure(None, unit, None, floor, reason=reason)}, end_notes
+        missing = Measure(None, unit, None, floor, reason=reason)
+        return Flutter({FLUTTER_MEASURE: missing}, end_notes)
     limit = unstable_cycles[-1]
 
     # Motions below the unstable cycle approach the largest stable one inside it, or decay.
@@ -84,13 +90,15 @@ def compute_flutter_amplitude(run) -> tuple:
     else:
         decay_text += " decays"
 
-    return {FLUTTER_MEASURE: Measure(limit.amplitude, unit, limit.error, floor)}, [
+    measure = Measure(limit.amplitude, unit, limit.error, floor)
+    notes = [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
         f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / tau:.4g} "
         "Hz; a free oscillation of "
         f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,
     ]
+    return Flutter({FLUTTER_MEASURE: measure}, notes)
 
 
 class LimitCycles(NamedTuple):
@@ -102,7 +110,7 @@ class LimitCycles(NamedTuple):
       amplitudes.
     """
 
-    cycles: list
+    cycles: list[limit_cycles.LimitCycle]
     reason: str
     smallest_amplitude: float = 0.0
 
@@ -119,7 +127,6 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_INTERFACE_NOTE)
 
-    load = patch.pressure.load if patch is not None else model.point.load
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
 
@@ -138,7 +145,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         # All other laws have smooth loops, which harmonic balance finds.
         finder = BalanceFinder(model, numerics, patch)
         cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
-            modes, finder.group, row, f.static * load
+            modes, finder.group, row, f.static * first_interface_load(model, patch)
         )
         reason = NO_SMALLER_CYCLE_NOTE if smallest_amplitude else NO_CYCLE_NOTE
         return LimitCycles(cycles, reason, smallest_amplitude)

@@ -32,8 +32,8 @@ class Joints(NamedTuple):
     - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
     """
 
-    laws: tuple = ()
-    elements: tuple = ()
+    laws: tuple[tuple[LawNumbers, Load], ...] = ()
+    elements: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     contact: "joints.Joint | None" = None
     stick_tolerance: float = 0.0
 

@@ -51,7 +51,7 @@ class Joint(NamedTuple):
         return element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
 
 
-def list_joints(model: Model, patch, meshed: tuple = ()) -> list[Joint]:
+def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     """Return the interfaces of a rig, or the strips of its patch that slide apart.
 
     Parameters

@@ -13,6 +13,7 @@ import numpy as np
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
+from ...response.loops import CycleLoop
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
@@ -22,7 +23,6 @@ from .bond_lists import choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import (
-    CycleLoop,
     Fields,
     Solution,
     compute_sampled_loop,
@@ -124,27 +124,6 @@ class MarchEvaluator(RunEvaluator):
             return None
         return choose_bond_summation(self.model, self.numerics)
 
-    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the check of the friction work, and the measures of a stuck interface.
-
-        Parameters
-        ----------
-        run : points.time_march.Motion
-            Motion in time steps.
-        drive
-            Drive of this motion, which may be a single level.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        if not self.has_friction:
-            return IntegratedMeasures()
-        book = self._compute_energies(run, drive, stuck=stuck)
-        values = {"work_check": compute_work_check(book)}
-        if stuck and self.contact.set_valued:
-            # The remaining motion of a stuck interface is round-off, not slip.
-            values |= {"slip_start_phase": None, "stick_fraction": 1.0}
-        return IntegratedMeasures(values)
-
     def _compute_energies(self, run, drive, *, stuck: bool) -> Values:
         """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
 
@@ -156,8 +135,8 @@ class MarchEvaluator(RunEvaluator):
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         return run.ledger | {"power": run.ledger["power"] + moving}
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
-        """Return the friction loop and the energies of the last cycles.
+    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
+        """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
 
         Parameters
         ----------
@@ -170,8 +149,14 @@ class MarchEvaluator(RunEvaluator):
         """
         if not self.has_friction:
             return {}
+        energies = self._compute_energies(run, drive, stuck=stuck)
+        values = {"work_check": compute_work_check(energies)}
+        if stuck and self.contact.set_valued:
+            # The remaining motion of a stuck interface is round-off, not slip.
+            values |= {"slip_start_phase": None, "stick_fraction": 1.0}
         return {
-            "run_energies": self._compute_energies(run, drive, stuck=stuck),
+            "integrated": IntegratedMeasures(values),
+            "run_energies": energies,
             "loop": self._compute_loop(run, drive),
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
             "is_single_interface": self.model.rig.friction.strips_slide_apart,

@@ -176,9 +176,8 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     is_found = ENGINES[run.numerics.engine].finds_periodic_motion
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
-    window = run.solution.window
-    slides = window.extra.get("slides", window.slide[:, None])
-    for (_, yields), slide in zip(list_elements(run.model, run.numerics, run.patch), slides.T):
+    slides = run.solution.window.slides.T
+    for (_, yields), slide in zip(list_elements(run.model, run.numerics, run.patch), slides):
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2
         if largest_yield > amplitude:

@@ -54,7 +54,7 @@ class Numerics:
     whole: bool = True
     local: float = 0.0
     other_rig: int | None = None
-    meshed: tuple = ()
+    meshed: tuple[int, ...] = ()
     coarse_patch: bool = False
     stiffer_joint: bool = False
 

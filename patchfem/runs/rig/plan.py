@@ -10,6 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...model.model import Model
+from ...response.measures import Values
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
@@ -26,7 +27,7 @@ MIN_STIFF_LINK_RATIO = 10.0
 Chain = dict[str, float | str]  # stiffness [N/m] of each link by name, or why it has none
 
 
-def structure_stiffnesses(rig) -> dict:
+def structure_stiffnesses(rig) -> Chain:
     """Return a dict of the stiffnesses [N/m] of the structure in the stiffness chain."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
@@ -74,7 +75,7 @@ def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     return stiffness
 
 
-def mode_frequencies(rig, chain: Chain) -> list:
+def mode_frequencies(rig, chain: Chain) -> list[dict[str, str | float | None]]:
     """Return name, free and stuck frequency [Hz] of each mode as a list of dicts.
 
     The stuck frequency is that with stuck interfaces. It is None without friction and if no link of
@@ -97,7 +98,7 @@ def mode_frequencies(rig, chain: Chain) -> list:
     return frequencies
 
 
-def count_unknowns(model: Model) -> dict:
+def count_unknowns(model: Model) -> dict[str, int]:
     """Count the unknowns of a rig: modes, and for time steps the entries of a list of bonds or the shear modes."""
     counts = {"modes": len(model.rig.structure.frequencies)}
     numerics = choose_numerics(model)
@@ -114,7 +115,7 @@ def count_unknowns(model: Model) -> dict:
     return counts
 
 
-def compute_dimensionless_groups(model: Model) -> dict:
+def compute_dimensionless_groups(model: Model) -> Values:
     """Return a dict of the dimensionless groups of the motion of a rig.
 
     - D: ratio of the static friction limit to the largest force of the drive, both as they act on
@@ -155,7 +156,7 @@ def compute_dimensionless_groups(model: Model) -> dict:
     return sizes
 
 
-def find_drive_and_knee(model: Model) -> dict:
+def find_drive_and_knee(model: Model) -> Values:
     """Return a dict with the drive and the largest drive at which friction bounds the resonance.
 
     The keys are "drive" and "knee", both accelerations of the base [m s-2]. The dict is empty
@@ -190,7 +191,7 @@ def _find_participation_ratio(rig) -> float:
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
-def describe_stick(rig, sizes: dict, chain: Chain) -> list[str]:
+def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
     """Describe in sentences for a plan whether friction stops a driven block.
 
     For a single mode, they say from D whether the block sticks, and whether friction bounds its

@@ -148,6 +148,8 @@ def run_rig(inputs: RunInputs) -> Result:
     fields = {}
     if inputs.patch is not None:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
+
+    # Interfaces with patches of their own have fields of their own.
     moved = ()
     if model.has_interface_patches:
         snapshots = [one for one in solution.snapshots if isinstance(one, ElementSnapshot)]

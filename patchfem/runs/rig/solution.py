@@ -3,16 +3,21 @@
 In: a run of an engine. Out: `Solution`, and friction loop, load and stiffness of the last cycles.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
 from ...response.decay_curve import measure_last_cycle_amplitude
-from ...response.measures import Measures, Values, compute_harmonic, measure_half_range
+from ...response.events import Events
+from ...response.levels import Level
+from ...response.loops import CycleLoop, sample_loop
+from ...response.measures import Measures, Values, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
+from ...response.ringing import VibratingMode
 from ...response.rows import AMPLITUDE, STEADY_AMPLITUDE
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 from ..results.result import Settings, SteadyData
@@ -62,27 +67,27 @@ class Solution:
     response: Response
     window: Response
     amplitudes: np.ndarray
-    steady: tuple
+    steady: tuple[float | None, float | None]
     outcome: Outcome | None
-    snapshots: list
+    snapshots: Sequence
     book: Values
     seconds: float
     contact: object = None
     prepare: Values | None = None
     message: str = ""
-    levels: tuple = ()
+    levels: tuple[Level, ...] = ()
     run_level: object = None
-    log: object = None
+    log: Events | None = None
     notes: tuple[str, ...] = ()
     stick_tolerance: float = 0.0
     run_errors: Values = field(default_factory=dict)
     errors: Values | None = None
     bond_summation: object = None
-    coarser: tuple = ()
+    coarser: "tuple[tuple[Solution, Solution | None], ...]" = ()
     extremes: np.ndarray | None = None
     drive: SineDrive | None = None
     peak_error: float = np.nan
-    tail: object = None
+    tail: VibratingMode | None = None
     settings: Settings = field(default_factory=Settings)
     periodic: SteadyData | None = None
 
@@ -104,18 +109,6 @@ def describe_escape(rig, travel: float) -> str:
         f"beyond a displacement of {format_length(travel, 3)} the motion grows without limit, because the force of the "
         "softening spring no longer pulls the block back; the run ended there"
     )
-
-
-class CycleLoop(NamedTuple):
-    """First harmonics and work of the friction loop of one cycle.
-
-    - slide, force: first harmonics of relative displacement [m] and friction force [N].
-    - work: friction work per cycle [J].
-    """
-
-    slide: complex
-    force: complex
-    work: float
 
 
 def replace_output_by_gauge(model, solution: Solution) -> Solution:
@@ -180,7 +173,7 @@ def first_interface_load(model, patch) -> float | None:
     """Return the normal load [N] on the first interface; None without friction."""
     if model.friction is None:
         return None
-    return patch.pressure.load if patch is not None else model.point.load
+    return model.point.load if patch is None else patch.pressure.load
 
 
 def first_mode_stiffness(model, window) -> float:
@@ -194,10 +187,8 @@ def first_mode_stiffness(model, window) -> float:
     return first_mode.stiffness
 
 
-def compute_sampled_loop(
-    window, drive, work: float, force: complex | None = None
-) -> CycleLoop | None:
-    """Compute the friction loop from samples by the trapezoidal rule.
+def compute_sampled_loop(window, drive, work: float, force=None) -> CycleLoop | None:
+    """Compute the friction loop of the last cycles from samples; None if they contain no complete cycle.
 
     Parameters
     ----------
@@ -209,22 +200,11 @@ def compute_sampled_loop(
         Friction work per cycle [J].
     force : complex, optional
         First harmonic of the force [N], if it is known more accurately.
-
-    Returns
-    -------
-    CycleLoop or None
-        None if the window contains no complete cycle.
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
-    step = np.diff(window.time)
-    weight = np.append(step, 0.0) + np.append(0.0, step)
-    omega = find_drive_omega(drive)
-    mean = np.average(window.slide, weights=weight)
-    slide = compute_harmonic(window.time, weight, window.slide - mean, omega)
-    if force is None:
-        force = compute_harmonic(window.time, weight, window.force, omega)
-    return CycleLoop(slide, force, work)
+    force = window.force if force is None else force
+    return sample_loop(window.time, window.slide, force, find_drive_omega(drive), work)
 
 
 def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:

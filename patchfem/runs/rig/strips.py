@@ -43,15 +43,12 @@ def average_histories_over_strips(response, loads, offsets):
     offsets : (s,)
         Lateral positions y of the strips [m].
     """
-    extra = response.extra
     weights = np.asarray(loads) / np.sum(loads)
-    slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
-    slips = extra.get("slips", slides)
     return replace(
         response,
-        slide=slides @ weights,
-        slide_rate=rates @ weights,
-        force=forces.sum(axis=1),
-        slip=slips @ weights,
-        extra=extra | {"yaw_moment": forces @ np.asarray(offsets)},
+        slide=response.slides @ weights,
+        slide_rate=response.extra["slide_rates"] @ weights,
+        force=response.forces.sum(axis=1),
+        slip=response.slips @ weights,
+        extra=response.extra | {"yaw_moment": response.forces @ np.asarray(offsets)},
     )

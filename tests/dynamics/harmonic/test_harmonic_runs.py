@@ -16,7 +16,7 @@ from patchfem.dynamics import (
     trace_over_frequency,
 )
 from patchfem.dynamics.harmonic.laws import Jenkins
-from patchfem.response import compute_harmonic, compute_peak, interface_loop
+from patchfem.response import compute_peak, interface_loop, sample_loop
 from patchfem.response.measures import compute_slip_measures
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -50,19 +50,14 @@ def test_exact_measures_agree_with_marched_scene(law):
         tolerance=1e-5,
     )
     response = make_cycle_response(p, modes, drive, 1000)
-    dt = np.full(1001, drive.period / 1000)
-    dt[[0, -1]] /= 2
-    q, f = (
-        compute_harmonic(response.time, dt, v, drive.omega)
-        for v in (response.slide, response.force)
-    )
-    work = float(dt @ (response.force * response.slide_rate))
+    work = float(np.trapezoid(response.force * response.slide_rate, response.time))
+    loop = sample_loop(response.time, response.slide, response.force, drive.omega, work)
     values = {
         "relative_displacement_amplitude": p.amplitude(modes.output),
         "absolute_acceleration_peak": compute_peak(response.acceleration),
         "friction_force_peak": np.abs(response.force).max(),
         **compute_slip_measures(response, drive, 1000),
-        **interface_loop(np.ptp(response.slide) / 2, q, f, work, modes.mass * modes.omega[0] ** 2),
+        **interface_loop(np.ptp(response.slide) / 2, *loop, modes.mass * modes.omega[0] ** 2),
     }
     for name, tolerance in (
         ("relative_displacement_amplitude", 1e-3),

@@ -65,8 +65,8 @@ class CycleRun(NamedTuple):
 class BalanceEvaluator(RunEvaluator):
     """Evaluation of one cycle of a motion from harmonic balance."""
 
-    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the check of the friction work, and the measures that depend on reversals.
+    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
+        """Return the friction loop, the check of the friction work, and the measures that depend on reversals.
 
         A periodic motion has no drift.
 
@@ -79,31 +79,19 @@ class BalanceEvaluator(RunEvaluator):
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
+        work = run.ledger["friction"]
+        fields = {"loop": compute_sampled_loop(run.window, drive, work)}
         values = {"drift_per_cycle": 0.0}
-        if not self.has_friction:
-            return IntegratedMeasures(values)
-        book = run.ledger | {"booked": run.ledger["friction"]}
-        values["work_check"] = compute_work_check(book | compute_sampled_work(run.window))
-        if not run.reversals:
-            return IntegratedMeasures(values)
-        slides, forces, slips = zip(*run.reversals)
-        values["friction_force_peak"] = float(np.abs([*forces, *run.window.force]).max())
-        values["slip_amplitude"] = float(np.ptp([*slips, *run.window.slip])) / 2
-        return IntegratedMeasures(values, reversals=(tuple(zip(slides, forces)),))
-
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
-        """Return the friction loop of the cycle.
-
-        Parameters
-        ----------
-        run : CycleRun
-            One cycle of the steady motion.
-        drive
-            Sine that drives the cycle.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        return {"loop": compute_sampled_loop(run.window, drive, run.ledger["friction"])}
+        pairs = ()
+        if self.has_friction:
+            book = run.ledger | {"booked": work}
+            values["work_check"] = compute_work_check(book | compute_sampled_work(run.window))
+        if self.has_friction and run.reversals:
+            slides, forces, slips = zip(*run.reversals)
+            values["friction_force_peak"] = float(np.abs([*forces, *run.window.force]).max())
+            values["slip_amplitude"] = float(np.ptp([*slips, *run.window.slip])) / 2
+            pairs = (tuple(zip(slides, forces)),)
+        return fields | {"integrated": IntegratedMeasures(values, reversals=pairs)}
 
 
 class CycleMeasures(NamedTuple):
