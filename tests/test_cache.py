@@ -94,6 +94,7 @@ def test_exact_only_first_of_two_processes_compiles(parallel_results):
     assert len({(one["work"], one["peak"]) for one in parallel_results}) == 1
 
 
+@pytest.mark.slow
 def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_results):
     """An edited law is compiled again, and its stiffness factor of 0.8 changes the peak force by 0.8."""
     package = copy_package(tmp_path / "home")

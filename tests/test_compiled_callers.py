@@ -109,6 +109,7 @@ def test_always_kernels_use_inlining_decorator():
     assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]
 
 
+@pytest.mark.slow
 def test_exact_inner_functions_called_from_python_are_cached(tmp_path):
     """An inner function that Python calls is compiled once and cached for later processes.
 

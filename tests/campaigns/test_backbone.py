@@ -244,6 +244,7 @@ base = 0.1
 )
 
 
+@pytest.mark.slow
 def test_curve_continues_beyond_a_fold():
     """The curve of a blade with a damper continues beyond its fold near 26 um.
 

@@ -7,7 +7,11 @@ from made_fits import compare_fit
 
 @pytest.mark.parametrize(
     "first, count",
-    [(102, 4), (104, 20), pytest.param(103, 10, marks=pytest.mark.slow)],
+    [
+        (102, 4),
+        pytest.param(104, 20, marks=pytest.mark.slow),
+        pytest.param(103, 10, marks=pytest.mark.slow),
+    ],
     ids=["loops", "decays", "curves"],
 )
 def test_always_intervals_hold_with_noise(first, count, tmp_path):

@@ -46,6 +46,26 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path
     assert refitted["worn_volume"].value == pytest.approx(measures["worn_volume"].value, rel=1e-3)
 
 
+def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path):
+    """The interval of the coefficient has the relative ends of the interval of the depth.
+
+    The worn volume is proportional to the coefficient.
+    """
+    page = tmp_path / "compare.json"
+    page.write_text(
+        json.dumps(
+            {
+                "worn_depth_max": None,
+                "worn_depth_mean": {"value": 20e-9, "low": 15e-9, "high": 30e-9, "unit": "m"},
+            }
+        )
+    )
+    answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
+    fitted = json.loads(answer.out)["values"]["wear.coefficient"]
+    assert fitted["low"] / fitted["value"] == pytest.approx(0.75, rel=2e-3)
+    assert fitted["high"] / fitted["value"] == pytest.approx(1.5, rel=2e-3)
+
+
 def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):
     """Depths outside the bounds, other quantities, other parameters and scenes without a patch are refused."""
 

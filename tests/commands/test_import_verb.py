@@ -87,6 +87,10 @@ def test_exact_imported_modes_agree_with_driven_oscillators(measured_file, tmp_p
     )
     assert modes.output**2 / modes.mass == pytest.approx(RESIDUE, rel=1e-6)
     assert "# modes of shaker.uff" in text
+    band = ("--band", "100 Hz..200 Hz", "--json")
+    answer = run_cli("import", measured_file, "-o", tmp_path / "first.toml", *band)
+    first = [one["frequency"] for one in json.loads(answer.out)["modes"]]
+    assert first == pytest.approx(HERTZ[:1], rel=1e-3)
 
 
 def test_exact_modes_of_free_decay(tmp_path):

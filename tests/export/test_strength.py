@@ -81,7 +81,7 @@ def test_exact_yield_note_agrees_with_hertz(tmp_path):
     assert "235 MPa (EN 10025-2: minimum yield strength of S235" in note
 
 
-@pytest.mark.share(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_exact_yield_bound_from_peak_pressure(tmp_path, plane):
     """A result that is not saved has a note on yielding from a lower bound of the von Mises stress.

@@ -1,6 +1,7 @@
 """Templates of scenes: the numbers in their comments (`commands/test_clean_screens.py` runs them)."""
 
 import numpy as np
+import pytest
 from scipy.linalg import eigh
 
 import patchfem as pf
@@ -10,6 +11,7 @@ BLADE = (np.array([[1e6, -1e6], [-1e6, 6e6]]), np.diag([0.15, 0.25]))  # stiffne
 FLATS = 7e7  # N/m
 
 
+@pytest.mark.slow
 def test_exact_damper_template_frequencies():
     """Free and stuck frequency and wedge load in the damper template agree with an eigenvalue solution and statics.
 

@@ -163,6 +163,7 @@ def friction_rows(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_always_held_out_rows_do_not_affect_fit(tmp_path):
     """Other values in rows held out or left out change neither the fit nor any of its starts."""
     scene = write_and_load(tmp_path, LINEAR)

@@ -66,9 +66,8 @@ def support_on_path(monkeypatch):
     )
 
 
-@pytest.mark.parametrize(
-    "once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("once", [True, False], ids=["once", "always"])
 def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
     """If a case kills its worker, all other cases have the same results as without it."""
     assert_only_killing_case_fails(tmp_path, once, Pool(2))

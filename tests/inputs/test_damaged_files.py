@@ -46,14 +46,12 @@ def matrix_market(matrix, **options) -> bytes:
 
 Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.draw_scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
-LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
 
 ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
 
 # file name, content that is damaged, and function that makes the file of it
 SURFACES = {
     "text": ("a.csv", f"# tip 2 um\nx [um],z [um]\n{ROWS}".encode(), bytes),
-    "raster": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode(), bytes),
     "matrix": ("a.txt", ("# Width: 3.0 µm\n# Height: 3.0 µm\n# Value units: um\n" + "\n".join("\t".join(
         f"{float(z) * 1e6!r}".replace(".", ",") for z in row) for row in Z)).encode(), bytes),
     "dektak": ("a.csv", write.make_dektak(np.sin(np.arange(60.0)), 9.375), bytes),
