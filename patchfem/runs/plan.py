@@ -68,7 +68,7 @@ class Plan:
     engine: str
     unknowns: dict[str, int]
     samples: int
-    chain: of_rig.Chain
+    chain: "of_rig.Chain"
     groups: Values
     verdict: tuple[str, ...]
 
@@ -97,7 +97,7 @@ class Plan:
         ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
-    def modes(self, chain: of_rig.Chain) -> list[dict[str, str | float | None]]:
+    def modes(self, chain: "of_rig.Chain") -> list[dict[str, str | float | None]]:
         """Return name, free and stuck frequency [Hz] of each mode of a rig."""
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
@@ -229,7 +229,7 @@ def _make_plan(model: Model) -> Plan:
     )
 
 
-def _interface_stiffnesses(model: Model) -> of_rig.Chain:
+def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
     """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
     load = model.nominal_load
     if not load > 0:

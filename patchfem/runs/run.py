@@ -199,9 +199,10 @@ class _Passes:
             run_plan = replace(run_plan, model=model)
 
         # Sentences on the static contact; those of several interfaces are merged.
-        warn = partial(_warn_of_pressed_patch, estimate=self.estimate)
-        warnings += merge_sentences(model, pressed, warn)
-        notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
+        if pressed:
+            warn = partial(_warn_of_pressed_patch, estimate=self.estimate)
+            warnings += merge_sentences(model, pressed, warn)
+            notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
         notes += model.describe_removed_joint()
         inputs = RunInputs(
             run_plan,
@@ -256,7 +257,7 @@ class _Passes:
             )
         return result, moved.faces
 
-    def _wear_patch(self, inputs: RunInputs) -> evolve.WornPatch:
+    def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
         """Compute the wear of a patch, continuing from a saved state if there is one."""
         model = inputs.plan.model
         file = self.state_file
@@ -354,7 +355,7 @@ def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
     return _complete_result(FinishedPass(run_plan.model, result, unmoved, 0.0))
 
 
-def _make_worn_inputs(inputs: RunInputs, worn_patch: evolve.WornPatch) -> RunInputs:
+def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunInputs:
     """Return the inputs of a run with worn surfaces."""
 
     def wear_model(model: Model) -> Model:

@@ -37,7 +37,7 @@ class BenchEngine:
     """
 
     method: str
-    choice: bond_engines.EngineChoice | None = None
+    choice: "bond_engines.EngineChoice | None" = None
     springs: "Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None" = None
 
     @property
@@ -47,7 +47,7 @@ class BenchEngine:
 
 
 def choose_bench_engine(
-    model, slide, choice: bond_engines.EngineChoice | None = None
+    model, slide, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
     """Choose the method that computes the friction force of a bench run.
 
@@ -101,7 +101,7 @@ def has_changing_pressure(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def choose_bond_summation(model, slide) -> bond_engines.EngineChoice:
+def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
     """Choose the method of bond summation for a rigidly sliding interface.
 
     The method is chosen as in a rig. Its error refers to the largest force, which is small for
@@ -135,7 +135,7 @@ def find_requested_engine(model) -> str:
     )
 
 
-def choose_smooth_bond_summation(model, slide) -> bond_engines.EngineChoice | None:
+def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
     """Choose a bond summation without merging, so that the force is smooth in the parameters.
 
     With merging, the summation error jumps when a parameter changes, which disturbs a fit. The

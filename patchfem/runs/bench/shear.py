@@ -30,7 +30,7 @@ MIN_PRESSURE_FRACTION = 1.0
 MODES_TOLERANCE_RATIO = 0.1
 
 
-def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> contacts.Contact:
+def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "contacts.Contact":
     """Return the contact points of bonds, on grooves, or under a load that changes.
 
     Under a nonlocal law with [contact.shear], the nodes of the patch with pressure become points of bonds with the
@@ -78,7 +78,7 @@ def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> c
     return contacts.make_bond_contact(law, force, row, modes, bond_sum)
 
 
-def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> contacts.Contact:
+def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts.Contact":
     """Return the points of a patch whose contact set changes with heave and pitch of the upper piece.
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
@@ -134,7 +134,7 @@ def _find_weakening(law) -> float:
 
 def _choose_modes(
     patch, limit, length: float, n_modes: int | None, tolerance: float, weakening: float = 1.0
-) -> shear_modes.ShearModes:
+) -> "shear_modes.ShearModes":
     """Return a number of shear modes of the pieces, by default as many as a part of the tolerance needs.
 
     Parameters
@@ -268,7 +268,7 @@ def make_bond_sum(law, choice) -> "contacts.BondSum | None":
     return contacts.BondSum(law, choice.reach(law.order), choice.merge)
 
 
-def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> shear_modes.ShearModes:
+def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shear_modes.ShearModes":
     """Return the shear modes of the contact points of a nonlocal law.
 
     If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
@@ -287,7 +287,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> shear
     n_modes = n_modes or model.accuracy.shear_modes
     tolerance = MODES_TOLERANCE_RATIO * model.accuracy.tolerance
 
-    def compute() -> shear_modes.ShearModes:
+    def compute() -> "shear_modes.ShearModes":
         """Compute the modes, for all runs with the same Patch."""
         sigma = patch.pressure.sigma_n
         if model.side == "lower":
@@ -317,7 +317,7 @@ def count_shear_modes(model, patch) -> int | None:
     return compute_point_shear_modes(model, patch).stiffness.size
 
 
-def make_lower_contact(model, patch, row, modes, bond_sum) -> contacts.Contact:
+def make_lower_contact(model, patch, row, modes, bond_sum) -> "contacts.Contact":
     """Return the points of bonds at all nodes, under a pressure that is fixed to the lower piece.
 
     Parameters

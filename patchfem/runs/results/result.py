@@ -16,9 +16,6 @@ import numpy as np
 from ...core import Outcome
 from ...formatting import rewrite_powers_of_ten
 from ...response import rows
-from ...response.coarser import StepRun
-from ...response.events import Events
-from ...response.levels import Level
 from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
 
@@ -174,9 +171,9 @@ class MotionData(NamedTuple):
 
     period: float | None = None
     energies: Values = MappingProxyType({})
-    step_runs: tuple[StepRun, ...] = ()
-    levels: tuple[Level, ...] = ()
-    events: Events | None = None
+    step_runs: tuple = ()
+    levels: tuple = ()
+    events: object = None
     decay: object = None
     spectra: object = None
     steady: SteadyData | None = None

@@ -95,7 +95,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
-def make_laws_on_mesh(model, patch, meshed=()) -> forces.LawGroup:
+def make_laws_on_mesh(model, patch, meshed=()) -> "forces.LawGroup":
     """Return the friction laws of a rig, discretized on one of the meshes of its patches.
 
     Parameters
@@ -128,7 +128,7 @@ def make_laws_on_mesh(model, patch, meshed=()) -> forces.LawGroup:
     )
 
 
-def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list[forces.LawGroup]:
+def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> "list[forces.LawGroup]":
     """Return a list of friction laws of a rig, each with one patch on its coarser mesh.
 
     Parameters

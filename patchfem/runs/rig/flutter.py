@@ -110,7 +110,7 @@ class LimitCycles(NamedTuple):
       amplitudes.
     """
 
-    cycles: list[limit_cycles.LimitCycle]
+    cycles: "list[limit_cycles.LimitCycle]"
     reason: str
     smallest_amplitude: float = 0.0
 

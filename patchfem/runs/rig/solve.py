@@ -16,11 +16,6 @@ from .steady import steady
 
 # Expected ratio of the steps of a run and its coarse runs to those of the run.
 COARSE_RUNS_RATIO = 2.0
-SOLVERS = {
-    "hybrid": event_to_event.run_from_event_to_event,
-    "march": march.march_in_time,
-    "harmonic": steady.solve_steady_motion,
-}
 
 
 def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -39,8 +34,14 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    solution = SOLVERS[numerics.engine](model, numerics, patch, frames, say, progress)
-    return replace_output_by_gauge(model, solution)
+    # Only the module of this engine is loaded.
+    if numerics.engine == "hybrid":
+        run = event_to_event.run_from_event_to_event
+    elif numerics.engine == "march":
+        run = march.march_in_time
+    else:
+        run = steady.solve_steady_motion
+    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
 
 
 def refuse_long_run(model, numerics) -> None:
