@@ -196,7 +196,7 @@ INVALID_CHANGES = {
     ),
     "no far face": (
         lambda m: remove_edges(m, "upper_far"),
-        r"no cells or nodes are tagged upper_far \(",
+        r"no cells or nodes are tagged upper_far \(.*; tags in the file: lower_coating, lower_far, ",
     ),
     "no interface": (
         lambda m: remove_edges(m, "lower_interface"),
