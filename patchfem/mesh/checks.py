@@ -132,7 +132,7 @@ def _check_tags(mesh: TaggedMesh) -> None:
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
     ]
     if missing:
-        found = sorted({name for block in mesh.blocks for name in block.names.tolist() if name})
+        found = sorted(set(np.concatenate([block.names for block in mesh.blocks]).tolist()) - {""})
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
             f"file: {', '.join(found[:MAX_LISTED_TAGS]) or 'none'})"
@@ -262,16 +262,19 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
     bulge = np.abs(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]) / length_squared
     is_wrong = (shift > MAX_MIDDLE_SHIFT) | (bulge > MAX_MIDDLE_BULGE)
     if is_wrong.any():
-        worst = int(np.argmax(np.where(is_wrong, np.hypot(shift, bulge), 0.0)))
-        node, first, last = (
-            f"x = {x:.6g} m, {abs(y):.6g} m from the interface"
-            for x, y in (middle[worst], begin[worst], end[worst])
-        )
+        distance = np.hypot(shift, bulge)
+        worst = int(np.argmax(np.where(is_wrong, distance, 0.0)))
+        count = np.unique(edges.middles[is_quadratic][is_wrong]).size
         raise PatchfemError(
-            f"{len(np.unique(edges.middles[is_quadratic][is_wrong]))} nodes of the {side} piece are not in the middle of "
-            f"their edge: the node at {node} is {np.hypot(shift, bulge)[worst]:.2g} of the length of its edge (from "
-            f"{first}, to {last}) away from the middle"
+            f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
+            f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
+            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle"
         )
+
+
+def _format_place(point) -> str:
+    """Return position x and depth [m] of a point (2,) in words."""
+    return f"x = {point[0]:.6g} m, {abs(point[1]):.6g} m from the interface"
 
 
 def _check_interface(points, nodes, side: str) -> None:
