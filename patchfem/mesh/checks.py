@@ -132,10 +132,12 @@ def _check_tags(mesh: TaggedMesh) -> None:
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
     ]
     if missing:
-        found = sorted(set(np.concatenate([block.names for block in mesh.blocks]).tolist()) - {""})
+        found = set()
+        for block in mesh.blocks:
+            found |= set(np.unique(block.names).tolist()) - {""}
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
-            f"file: {', '.join(found[:MAX_LISTED_TAGS]) or 'none'})"
+            f"file: {', '.join(sorted(found)[:MAX_LISTED_TAGS]) or 'none'})"
         )
     unknown = set()
     for block in mesh.blocks:
