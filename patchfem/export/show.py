@@ -3,8 +3,9 @@
 import shlex
 from pathlib import Path
 
+from ..formatting import format_number
 from . import quantities, store
-from .answer import Answer, Quantities
+from .answer import Answer, Quantities, Quantity
 
 
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
@@ -14,8 +15,30 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """
     lines = [answer.title] if answer.title else []
     lines += answer.verdict
+    if answer.kind == "cost":
+        lines += _format_costs(answer)
     shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
     return lines + format_quantities(shown)
+
+
+def _format_costs(answer: Answer) -> list[str]:
+    """Return an aligned line for each run of `cost`: setting, CPU time, and value and error of the main measure."""
+    data = answer.data
+    main = next((name for name in answer.quantities if f"error_{name}" in data), None)
+    rows = []
+    for k, seconds in enumerate(data["seconds"].values.tolist()):
+        cells = [f"{data['knob'].values[k]} {data['setting'].values[k]}"]
+        cells.append(f"{format_number(seconds, 2)} CPU s")
+        if main is not None:
+            value, error = (data[name].values[k] for name in (main, f"error_{main}"))
+            quantity = Quantity(value, data[main].unit, error)
+            cells.append(f"{main} {quantities.format_quantity(main, quantity)}")
+        rows.append(cells)
+
+    # The last column needs no width
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    widths[-1] = 0
+    return ["  " + "  ".join(map(str.ljust, cells, widths)) for cells in rows]
 
 
 def list_quantities(shown: Quantities) -> list[tuple[str, str]]:

@@ -11,11 +11,17 @@ from scipy.spatial import cKDTree
 from ..core import PatchfemError
 from .elements import ELEMENTS
 from .grading import LENGTH_TOL
-from .pieces import PieceMesh, find_edges, freeze_piece, signed_areas
+from .pieces import CellEdges, PieceMesh, find_edges, freeze_piece, signed_areas
 
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
 MAX_ROUNDED_SLOPE = 0.1
+# Tags of a file in the message on a missing tag
+MAX_LISTED_TAGS = 12
+# Largest distances of the node of an edge of second order from the middle of the edge, as fractions of its length: along
+# the edge, where it moves the stresses, and across, where the edge may be the arc of a rounded end
+MAX_MIDDLE_SHIFT = 0.01
+MAX_MIDDLE_BULGE = 0.1
 # Names of the tags of the cells of both pieces, with their numbers in mesh files
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 # Names of the tags of the edges on the interfaces and the far faces of both pieces, with these numbers
@@ -126,8 +132,12 @@ def _check_tags(mesh: TaggedMesh) -> None:
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
     ]
     if missing:
+        found = set()
+        for block in mesh.blocks:
+            found |= set(np.unique(block.names).tolist()) - {""}
         raise PatchfemError(
-            f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help})"
+            f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
+            f"file: {', '.join(sorted(found)[:MAX_LISTED_TAGS]) or 'none'})"
         )
     unknown = set()
     for block in mesh.blocks:
@@ -180,6 +190,7 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
 
     # The nodes of the interface and of the far face, numbered within the piece
     edges = find_edges(blocks, len(points))
+    _check_middles(points, edges, side)
     ends = []
     for name in (f"{side}_interface", f"{side}_far"):
         nodes = np.unique(
@@ -237,6 +248,35 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
             f"x = {x:.6g} m, {abs(y):.6g} m from the interface"
         )
     return cells
+
+
+def _check_middles(points, edges: CellEdges, side: str) -> None:
+    """Raise PatchfemError unless the nodes between corners lie in the middles of their edges."""
+    is_quadratic = edges.middles >= 0
+    begin, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
+    middle = points[edges.middles[is_quadratic]]
+    along = end - begin
+    offset = middle - (begin + end) / 2
+
+    # Parts of the offset along and across the edge, as fractions of its length
+    length_squared = (along**2).sum(axis=1)
+    shift = np.abs((along * offset).sum(axis=1)) / length_squared
+    bulge = np.abs(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]) / length_squared
+    is_wrong = (shift > MAX_MIDDLE_SHIFT) | (bulge > MAX_MIDDLE_BULGE)
+    if is_wrong.any():
+        distance = np.hypot(shift, bulge)
+        worst = int(np.argmax(np.where(is_wrong, distance, 0.0)))
+        count = np.unique(edges.middles[is_quadratic][is_wrong]).size
+        raise PatchfemError(
+            f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
+            f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
+            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle"
+        )
+
+
+def _format_place(point) -> str:
+    """Return position x and depth [m] of a point (2,) in words."""
+    return f"x = {point[0]:.6g} m, {abs(point[1]):.6g} m from the interface"
 
 
 def _check_interface(points, nodes, side: str) -> None:

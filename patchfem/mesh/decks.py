@@ -16,15 +16,14 @@ TAG_HELP = (
     "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET, of *SURFACE of type ELEMENT or of "
     "*ELSET made of line elements"
 )
-PLANE_ELEMENT = re.compile(
-    r"(?:CPE|CPS|CPEG|CAX|S|STRI|M3D|R3D|SFM3D)([3468])(?:M|R|H|I|RH|IH|MH|RS|RSW|R5|5)?$"
-)
-# Numbers of nodes of line elements
-LINE_ELEMENTS = {"T2D2": 2, "T3D2": 2, "B21": 2, "B31": 2, "R2D2": 2, "RAX2": 2, "SAX1": 2}
-LINE_ELEMENTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3, "SAX2": 3}
+PLANE_ELEMENT = re.compile(r"CP(?:E|S|EG)([3468])(?:M|R|H|I|RH|IH|MH)?$")
+# Numbers of nodes of line elements, which only name edges
+LINE_ELEMENTS = {"T2D2": 2, "T3D2": 2, "B21": 2, "B31": 2, "R2D2": 2}
+LINE_ELEMENTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3}
 # Elements in meshio by number of nodes; a surface names the sides of plane elements
 PLANE_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 LINE_KINDS = {2: "line", 3: "line3"}
+PART_KEYWORDS = ("PART", "ASSEMBLY", "INSTANCE")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
 # Largest ratio of the members of a set to the lines of the deck; since a set may repeat members of
 # other sets, a short deck could otherwise name any number of members
@@ -51,12 +50,17 @@ class Deck:
 
     def _add(self, keyword: str, parameters: dict[str, str], lines: list[list[str]]) -> None:
         """Add the contents of a keyword block to the deck."""
+        if keyword in PART_KEYWORDS:
+            raise PatchfemError(
+                f"*{keyword}: parts and instances are not read; in Abaqus/CAE "
+                "mdb.models['Model-1'].setValues(noPartsInputFile=ON) writes a flat deck"
+            )
         if keyword in UNSUPPORTED_KEYWORDS:
             raise PatchfemError(
                 f"*{keyword} is not supported yet; write a flat deck (without parts and instances)"
             )
         if keyword == "NODE":
-            new = {int(line[0]): [float(word) for word in line[1:]] for line in lines}
+            new = [(int(line[0]), [float(word) for word in line[1:]]) for line in lines]
             self._add_numbered(self.nodes, new, "NSET", parameters)
         elif keyword == "ELEMENT":
             new = _read_elements(parameters.get("TYPE", "").upper(), lines)
@@ -70,18 +74,19 @@ class Deck:
     def _add_numbered(
         self,
         known: dict[int, object],
-        new: dict[int, object],
+        new: list[tuple[int, object]],
         kind: str,
         parameters: dict[str, str],
     ) -> None:
         """Add numbered nodes or elements, and their numbers to the set of a kind that the block names."""
-        if new.keys() & known.keys():
-            raise PatchfemError(
-                "a node or element number is given twice (several parts are not supported yet: write a flat deck)"
-            )
-        known.update(new)
+        for number, content in new:
+            if number in known:
+                name = "node" if kind == "NSET" else "element"
+                raise PatchfemError(f"{name} {number} is given twice")
+            known[number] = content
         if kind in parameters:
-            self.sets[kind].setdefault(parameters[kind].lower(), []).extend(new)
+            members = self.sets[kind].setdefault(parameters[kind].lower(), [])
+            members += [number for number, _ in new]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
         """Return the node or element numbers of a set, which may contain other sets."""
@@ -190,17 +195,17 @@ def _split_blocks(text: str):
     yield from blocks
 
 
-def _read_elements(kind: str, lines) -> dict[int, tuple[str, list[int]]]:
-    """Return the elements of one type with their nodes, by element number."""
+def _read_elements(kind: str, lines) -> list[tuple[int, tuple[str, list[int]]]]:
+    """Return number, meshio name and nodes of each element of one type."""
     plane = PLANE_ELEMENT.match(kind)
     n_nodes = int(plane[1]) if plane else LINE_ELEMENTS.get(kind.removesuffix("H"))
     if n_nodes is None:
         raise PatchfemError(
-            f"{kind or 'untyped'} elements; only plane triangles and quadrilaterals of first or second order and line "
-            "elements can be used"
+            f"{kind or 'untyped'} elements cannot be used; the cells must be plane triangles or quadrilaterals of plane "
+            "strain (CPE*) or plane stress (CPS*), of first or second order; line elements may name edges"
         )
     numbers = np.array([int(word) for line in lines for word in line], np.int64)
     if numbers.size % (n_nodes + 1):
         raise PatchfemError(f"{kind} elements do not all have {n_nodes} nodes")
     name = PLANE_KINDS[n_nodes] if plane else LINE_KINDS[n_nodes]
-    return {row[0]: (name, row[1:]) for row in numbers.reshape(-1, n_nodes + 1).tolist()}
+    return [(row[0], (name, row[1:])) for row in numbers.reshape(-1, n_nodes + 1).tolist()]

@@ -128,7 +128,7 @@ def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
     Raises
     ------
     PatchfemError
-        With the key of the size that differs. If another unit gives this size, the message names it.
+        With the key of the size that differs, or of the file if another unit gives this size; the message names it.
     """
     for side, piece, body in (("lower", pieces.lower, lower), ("upper", pieces.upper, upper)):
         for key, in_file, in_scene in (
@@ -142,8 +142,8 @@ def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
             for name, factor in UNIT_FACTORS["length"].items():
                 if in_scene and abs(in_file / unit * factor / in_scene - 1) <= MESH_SIZE_TOL:
                     advice = f': set contact.mesh_unit = "{name}"'
-            raise PatchfemError(
-                f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh"
-                f"{advice}",
-                f"contact.{key}",
-            )
+            text = f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh"
+            # The unit belongs to the file, not to the size in the scene
+            if advice:
+                raise PatchfemError(f"{key} {text}{advice}", "contact.mesh")
+            raise PatchfemError(text, f"contact.{key}")

@@ -15,6 +15,7 @@ from patchfem.campaigns import (
 )
 from patchfem.core import Measure
 from patchfem.export.costs import make_answer
+from patchfem.export.show import make_lines
 from patchfem.runs.run import run
 
 TEXT = (
@@ -81,6 +82,14 @@ def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     assert describe_best_setting(automatic, 1e-2) == within
     automatic[-1] = make_cost("auto", 3, 1e-3, value=None)
     assert describe_best_setting(automatic, 1e-3).startswith("a knob at auto: 3 CPU s per run")
+
+
+def test_exact_screen_shows_main_measure_of_every_run():
+    """The screen has a line with setting, CPU time and main measure of each run, also where its error is unknown."""
+    runs = [make_cost("2", 1, 4e-2), make_cost("400", 12, 8e-3)]
+    forget_errors(runs[1], "a")
+    lines = make_lines(make_answer({"knob": runs}, build_model(tolerance=1e-3)))
+    assert lines[1:3] == ["  knob 2    1 CPU s   a 1.000 ± 0.040", "  knob 400  12 CPU s  a 1"]
 
 
 def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():

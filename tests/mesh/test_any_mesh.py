@@ -196,7 +196,7 @@ INVALID_CHANGES = {
     ),
     "no far face": (
         lambda m: remove_edges(m, "upper_far"),
-        r"no cells or nodes are tagged upper_far \(",
+        r"no cells or nodes are tagged upper_far \(.*; tags in the file: lower_coating, lower_far, ",
     ),
     "no interface": (
         lambda m: remove_edges(m, "lower_interface"),
@@ -299,6 +299,38 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
     path.write_text(path.read_text().replace("ELSET=UPPER_COATING", "ELSET=GLUE"))
     with pytest.raises(PatchfemError, match=r"some cells have an unknown tag \(no tag\);"):
         read_pieces(path)
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ("CPE4R", "S4R", r"S4R elements cannot be used; .*\(CPE\*\)"),
+        ("CPE4R", "CAX4R", "CAX4R elements cannot be used"),
+        ("CPE4R", "M3D4", "M3D4 elements cannot be used"),
+        ("T2D2", "SAX1", "SAX1 elements cannot be used"),
+        ("*NODE", "*Part, name=A\n*NODE", r"\*PART: parts .*noPartsInputFile=ON\) writes a flat"),
+        ("*NODE", "*Instance, name=A-1, part=A\n*NODE", r"\*INSTANCE: parts and instances"),
+        ("\n8, ", "\n5, ", "node 5 is given twice"),
+    ],
+)
+def test_refuses_decks_of_other_elements_and_of_parts(old, new, message, tmp_path):
+    """A deck of shells, membranes or axisymmetric elements, of parts or with a number given twice is refused."""
+    path = tmp_path / "pair.inp"
+    write_inp(make_pair("quads"), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(PatchfemError, match=message):
+        read_pieces(path)
+
+
+@pytest.mark.parametrize("kind", ["CPE4H", "CPS4", "CPEG4R"])
+def test_always_reads_decks_of_plane_elements(kind, tmp_path):
+    """Elements of plane strain, plane stress and generalized plane strain are read."""
+    path = tmp_path / "pair.inp"
+    write_inp(make_pair("quads"), path)
+    path.write_text(path.read_text().replace("CPE4R", kind))
+    assert len(read_pieces(path).lower.blocks["quad"]) > 0
 
 
 BYTE_CHANGES = st.lists(

@@ -8,6 +8,7 @@ import pytest
 from any_mesh_cases import GRID, NAMES, make_pair
 from scipy.spatial import cKDTree
 
+from patchfem.core import PatchfemError
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.elasticity.elasticity import Layers
 from patchfem.mesh import read_pieces
@@ -101,6 +102,30 @@ def test_exact_same_mesh_in_every_format_gives_equal_compliance(kind, tmp_path):
         assert pair.upper.coating_thickness == pytest.approx(GRID.coating_thickness, rel=1e-12)
         for mine, other in zip(interface_compliance(Piece(pair.upper, LAYERS)), first):
             assert np.abs(mine - other).max() <= 1e-12 * np.abs(first.nn).max()
+
+
+@pytest.mark.parametrize("kind", ABAQUS)
+@pytest.mark.parametrize("axis, shift, is_refused", [(0, 0.02, 1), (0, 0.005, 0), (1, 0.05, 0)])
+def test_refuses_nodes_beside_the_middle_of_their_edge(kind, axis, shift, is_refused, tmp_path):
+    """A node is refused 2 % of its edge along the edge from the middle, not 0.5 % along it or 5 % across."""
+    path = write_pair(tmp_path, kind, ".msh")
+    mesh = meshio.read(path)
+
+    # The middle of a horizontal edge within the upper piece
+    edge = next(
+        cell[[0, 1, 3 if kind == "triangle6" else 4]]
+        for cell in mesh.cells_dict[kind]
+        if mesh.points[cell[0], 1] == mesh.points[cell[1], 1] > 0
+    )
+    mesh.points[edge[2], axis] += shift * abs(np.diff(mesh.points[edge[:2], 0])[0])
+    meshio.write(path, mesh, file_format="gmsh22")
+    if not is_refused:
+        assert read_pieces(path).upper.is_quadratic
+        return
+    x, y = mesh.points[edge[2], :2]
+    message = rf"1 nodes of the upper piece are not in the middle .* x = {x:.6g} m, {y:.6g} m .* is 0\.02 of"
+    with pytest.raises(PatchfemError, match=message):
+        read_pieces(path)
 
 
 @pytest.mark.parametrize("kind", [*ABAQUS, "quad9"])

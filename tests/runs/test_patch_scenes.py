@@ -219,3 +219,22 @@ def test_refuses_profile_with_waves_finer_than_mesh(tmp_path):
         PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .*rms height.*element_size"
     ):
         run(load_scene(tables, path=tmp_path / "scene.toml"))
+
+
+def test_exact_prescribed_rotation_has_no_error_and_no_warning():
+    """The rotation of pieces of 320 mm that cannot rotate is exactly 0, so that it neither warns nor refines the mesh.
+
+    A smaller tolerance gets a finer mesh.
+    """
+    steel = '{young = "210 GPa", poisson = 0.3, density = "7800 kg/m^3"}'
+    text = '[contact]\nlength = "320 mm"\nheight = "160 mm"\nwidth = "10 mm"\nload = "1.2 kN"\ncrown.radius = "60 mm"\n'
+    text += f"substrate = {steel}\n[accuracy]\ntolerance = "
+    coarse, fine = (run(build(text + tolerance)) for tolerance in ("1e-3", "1e-4"))
+    assert coarse.measures["rotation"].value == coarse.measures["rotation"].error == 0.0
+    assert coarse.warnings == [] and not any("rotation" in one for one in fine.warnings)
+    assert coarse.patch.x.size < fine.patch.x.size
+
+    # The closed form for half planes; pieces of this size change its pressure by 1e-6
+    peak = coarse.measures["pressure_peak"]
+    modulus = 210e9 / (1 - 0.3**2) / 2
+    assert abs(peak.value - np.sqrt(modulus * 1.2e5 / (np.pi * 0.06))) <= peak.error

@@ -463,11 +463,9 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
         peak_error = peak_error + peak / (4 * n_nodes**2)
     peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
 
-    # Displacements have round-off, and a wrong centre times the angle of rotation.
-    displacement = (
-        ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
-        + abs(finest["rotation"]) * centre_error * resolution.can_rotate
-    )
+    # Displacements have round-off, and a wrong centre times the angle of rotation. A prescribed rotation has neither.
+    displacement = ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
+    displacement += abs(finest["rotation"]) * centre_error
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
 
     edge_offset = 0.0
@@ -487,7 +485,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
         "loaded_fraction": peak_error * fraction_per_pressure,
         "pressure_centre": ROUND_OFF_FRACTION * length + centre_error,
         "moment": (ROUND_OFF_FRACTION * length + centre_error) * load,
-        "rotation": displacement / length,
+        "rotation": displacement / length * resolution.can_rotate,
         "approach": ROUND_OFF_FRACTION * resolution.closing,
     }
 
