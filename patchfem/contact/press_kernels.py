@@ -18,7 +18,8 @@ from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import (
     N_STORED,
-    NEXT_SLOT,
+    OLDEST_SLOT,
+    PRESENT_SLOT,
     REFERENCE_ENERGY,
     REFERENCE_LOAD,
     REFERENCE_MOMENT,
@@ -171,13 +172,19 @@ def refine_columns(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def take_slot(sets):
-    """Return a free slot for a contact set; if none is free, return that of the oldest set."""
+    """Return a free slot for a contact set; if none is free, return that of the oldest set but the present one."""
     stored = sets.stored
-    slot = sets.counters[NEXT_SLOT]
-    sets.counters[NEXT_SLOT] = (slot + 1) % stored.names.size
-    if sets.counters[N_STORED] < stored.names.size:
+    n_slots = stored.names.size
+    slot = sets.counters[N_STORED]
+    if slot < n_slots:
         sets.counters[N_STORED] += 1
         return slot
+
+    # Every trial of a step starts from the present set, which is therefore kept
+    slot = sets.counters[OLDEST_SLOT]
+    if slot == sets.counters[PRESENT_SLOT]:
+        slot = (slot + 1) % n_slots
+    sets.counters[OLDEST_SLOT] = (slot + 1) % n_slots
 
     # The set that the slot holds leaves the chain of its hash
     bucket = stored.names[slot] & (stored.heads.size - 1)

@@ -165,7 +165,8 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             out[PathMean.ROTATION_BY_HEAVE] = out[PathMean.HEAVE_BY_ROTATION]
             return slot
 
-        # The set beyond the border
+        # The set beyond the border; the search for it may replace the set in the present slot
+        name = sets.stored.names[slot]
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
         next_slot = find_set(sets, slot, d, rotation + beyond * rotation_change)
@@ -173,7 +174,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return next_slot
 
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
-        if next_slot == slot:
+        if sets.stored.names[next_slot] == name:
             border_step *= 10
             start = beyond
         else:

@@ -16,7 +16,9 @@ REFERENCE_ENERGY = 2
 # Index into `SetArrays.reference` of the largest magnitude of the openings [m]
 REFERENCE_OPENING = 3
 N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
-NEXT_SLOT = 1  # index into `SetArrays.counters` of the slot of the next set
+OLDEST_SLOT = 1  # index into `SetArrays.counters` of the slot that is replaced next
+# Index into `SetArrays.counters` of the slot of the present contact set, -1 if none is found
+PRESENT_SLOT = 2
 
 
 class EnergyTerm(IntEnum):
@@ -94,7 +96,7 @@ class SetArrays(NamedTuple):
     - opening (m,): openings of the reference state without forces [m].
     - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
     - tableau, stored: see there.
-    - counters (2,): `N_STORED` and `NEXT_SLOT`.
+    - counters (3,): from `N_STORED` to `PRESENT_SLOT`.
     """
 
     compliance: np.ndarray
@@ -158,7 +160,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         np.array(reference, float),
         tableau,
         stored,
-        np.zeros(2, np.int64),
+        np.zeros(3, np.int64),
     )
 
 

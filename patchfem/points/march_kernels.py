@@ -23,7 +23,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
-from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
+from ..contact.set_arrays import PRESENT_SLOT, REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
@@ -406,7 +406,7 @@ def write_residual(system, level, h):
         slides = moves[Port.SLIDE]
         normal.path_mean(
             system.sets,
-            int(system.totals[Total.SLOT]),
+            system.sets.counters[PRESENT_SLOT],
             slides[heave],
             slides[pitch],
             increments[heave],
@@ -690,7 +690,6 @@ def find_loads(system, row, fraction, is_solved):
     points = system.points
     loads = system.structure.loads
     values = points.values
-    totals = system.totals
     flank = system.flank
     moves = ports.values
     heave = int(ports.contact[0])
@@ -701,7 +700,7 @@ def find_loads(system, row, fraction, is_solved):
         pitch = int(ports.contact[1])
         h = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
         t = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = normal.find_set(system.sets, int(totals[Total.SLOT]), -h, t)
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -h, t)
         if slot < 0:
             return -1.0
         normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
@@ -789,7 +788,7 @@ def find_holds(system, state, drive):
         pitch = int(ports.contact[1])
         h = sum_products(ports.rows[heave], state[:n])
         t = sum_products(ports.rows[pitch], state[:n])
-        energy = normal.compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
+        energy = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
         ports.vector[heave] += energy[1]
         ports.vector[pitch] += energy[2]
 
@@ -943,7 +942,7 @@ def commit(system, h):
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
     system.totals[Total.REST] = 0.0
-    if options.is_rigid and system.totals[Total.SLOT] >= 0:
+    if options.is_rigid and system.sets.counters[PRESENT_SLOT] >= 0:
         rest_ports(system)
         system.totals[Total.REST] = find_motion_energy(system) - energy
 
@@ -1097,8 +1096,8 @@ def find_motion_energy(system):
     if heave >= 0:
         up = sum_products(ports.rows[heave], state[:n])
         turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
-        system.totals[Total.SLOT] = slot
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -up, turn)
+        system.sets.counters[PRESENT_SLOT] = slot
         if slot >= 0:
             energy += normal.compute_energy(system.sets, slot, up, turn)[0]
     return energy
@@ -1136,7 +1135,7 @@ def rest_ports(system):
 
 @njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
-    """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
+    """Advance by a step of a level; return False if it contains an event; without a contact set `PRESENT_SLOT` becomes -1.
 
     `row`, `begin` and `end` are the number of the whole step and the fractions of it; `drive` is the parabola of the
     drive at the start of this step.
@@ -1190,7 +1189,7 @@ def try_step(system, level, row, begin, end, drive):
         if options.has_loads:
             change = find_loads(system, row, end, count > 0)
             if change < 0:
-                totals[Total.SLOT] = -1
+                system.sets.counters[PRESENT_SLOT] = -1
                 return True
             if count > 0 and change <= LOAD_RESIDUAL:
                 break
@@ -1263,7 +1262,6 @@ def write_sample(system, row, sample):
     """
     ports = system.ports
     points = system.points
-    totals = system.totals
     structure = system.structure
     flank = system.flank
     size = system.state.shape[1]
@@ -1333,7 +1331,7 @@ def write_sample(system, row, sample):
     if heave >= 0:
         h = ports.values[Port.SLIDE, heave]
         t = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = normal.compute_energy(system.sets, int(totals[Total.SLOT]), h, t)
+        contact = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
         reference = system.sets.reference
         sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
         sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
@@ -1400,7 +1398,7 @@ def march(system, steps, samples):
             if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
                 level += 1
                 continue
-            if system.totals[Total.SLOT] < 0:
+            if system.sets.counters[PRESENT_SLOT] < 0:
                 return i, NO_CONTACT_SET
             if system.totals[Total.IS_FULL] > 0:
                 return i, LISTS_FULL

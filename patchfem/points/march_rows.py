@@ -128,7 +128,6 @@ class Total(IntEnum):
       [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
-    - SLOT: slot of the contact set, -1 if none is found
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
     - REST: energy that the modes gained as ports at rest were brought back in the last step [J]
@@ -141,10 +140,9 @@ class Total(IntEnum):
     STORED = 4
     ITERATIONS = 5
     UNSOLVED = 6
-    SLOT = 7
-    IS_FULL = 8
-    IS_DIRTY = 9
-    REST = 10
+    IS_FULL = 7
+    IS_DIRTY = 8
+    REST = 9
 
 
 class Sample(IntEnum):

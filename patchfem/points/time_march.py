@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
-from ..contact.set_arrays import hash_set, make_set_arrays
+from ..contact.set_arrays import PRESENT_SLOT, hash_set, make_set_arrays
 from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
 from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
@@ -469,7 +469,7 @@ def _press_first(system: System, contact: Contact) -> None:
         float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
     )
     slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
-    system.totals[Total.SLOT] = slot
+    system.sets.counters[PRESENT_SLOT] = slot
 
 
 def _climb_first(system: System, contact: Contact) -> None:
@@ -598,9 +598,7 @@ class March:
     def reset_balance(self) -> None:
         """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
         totals = self.system.totals
-        slot = totals[Total.SLOT]
         totals[:] = 0.0
-        totals[Total.SLOT] = slot
         totals[Total.IS_DIRTY] = 1.0
         self.work_sums[:] = 0.0
         self.done = 0
