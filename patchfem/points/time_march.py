@@ -7,6 +7,7 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
 from ..contact.set_arrays import PRESENT_SLOT, hash_set, make_set_arrays
@@ -42,6 +43,8 @@ from .march_rows import (
     Total,
 )
 
+MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
+N_GAUSS = 8  # Gauss points of the integrals over that step
 RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
@@ -169,71 +172,58 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
 
-    # Rates of loss and work as quadratic forms of the state.
+    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
+    fastest = float(modes.omega.max(initial=0.0)) * step
+    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
+    short = step / 2**n_halvings
+    nodes, weights = leggauss(N_GAUSS)
+    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
     loss = np.zeros_like(matrix)
     loss[velocities, velocities] = modes.mass * modes.damping_matrix
     work = np.zeros_like(matrix)
     work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
-
-    # As steps double, an integral of x(t)^T form x(t) is the sum of both halves; the square of the exponential would double
-    # its round-off.
-    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
-    shortest = step / 2 ** (levels - 1)
-    forms = [integrate_form(matrix, form, shortest, powers) for form in (loss, work)]
+    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
+    forms = [
+        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
+        for form in (loss, work)
+    ]
     parts = []
-    for level in range(levels):
-        time = shortest * 2**level
-        ratio = time ** (powers - powers[:, None])
-        whole = exponential(time * matrix / ratio) * ratio
-        parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
+    for k in range(n_halvings + 1):
+        # The square of the last matrix would double its round-off.
+        whole = exponential(matrix, short * 2**k, powers)
+        if k > n_halvings - levels:
+            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
         forms = [form + whole.T @ form @ whole for form in forms]
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
-def integrate_form(matrix, form, time: float, powers) -> np.ndarray:
-    """Return the integral of x^T form x over a time as a form (k, k) of the first state.
+def exponential(matrix, time: float, powers) -> np.ndarray:
+    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
 
-    With the block exponential of Van Loan (1978), exp([[-A^T, Q], [0, A]]) = [[., F], [0, E]], the integral of
-    exp(A s)^T Q exp(A s) is E^T F.
+    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
 
     Parameters
     ----------
     matrix : (k, k) array
-        Matrix of the rates of the state x.
-    form : (k, k) array
-        Quadratic form.
+        Matrix of the rates of the state.
     time : float
         [s]
     powers : (k,) array
-        Powers of the unit of each state, [s^-powers].
+        Powers of the unit of each state.
     """
-    # In units of the time the entries of the exponent are of order 1, as those of the form over its largest one.
-    k = powers.size
-    exponent = time * matrix / time ** (powers - powers[:, None])
-    units = time ** -(powers + powers[:, None])
-    size = np.abs(form * units).max() or 1.0
-    block = np.zeros((2 * k, 2 * k))
-    block[:k, :k] = -exponent.T
-    block[k:, k:] = exponent
-    block[:k, k:] = form * units / size
-    whole = exponential(block)
-    return time * size * (whole[k:, k:].T @ whole[:k, k:]) / units
-
-
-def exponential(matrix) -> np.ndarray:
-    """Return the exponential (k, k) of a matrix by scaling and squaring of a Taylor polynomial.
-
-    The import of scipy.linalg would take longer than all exponentials of a run.
-    """
-    n_squares = max(int(np.ceil(np.log2(np.abs(matrix).sum(axis=1).max()))), 0)
-    scaled = matrix / 2**n_squares
-    identity = np.eye(len(matrix))
+    # In units of the time the entries of the exponent are of order 1.
+    units = time**-powers
+    ratio = units[:, None] / units
+    exponent = time * matrix / ratio
+    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
+    exponent = exponent / 2**n_squares
+    identity = np.eye(powers.size)
     result = identity
     for order in range(TAYLOR_DEGREE, 0, -1):
-        result = identity + scaled @ result / order
+        result = identity + exponent @ result / order
     for _ in range(n_squares):
         result = result @ result
-    return result
+    return result * ratio
 
 
 def make_system(

@@ -142,7 +142,7 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
     for sentence in summary["verdict"]:
         assert f"<p>{sentence}</p>" in text
     tiles = read_tiles(text)
-    assert next(iter(tiles)) == "worn depth mean" and 5 <= len(tiles) <= 10
+    assert next(iter(tiles)) == "worn depth mean" and 3 <= len(tiles) <= 10
     for label, shown in tiles.items():
         name = label.replace(" ", "_")
         assert quantities.format_quantity(name, parse(summary["measures"][name])) == shown

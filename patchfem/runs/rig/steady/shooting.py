@@ -253,7 +253,7 @@ class ShootingFinder:
         if needs_histories:
             # The closed form of a linear rig has no state from which a cycle starts.
             laws = self.joints.laws
-            state = point.guess if laws else self.find_periodic_motion(drive).batch.states
+            state = point.guess if laws else self.find_periodic_motion(drive).run.final
             window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
         sensed = [point.values.get(COLUMN_MEASURES[name]) for name in SENSED_COLUMNS]
         amplitude, peak, fundamental = sensed
