@@ -203,8 +203,9 @@ def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
 class Accuracy(NamedTuple):
     """Largest error of a run, relative to the error that the tolerance allows.
 
-    fraction: error over the allowed error at a tolerance of 1, to be compared with the tolerance;
-    name: name of the measure, "" if no error is known; is_complete: whether the errors of all measures are known.
+    - fraction: error over the allowed error at a tolerance of 1, to be compared with the tolerance.
+    - name: name of the measure with this error; "" if no error is known.
+    - is_complete: whether the errors of all measures are known.
     """
 
     fraction: float
@@ -212,7 +213,14 @@ class Accuracy(NamedTuple):
     is_complete: bool
 
     def judge(self, tolerance: float) -> Judgement:
-        """Judge whether the errors are within a tolerance."""
+        """Judge whether the errors are within a tolerance.
+
+        Returns
+        -------
+        Judgement
+            MISSES if a known error exceeds the tolerance; MEETS if all errors are known and none does; UNKNOWN if no
+            known error does, but some errors are not known.
+        """
         if self.fraction > tolerance:
             return Judgement.MISSES
         return Judgement.MEETS if self.is_complete else Judgement.UNKNOWN

@@ -309,7 +309,7 @@ def check_contact_conditions(sets, slot, d, t):
     by_t = sets.stored.unknowns[slot, 2]
     in_contact = sets.stored.in_contact[slot]
 
-    # Smallest force in contact and smallest gap outside
+    # The conditions are force >= 0 in contact and gap >= 0 outside, up to the round-off of the largest terms.
     scale = 0.0
     smallest_force = 0.0
     smallest_gap = 0.0
@@ -329,25 +329,28 @@ def check_contact_conditions(sets, slot, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
-    """Set the target contact set to the current one with the violating nodes exchanged.
+    """Write to `sets.tableau.target` a stored contact set in which the violating nodes are exchanged.
+
+    A node in contact whose force is below `bounds.min_force` leaves the set, and an open node whose gap is below
+    `bounds.min_gap` enters it.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
-        Preloaded interface with its stored contact sets.
+        Preloaded interface with its stored contact sets; its target is overwritten.
     slot : int
-        Slot of the contact set.
+        Slot of the stored contact set.
     d, t : float
-        Motion [m] and [rad].
+        Displacement [m] and rotation [rad] of the holder.
     bounds : ContactBounds
         Force and gap below which a node violates its condition.
     is_single : bool
-        Whether only the first failing node is exchanged.
+        Whether only the first violating node is exchanged.
 
     Returns
     -------
     int
-        Name of the new set.
+        Hash of the new set, by which `find_stored` looks it up.
     """
     stored = sets.stored
     name = stored.names[slot]

@@ -76,6 +76,11 @@ def compute_answer(
     folder : Path
         Existing folder of the results.
 
+    Returns
+    -------
+    Answer
+        Fitted values with their intervals, the verdict, and measured and computed values as arrays.
+
     Raises
     ------
     SceneError, PatchfemError

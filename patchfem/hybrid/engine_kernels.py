@@ -184,7 +184,8 @@ def advance(rig, state, record, t_end, cycle):
     rtol = rig.settings[Setting.RTOL]
     longest = rig.settings[Setting.LONGEST_STEP]
     in_window = record.cycles[cycle, Cycle.WINDOW] >= 0
-    # A motion that ends with the cycle before ends by the error of the step in this one.
+    # Rounding may let a motion that stops exactly at the end of the previous cycle reach into this one. An end within
+    # MIN_SEEN of a period therefore belongs to the previous cycle.
     first_seen = MIN_SEEN * rig.settings[Setting.PERIOD]
     if cycle > 0:
         first_seen += record.cycles[cycle - 1, Cycle.END]
@@ -436,16 +437,24 @@ def drop_cut_extremes(cycle, point):
 
 @njit(**NJIT_KERNEL)
 def run_cycles(rig, state, record):
-    """Run the cycles of a case; return its `Status`.
+    """Integrate a motion cycle by cycle, up to the times in column `Cycle.END` of `record.cycles`.
+
+    With `Setting.REPEAT` equal to 1, cycles before the window are skipped as soon as the motion no longer changes from
+    cycle to cycle.
 
     Parameters
     ----------
     rig : Rig
         Arrays of the rig.
     state : State
-        Motion, which is updated.
+        Motion at the start; overwritten by the motion at the end.
     record : Record
         What the run records.
+
+    Returns
+    -------
+    Status
+        `Status.DONE` at the end of the last cycle; any other value ends the run at once.
     """
     clock = state.clock
     begin_scales(rig, state)

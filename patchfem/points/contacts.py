@@ -194,19 +194,27 @@ def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact
 
 
 def make_cubic_spring(stiffness: float, row) -> PointSet:
-    """Return a spring of the force stiffness q^3 [N/m3] on a port of displacement `row` (n,) per coordinate."""
-    return PointSet([make_cubic(stiffness)], row, is_spring=True)
-
-
-def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointSet:
-    """Return a spring of sinusoidal force, of a stiffness at rest [N/m], on a port of displacement `row` (n,).
+    """Return a spring whose force is k_3 q^3 on a port with the displacement q.
 
     Parameters
     ----------
     stiffness : float
-        Stiffness at rest [N/m].
+        Stiffness k_3 [N/m3].
+    row : (n,) array
+        Displacement of the port per modal coordinate.
+    """
+    return PointSet([make_cubic(stiffness)], row, is_spring=True)
+
+
+def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointSet:
+    """Return a spring whose force is stiffness/k sin(k q) on a port with the displacement q, k = 2 pi/wavelength.
+
+    Parameters
+    ----------
+    stiffness : float
+        Stiffness at q = 0 [N/m].
     wavelength : float
-        Wavelength of the force [m].
+        Displacement between two equal states of the spring [m].
     row : (n,) array
         Displacement of the port per modal coordinate.
     """

@@ -1078,7 +1078,15 @@ class Record:
                 self.early.append(rows[: -1 : self.stride])
 
     def repeat(self, count: int) -> None:
-        """Repeat the last part of the march."""
+        """Append copies of the last part of a motion that repeats, instead of computing its next cycles.
+
+        In each copy the step numbers and the energies continue from those of the part before it.
+
+        Parameters
+        ----------
+        count : int
+            Number of copies.
+        """
         n_cycles = (len(self.last) - 1) // self.run.steps
         change = np.zeros(self.last.shape[1])
         change[NUMBER:] = self.last[-1, NUMBER:] - self.last[0, NUMBER:]

@@ -171,12 +171,22 @@ def mean_power(time, work) -> tuple[float, float]:
 
 
 def is_stationary(window, drive) -> bool:
-    """Return whether the root mean squares of both halves of a window agree within scatter."""
+    """Return whether the displacement scatters equally in both halves of a window.
+
+    The standard deviations of both halves may differ by up to 4 standard errors of their difference.
+
+    Parameters
+    ----------
+    window : Response
+        Record without its initial transient.
+    drive
+        Random drive, whose time step is that of the samples.
+    """
     displacement = make_record(window, drive).displacement
     half = displacement.size // 2
     first = displacement[:half]
     last = displacement[half:]
-    # half-widths are 2 standard errors, so that 4 standard errors are accepted
+    # `rms_scatter` returns about 2 standard errors, so that 4 standard errors are accepted.
     return bool(
         abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
     )

@@ -20,7 +20,8 @@ class StepSetting(NamedTuple):
 
     - steps: steps per cycle.
     - seconds: CPU seconds of the motion: the steps times the smallest time per step of all runs.
-    - error: largest error of the main measures, as the smallest tolerance that it meets [1].
+    - error: largest ratio of the error of a main measure to its size [1]. It is the smallest value of
+      `accuracy.tolerance` that these steps meet.
     """
 
     steps: int

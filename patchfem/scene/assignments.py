@@ -148,12 +148,21 @@ class Range:
 def read_assignments(
     texts: Iterable[str], form: Form = LISTS
 ) -> tuple[list[Axis | Range], list[str]]:
-    """Read strings ``table.key=values``; without lists, commas separate several of them in one string.
+    """Read strings ``table.key=values``.
+
+    Parameters
+    ----------
+    texts : iterable of str
+        Values of the option.
+    form : Form
+        What the option accepts. Without lists of values, commas separate several assignments in one string.
 
     Returns
     -------
-    tuple
-        The keys with their values, and the sentences about mistakes.
+    given : list of Axis or Range
+        A Range for a key with a range without a number of values, else an Axis with the values.
+    mistakes : list of str
+        A sentence for each mistake.
     """
     given: list[Axis | Range] = []
     mistakes = []

@@ -230,6 +230,12 @@ class JointMode(NamedTuple):
         ----------
         compute : callable
             Function of a JointMode and a LawGroup that returns the quantity as an array.
+
+        Returns
+        -------
+        ndarray or float
+            Error of each value, with the shape of the quantity; 0.0 if no errors are estimated, or if the contact has
+            neither partial slip nor discrete sliders.
         """
         model = self.model
         error = 0.0

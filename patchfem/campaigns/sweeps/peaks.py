@@ -149,9 +149,11 @@ def _estimate_error(values: np.ndarray) -> float:
 
 
 class _Shape(NamedTuple):
-    """Minimum of 1/y^2 over the squares of the frequencies.
+    """Minimum of the curve of 1/y^2, where y is the response over its largest value at the frequency f_top.
 
-    place, level: of the minimum; below, above: where 1/y^2 is twice as large on either side, NaN if it is not.
+    - place: f^2 - f_top^2 at the minimum [Hz^2].
+    - level: 1/y^2 at the minimum [1].
+    - below, above: f^2 - f_top^2 [Hz^2] at which 1/y^2 is twice as large on either side; NaN if there is no such place.
     """
 
     place: float
@@ -161,9 +163,19 @@ class _Shape(NamedTuple):
 
 
 def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
-    """Return the minimum of a curve of 1/y^2; None without one above 0 between the neighbours of the largest value.
+    """Return the minimum of a curve of 1/y^2, where y is the response over its largest value at the frequency f_top.
 
-    `near` (3,) [Hz^2] are the squares of the frequencies of the largest value and of its neighbours.
+    Parameters
+    ----------
+    curve : PPoly
+        1/y^2 as a function of f^2 - f_top^2 [Hz^2].
+    near : (3,) array
+        f^2 - f_top^2 [Hz^2] of the lower neighbour of the largest value, of this value (0), and of its upper neighbour.
+
+    Returns
+    -------
+    _Shape or None
+        None if the curve has no minimum between both neighbours, or is not positive there.
     """
     places = curve.derivative().roots(extrapolate=False)
     places = places[(places > near[0]) & (places < near[2])]

@@ -47,8 +47,8 @@ class PathEquations(NamedTuple):
 class PathSettings(NamedTuple):
     """Numerical settings of arc-length continuation.
 
-    - first_step, max_step: first and longest step of the arc length, in which the width of the bounds and the size of
-      the motion count 1
+    - first_step, max_step: first and longest step, as arc length [1] of the curve of the scaled parameter and unknowns:
+      the parameter over the width of its bounds, and the unknowns over the size of the motion
     - max_points: largest number of points
     - tolerance: change of the motion, relative to its size, at which Newton's method ends
     """

@@ -77,7 +77,20 @@ class Law:
         return 0
 
     def evaluate(self, slides: Slides, row: int) -> LawForce:
-        """Return the steady force for the slide of an interface that starts from an unstretched contact."""
+        """Return the steady force for the slide of an interface that starts from an unstretched contact.
+
+        Parameters
+        ----------
+        slides : Slides
+            Slides of all interfaces at the M nodes of a cycle.
+        row : int
+            Index of the interface in `slides`.
+
+        Returns
+        -------
+        LawForce
+            Force (M,) at the nodes, and its derivatives.
+        """
         raise NotImplementedError
 
 
@@ -274,12 +287,24 @@ class FlowLaw(Law):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives of the harmonics of the force by those of the slide and by the frequency.
 
+        Harmonics are complex: q = Re sum q_k exp(i k theta) with k = 0 to H, and the same for the force.
+
+        Parameters
+        ----------
+        slides : Slides
+            Slides of all interfaces, with H + 1 harmonics each.
+        row : int
+            Index of the interface in `slides`.
+        states : FlowStates
+            States of the law for these slides, from `evaluate`.
+
         Returns
         -------
-        by_slide : (H + 1, 2 H + 1) array
-            By the real parts of k = 0 to H, then the imaginary parts of k = 1 to H [N/m].
-        by_omega : (H + 1,) array
-            [N s].
+        by_slide : (H + 1, 2 H + 1) complex array
+            Derivatives of the harmonics of the force [N/m]: columns 0 to H by the real parts of q_0 to q_H, the
+            others by the imaginary parts of q_1 to q_H.
+        by_omega : (H + 1,) complex array
+            Derivatives by the circular frequency [N s].
         """
         h = slides.harmonics.shape[1] - 1
         decay, by_increment, by_time = states.steps

@@ -157,9 +157,27 @@ def _merge_error_factor(law: Bonds) -> float:
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> EngineChoice:
-    """Estimate length, cost and error of a bond list with given settings; a setting of 0 is switched off.
+    """Estimate length, cost and error of a bond list with given settings.
 
-    The stroke is the path between two reversals [eps_0], on which there are `steps` steps.
+    Parameters
+    ----------
+    law : Bonds
+        Parameters of the bonds.
+    name : {"truncated", "merged"}
+        Name of the engine.
+    tail : float
+        Largest fraction of the friction limit that dropped bonds may carry; 0: no bonds are dropped.
+    merge : float
+        Largest width [eps_0] of a joined strip of age 0; 0: no strips are joined.
+    stroke : float
+        Path between two reversals [eps_0].
+    steps : float
+        Number of steps on this path.
+
+    Returns
+    -------
+    EngineChoice
+        With the expected number of strips, the CPU seconds per step and the bound of the error.
     """
     # Every increment of a step adds a strip, or several if it is longer than a strip may be.
     form = sum_form(law)

@@ -419,7 +419,23 @@ def _sum_report(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_youngest(x, bonds):
-    """Return the integrals of phi(y) and of y phi(y) from 0 to x, with phi(y) = y^p exp(-y)/Gamma(p + 1)."""
+    """Return the force and the lever of the bonds younger than x, for reading="report".
+
+    With phi(y) = y^p exp(-y)/Gamma(p + 1) these are the integrals of phi(y) and of y phi(y) from 0 to x. The first one is
+    the regularized incomplete gamma function P(p + 1, x), the second one (p + 1) P(p + 1, x) - x phi(x).
+
+    Parameters
+    ----------
+    x : float
+        Age R/eps_0 of the oldest bonds, where R is the path since they formed [1].
+    bonds : list_rows_kernels.BondList
+        List of bonds, with the parameters of its law.
+
+    Returns
+    -------
+    BondSum
+        Both integrals [1].
+    """
     if x <= 0:
         return BondSum(0.0, 0.0)
     p = bonds.law[LAW.order]

@@ -69,10 +69,22 @@ def switch(p, memory, point, s, which):
 
 
 def make_cubic(stiffness):
-    """Return a spring of the force k_3 q^3; stiffness: k_3 [N/m3]."""
+    """Return the numbers of a spring whose force is k_3 q^3; `stiffness` is k_3 [N/m3]."""
     return LawNumbers("springs", (stiffness, 0.0, 1.0))
 
 
 def make_interlocking(stiffness, wavelength):
-    """Return a sinusoidal spring of stiffness [N/m] at rest and wavelength [m]."""
+    """Return the numbers of a spring whose force is stiffness/k sin(k q), with k = 2 pi/wavelength.
+
+    Parameters
+    ----------
+    stiffness : float
+        Stiffness at q = 0 [N/m].
+    wavelength : float
+        Displacement between two equal states of the spring [m].
+
+    Returns
+    -------
+    LawNumbers
+    """
     return LawNumbers("springs", (0.0, stiffness, 2 * 3.141592653589793 / wavelength))

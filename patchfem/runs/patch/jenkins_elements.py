@@ -62,11 +62,16 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     Parameters
     ----------
     patch : Patch
-        Solved patch in strips.
+        Solved patch that is divided into strips across its width.
     static : float
-        Coefficient of friction [1].
+        Coefficient of static friction [1].
     length : float
-        Bond length [m].
+        Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
+
+    Returns
+    -------
+    tuple of StripElements
+        One for each strip, in the order of the strips of the patch.
     """
     # The compliance of a strip is inversely proportional to its fraction of the width.
     slip_compliance = patch.slip_compliance * len(patch.strips.offsets)

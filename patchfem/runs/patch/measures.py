@@ -204,8 +204,19 @@ def _widen_errors_by_corner_pressure(
     """Increase the errors of the peak measures if the pressure at a corner still grows.
 
     At a corner that the profile just reaches, every refinement raises the pressure, although the
-    largest pressure of the patch may not change yet. The result is {} if the errors are large
-    enough already.
+    largest pressure of the patch may not change yet.
+
+    Parameters
+    ----------
+    measures_by_name : dict of str to Measure
+        Measures of the patch, with the errors found so far.
+    fine, coarse : Patch
+        Patch on the finest mesh, and on the mesh before it.
+
+    Returns
+    -------
+    dict of str to Measure
+        The peak measures with larger errors; {} if their errors are large enough already.
     """
     pressure = fine.pressure.sigma_n[[0, -1]].max()
     coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()

@@ -57,7 +57,15 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
-    """Add a remark on a quadrature if there is no sum over bonds."""
+    """Add a remark if the scene sets `accuracy.quadrature`, although no law of it sums over bonds.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+        Scene that is checked; it receives the remark.
+    kind : str
+        Kind of the scene. Bonds are summed only in a "bench" or a "rig".
+    """
     scene = draft.values
     laws = [table.law for table in (scene.friction, *scene.structure.interface)]
     is_summed = kind in ("bench", "rig") and any(law_has_trait(law, "bonds") for law in laws)

@@ -26,10 +26,12 @@ MIN_NOISE_FRACTION = 0.3
 class Fit:
     """Depths of a second surface, placed on the first one.
 
-    - state: parameters of the model; free: indices (j,) of those that were fitted.
-    - depth, noise: (n,) [m], the noise as standard deviation of an unworn depth.
-    - unworn, worn, grown: masks (n,).
-    - jacobian: derivative (n, j) of the depth by each fitted parameter.
+    - state (k,): parameters of the model.
+    - free (j,): indices of the parameters that were fitted.
+    - depth (n,): [m].
+    - noise (n,): standard deviation of an unworn depth [m].
+    - unworn, worn, grown (n,): masks of the heights.
+    - jacobian (n, j): derivative of the depth by each fitted parameter.
     """
 
     state: np.ndarray
