@@ -160,7 +160,7 @@ ITEMS = (
         "the path of a point, and the distance that the point has covered since a bond formed",
         LOOP,
         "",
-        "tests/friction/bonds/test_list_sums.py",
+        "tests/friction/bonds/test_bond_sums.py",
         "works",
     ),
     Item(
@@ -184,7 +184,7 @@ ITEMS = (
         "the nonlocal law as printed",
         PRINTED_LAW_SCENE,
         "studies/rig/readings.py",
-        "tests/friction/bonds/test_list_truths.py",
+        "tests/friction/bonds/test_bond_sums.py",
         "in part: the program refuses to combine this law with grooves",
     ),
     Item(
@@ -208,7 +208,7 @@ ITEMS = (
         "at constant speed the nonlocal law becomes a local law",
         LOOP,
         "studies/bench/stribeck.py",
-        "tests/friction/bonds/test_list_sums.py",
+        "tests/friction/bonds/test_bond_sums.py",
         "works",
     ),
     Item(

@@ -37,7 +37,6 @@ def test_exact_new_writes_template(tmp_path):
     assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
 
 
-@pytest.mark.slow
 def test_exact_demo_runs_shipped_rig(tmp_path):
     """`patchfem demo` runs the rig of the report: its amplitude agrees with 14.8028 um within the error."""
     answer = run_cli("demo", "-o", tmp_path / "out", "--no-page")
