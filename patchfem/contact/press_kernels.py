@@ -172,7 +172,7 @@ def refine_columns(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def take_slot(sets):
-    """Return a free slot for a contact set; if none is free, return that of the oldest set but the present one."""
+    """Return a free slot, or that of the oldest contact set other than the present one."""
     stored = sets.stored
     n_slots = stored.names.size
     slot = sets.counters[N_STORED]

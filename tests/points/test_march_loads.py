@@ -1,7 +1,9 @@
 """Modes under normal force, moment and friction: closed forms, energy balances and independent
 computations."""
 
+from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,7 +25,6 @@ from varying_load_cases import (
     total_energy,
 )
 
-from patchfem.contact import ContactSets
 from patchfem.core import InitialState, SineDrive
 from patchfem.model.structure import compute_strip_slides
 from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
@@ -91,22 +92,14 @@ def check_nodal_forces(sets, snapshots) -> set:
     return contact_sets
 
 
-class FewSets(ContactSets):
-    """Contact sets of which only the last 16 are kept."""
-
-    def make_arrays(self):
-        """Return the arrays of the search."""
-        return super().make_arrays(0.0)
-
-
-@pytest.mark.parametrize("kind", [ContactSets, FewSets])
-def test_exact_bouncing_block_conserves_energy_and_solves_contact(kind):
+@pytest.mark.parametrize("n_slots", [100_000, 64, 16])
+def test_exact_bouncing_block_conserves_energy_and_solves_contact(n_slots):
     """In 5000 steps of heave and pitch with repeated lift-off the energy is constant within
-    1e-12, and nodal forces agree with new solutions of the contact, also where only 16 contact sets are kept.
+    1e-12, and nodal forces agree with new solutions of the contact, also where few contact sets are kept.
     """
     basis = make_modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
-    sets = crowned_contact()
-    sets = kind(sets.c, sets.x, sets.opening, sets.in_contact)
+    sets = copy(crowned_contact())
+    sets.make_arrays = partial(sets.make_arrays, n_slots * (25 * sets.x.size + 80))
     start = InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3])
     result = march_pressed(basis, STILL, sets, "plastic", 10, 500, start=start, frames=400)
     assert len(check_nodal_forces(sets, result.snapshots)) > 16 and result.outcome is None
