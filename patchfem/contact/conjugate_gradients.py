@@ -235,6 +235,15 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
     """Correct forces so that they have the prescribed resultants and are nonnegative.
 
     Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
+
+    Parameters
+    ----------
+    force : (n,) array
+        Nodal forces [N].
+    rigid : (n, r) array
+        Displacements of the nodes per unit of each rigid motion.
+    target : (r,) array
+        Prescribed resultants: load and moments.
     """
     is_loaded = force > 0
     restored = np.zeros(force.size)

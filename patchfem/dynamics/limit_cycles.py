@@ -109,9 +109,11 @@ def find_relay_cycles(
 ) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction in which the interface never sticks.
 
-    After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
-    period T/2. It is a limit cycle if the interface stops at the reversal, slides in one direction in
-    between, and would need more than the static friction to stick.
+    Between two reversals the friction force is constant, so that the state y = (z, z') obeys y' = A (y - e), where e is
+    the state of rest under this force. After half a period T/2 the state must be the opposite one, exp(A T/2) (y - e) + e
+    = -y, which has one solution y for each T. The limit cycles are the roots T/2 at which this y has no velocity at the
+    interface. In addition, the interface must slide in one direction in between, and at the reversal it must need more
+    than the static friction to stick.
 
     Parameters
     ----------

@@ -45,9 +45,12 @@ SCENE_JUDGEMENTS = {
 
 
 class Row(NamedTuple):
-    """A run of a curve, and its least accurate measure.
+    """A run of a curve of cost, and its least accurate measure.
 
-    knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve.
+    - knob: what varies along the curve: TOLERANCE, or the name of a numerical setting.
+    - run: the run.
+    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
+      curve do not count.
     """
 
     knob: str
@@ -61,14 +64,19 @@ class Row(NamedTuple):
 
 
 def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
-    """Return the answer of `cost`.
+    """Return the answer of the command `cost`: the CPU time and the accuracy of runs of a scene.
 
     Parameters
     ----------
     curves : dict of str to list of Cost
-        TOLERANCE or numerical setting -> its runs from coarse to fine.
+        The runs, from coarse to fine, by what varies: TOLERANCE, or the name of a numerical setting.
     model : Model
-        Model of the scene as it is.
+        Model of the scene as it is, which no run changes.
+
+    Returns
+    -------
+    Answer
+        The verdict is on the run with the settings of the scene, or on the best run if a numerical setting varies.
     """
     tolerance = model.accuracy.tolerance
     knob, runs = next(iter(curves.items()))

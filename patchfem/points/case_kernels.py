@@ -558,7 +558,12 @@ def find_parabola_extreme(first, middle, last):
 
 @njit(**NJIT_KERNEL)
 def observe_acceleration(waves, h, case, start, now, seen):
-    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event.
+    """Update the largest acceleration by that of a step.
+
+    Without an event it is the extreme of the parabola through both ends and the middle of the step. At an event, where the
+    point stops, reverses or is released (`Now.EVENT`), the velocity is 0 and the force may jump, so that the accelerations
+    before and after it count. The slide there is taken from the end of the step, which differs by O(h^2), because the
+    velocity is 0 at the event.
 
     Parameters
     ----------

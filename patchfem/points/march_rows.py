@@ -124,8 +124,9 @@ class Flank(IntEnum):
 class Total(IntEnum):
     """Entries of `System.totals`.
 
-    - WORK_IN, POWER, VISCOUS, FRICTION: work of the drive, its magnitude, viscous loss and friction work since the start
-      [J]
+    - WORK_IN: work of the drive since the start [J]
+    - POWER: sum over the steps of the magnitude of this work [J]
+    - VISCOUS, FRICTION: viscous loss and friction work since the start [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - IS_FULL: 1 if a list of bonds is full

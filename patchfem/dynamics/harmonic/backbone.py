@@ -232,6 +232,12 @@ class FreeBalance:
         start, target : float
             First and last amplitude [m].
 
+        Returns
+        -------
+        x : (N,) array
+            Unknowns at the last amplitude.
+        motion : FreeMotion
+
         Raises
         ------
         NotConverged
@@ -239,6 +245,7 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
+            # First guess: slides and amplitude in proportion to the target; frequency and damping ratio stay.
             scaled = x * (targets[-1] / start)
             scaled[-3:-1] = x[-3:-1]
             try:

@@ -163,7 +163,19 @@ def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_growing(after, scale, factor, bonds):
-    """Write force and energy of all strips of growing bonds by two Gauss points each."""
+    """Write force and energy of all strips of growing bonds by two Gauss points each.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strips are summed.
+    scale : float
+        Factor that undoes the scale of the values of the strips (`_value_scale`).
+    factor : float
+        Factor of forces and energies, 1/(Gamma(p + 1) eps_0) [1/m].
+    bonds : list_rows_kernels.BondList
+        List of bonds, whose forces and energies are overwritten.
+    """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     is_whole = p == 0.0 or p == 1.0 or p == 2.0

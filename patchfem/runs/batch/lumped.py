@@ -407,7 +407,22 @@ def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
 
 
 def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
-    """Return the indices of CLASSES (n,), and the steady amplitudes with errors (n,) [m]."""
+    """Classify the motions of n cases by their outcome, and estimate their steady amplitudes.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Magnitudes of the motions, with the decay rates of the modes `decay` (n,) [1/s].
+    refined : Refined
+        March of the cases, with the smallest and largest output `extremes` (n, cycles, 2) [m] of each cycle.
+
+    Returns
+    -------
+    tuple
+        Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each, in this order.
+    """
     march, values = refined.march, refined.march.values
     omega = cases.parameters[:, Number.OMEGA]
     cycles = march.extremes.shape[1]
@@ -431,7 +446,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
             ),
         )
 
-    # A periodic motion about a moving mean is transient, which is class 0.
+    # A periodic motion about a moving mean is transient.
     drifts = is_drifting(
         values["drift_per_cycle"],
         refined.errors["drift_per_cycle"],
@@ -440,7 +455,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
         error_floor("drift_per_cycle", scales.displacement),
     )
     is_steady = classes == CLASSES.index(Outcome.STEADY)
-    return np.where(is_steady & drifts, 0, classes), *steady
+    return np.where(is_steady & drifts, CLASSES.index(Outcome.TRANSIENT), classes), *steady
 
 
 def needs_single_run(
