@@ -708,8 +708,8 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         if last < 0:
             angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
             seen[Seen.STARTS] += 1
-            seen[Seen.START_COS] += cos(angle)
-            seen[Seen.START_SIN] += sin(angle)
+            seen[Seen.SLIP_START_PHASE_COS] += cos(angle)
+            seen[Seen.SLIP_START_PHASE_SIN] += sin(angle)
 
     seen[Seen.STUCK] += sticking
     seen[Seen.MIDDLE] = centre

@@ -88,7 +88,7 @@ class Seen(IntEnum):
     - MIN_SLIP, MAX_SLIP: smallest and largest irreversible slide [m]
     - STUCK: time of stick [s]
     - STARTS: number of starts of slip
-    - START_COS, START_SIN: sums of cosine and sine of twice the phases of the drive at these starts
+    - SLIP_START_PHASE_COS, SLIP_START_PHASE_SIN: sums of cosine and sine of twice the phases of the drive at these starts
     - MIDDLE: time in the cycle at the middle of the last step [s]
     - EXCESS: irreversible fraction of the path of the last step, less 1/2
     - COS_1, SIN_1: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) [m s]
@@ -112,8 +112,8 @@ class Seen(IntEnum):
     MAX_SLIP = 3
     STUCK = 4
     STARTS = 5
-    START_COS = 6
-    START_SIN = 7
+    SLIP_START_PHASE_COS = 6
+    SLIP_START_PHASE_SIN = 7
     MIDDLE = 8
     EXCESS = 9
     COS_1 = 10

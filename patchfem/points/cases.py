@@ -133,7 +133,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
         "stick_fraction": np.where(stuck > 1 - ALWAYS_STUCK, 1.0, stuck),
         "slip_start_phase": path_work.mean_slip_phase(
-            seen[:, Seen.STARTS], seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
+            seen[:, Seen.STARTS], seen[:, Seen.SLIP_START_PHASE_COS], seen[:, Seen.SLIP_START_PHASE_SIN]
         ),
         "normal_load": columns[Number.LOAD],
         "loop_area": work / count,

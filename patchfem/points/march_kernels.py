@@ -945,7 +945,7 @@ def commit(system, h):
     energy = find_motion_energy(system)
     system.totals[Total.REST] = 0.0
     if options.is_rigid and system.sets.counters[PRESENT_SLOT] >= 0:
-        rest_ports(system)
+        return_ports_to_rest(system)
         system.totals[Total.REST] = find_motion_energy(system) - energy
 
     # The mean of the rise speed over the step is slope dq/h.
@@ -1110,7 +1110,7 @@ def find_motion_energy(system):
 
 
 @njit(**NJIT_CALL)
-def rest_ports(system):
+def return_ports_to_rest(system):
     """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
 
     A constant force over the step only makes their velocity vanish at its end. `Port.FREE` has their displacements.

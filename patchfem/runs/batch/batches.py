@@ -16,13 +16,13 @@ from . import lumped, one_by_one
 from .case_results import CaseResults
 
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
-MIN_CASES = 32
+MIN_CASES_TO_GROUP = 32
 MIN_CHUNK_CASES = 256
 
 
 def find_group(model: Model, n_study_cases: int) -> Hashable | None:
     """Return the key of the models that are computed together with a model; None if it is computed by a single run."""
-    if n_study_cases < MIN_CASES or model.kind != "rig":
+    if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
         return None if lumped.refusal_reason(model) else lumped.group_key(model)

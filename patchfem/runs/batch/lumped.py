@@ -77,7 +77,7 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
-RIGID_SECANT = "secant_stiffness"
+SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
 class Scales(NamedTuple):
@@ -368,7 +368,7 @@ def make_results(
         sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
         moves = values[AMPLITUDE] > 0
         _put_reason(
-            results, RIGID_SECANT, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
+            results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
         )
 
     # Measures that a case lacks get the reasons that a single run states.

@@ -195,7 +195,7 @@ def _measure(
     names = NAMES[rasters[0].z.ndim]
     if not aligned.reason:
         depths = make_depths(aligned.model, aligned.fit, aligned.gain_error)
-        placement = _describe_place(aligned)
+        placement = _make_placement(aligned)
         hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     else:
         depths = find_flanked_track(*rasters) if is_trace else None
@@ -275,8 +275,8 @@ def _find_detection_limit(depths: DepthMap) -> float:
     return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
 
 
-def _describe_place(aligned: Aligned) -> Placement:
-    """Return shift, turn and gain with the errors that follow from the unworn heights."""
+def _make_placement(aligned: Aligned) -> Placement:
+    """Return shift, rotation and gain of the second surface, with the errors that follow from the unworn heights."""
     state = aligned.fit.state
     errors = aligned.fit.errors
     placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))
