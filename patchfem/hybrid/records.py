@@ -164,9 +164,13 @@ class Memory(IntEnum):
 
 
 class Margin(IntEnum):
-    """Margins of a regime: direction of motion or rest, branch, contact, and a limit of the law.
+    """Margins of the present regime of a law; the regime ends when one of them becomes negative.
 
-    AFTER is no margin; it marks the row after an event at which the force of a rigid law may jump.
+    - MOTION: direction of the motion, or rest of a rigid law
+    - BRANCH: branch of the law between two limits of its own
+    - CONTACT: contact or lift-off
+    - LIMIT: a further limit of the law
+    - AFTER: no margin; it marks the row after an event at which the force of a rigid law may jump
     """
 
     MOTION = 0
@@ -413,7 +417,14 @@ class Friction(NamedTuple):
 
 
 class LawNumbers(NamedTuple):
-    """A law of one interface: its name in `laws.LAWS`, its numbers, first states, scales of the states, length [m]."""
+    """A law of one interface.
+
+    - law: name of the law in `laws.LAWS`
+    - numbers: numbers of the law
+    - states: its states at the start
+    - scales: smallest magnitudes of the states, to which the errors of a step are relative
+    - length: stretch before slip [m] of a law whose force follows from the slide alone, else infinite
+    """
 
     law: str
     numbers: tuple[float, ...]

@@ -35,7 +35,13 @@ class ReducedModes(NamedTuple):
 
 
 class _ReducedFiles(NamedTuple):
-    """Matrices of the files by key, boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
+    """What the files of a reduced structure contain.
+
+    - values: matrices by key.
+    - boundary (b,): rows of the boundary coordinates.
+    - moved (n,): motion of the coordinates for a unit motion of the base; None if the base does not move.
+    - notes: sentences on the files.
+    """
 
     values: dict[str, Any]
     boundary: np.ndarray

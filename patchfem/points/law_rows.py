@@ -21,8 +21,13 @@ class Law(IntEnum):
 class Masing(IntEnum):
     """Rows of the memory of parallel sliders, which follow Masing's rules.
 
-    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
-    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
+    - SLIDE, FORCE: displacement [m] and force [N]
+    - DIRECTION: sign of the last motion
+    - COUNT: number of reversals on the stack
+    - VIRGIN: 1 until the sliders have slipped as a whole, then -1
+    - ENERGY: stored energy [J]
+    - STRETCH: mean stretch [m]
+    - STACK: first row of pairs of displacement [m] and force [N] at the reversals
     """
 
     SLIDE = 0

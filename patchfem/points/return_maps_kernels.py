@@ -50,7 +50,13 @@ DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre la
 
 
 class Step(NamedTuple):
-    """Increment [m] and duration [s], velocities at both ends [m/s], and velocity per force [m/(s N)]."""
+    """Step of a contact point.
+
+    - increment: increment of the slide [m]
+    - duration: duration [s]
+    - start_velocity, end_velocity: velocities at both ends [m/s]
+    - mobility: change of the velocity at the end per mean force of the step [m/(s N)]
+    """
 
     increment: float
     duration: float
@@ -60,11 +66,13 @@ class Step(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
+    """Friction force of a point over a step.
 
-    For a step that is long for the law "tanh" the force at the end is that at the start, as if it did not change. `bend`
-    [N] is the mean force less the mean of the forces at both ends, for the law "tanh", and the change of the elastic
-    force, for the LuGre law.
+    - force: mean over the path of the step [N]
+    - by_increment, by_velocity: its derivatives by the increment [N/m] and by the velocity at the end [N s/m]
+    - end: force at the end [N]. For a step that is long for the law "tanh" it is that at the start, as if it did not change
+    - bend: for the law "tanh", the mean force less the mean of the forces at both ends [N]; for the LuGre law, the change of
+      the elastic force [N]
     """
 
     force: float

@@ -27,10 +27,12 @@ EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trac
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Trace of heights z (n,) [m] at increasing positions x (n,) [m]; heights that were not measured are NaN.
+    """Trace of a surface, which is straight between its samples.
 
-    Between samples the trace is straight. source: name of the trace for messages; notes: sentences
-    on its treatment.
+    - x (n,): increasing positions [m].
+    - z (n,): heights [m]; NaN where one was not measured.
+    - source: name of the trace for messages.
+    - notes: sentences on its treatment.
     """
 
     x: np.ndarray

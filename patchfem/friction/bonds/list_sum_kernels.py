@@ -59,7 +59,15 @@ class BondSum(NamedTuple):
 
 
 class PathValues(NamedTuple):
-    """Path state of a list after an increment, and the bond length [m] in the middle of it."""
+    """State of the path of a list of bonds after an increment.
+
+    - displacement: relative displacement [m]
+    - path: length of the path [m]
+    - damage: integral of dR/eps along the path [1], for reading="stretch"
+    - growth: exponent J of the growth of bonds [1]
+    - length: bond length [m]
+    - middle_length: bond length in the middle of the increment [m]
+    """
 
     displacement: float
     path: float

@@ -52,7 +52,13 @@ MIN_TOPS_FRACTION = 0.6
 
 
 class Names(NamedTuple):
-    """Names of the quantities of traces or scans; wear: those that need wear, place: those that need a common place."""
+    """Names of the quantities of a comparison of traces, or of scans.
+
+    - lost, grown: lost and grown material.
+    - region: size of the part that both surfaces show.
+    - wear: quantities that have a value only if there is wear.
+    - place: quantities that have a value only if a common place is found.
+    """
 
     lost: str
     grown: str
