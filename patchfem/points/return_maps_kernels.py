@@ -276,7 +276,21 @@ def _mean_spring(numbers, slide, j, dq):
 
 @njit(**NJIT_KERNEL)
 def _walk_bouc_wen(numbers, z, j, load, dq):
-    """Return force and path-mean force of the Bouc-Wen law."""
+    """Return the force of the Bouc-Wen law at the end of an increment, and its mean over the path.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    z : float
+        State of the law at the start.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    dq : float
+        Increment of the slide [m].
+    """
     direction = 1.0 if dq > 0 else -1.0
     path = follow_path(direction * z, abs(dq) / numbers[2, j], numbers[3, j], numbers[4, j])
     limit = direction * numbers[1, j] * load
@@ -285,7 +299,17 @@ def _walk_bouc_wen(numbers, z, j, load, dq):
 
 @njit(**NJIT_KERNEL)
 def _first_loading(numbers, j, x):
-    """Return the force of first loading and its integral, of Segalman's sliders (2005, eq. 22)."""
+    """Return the force [N] of Segalman's sliders (2005, eq. 22) on first loading, and its integral [J].
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    j : int
+        Number of the point.
+    x : float
+        Displacement since the start of loading [m], >= 0.
+    """
     phi = numbers[2, j]
     beta = numbers[4, j]
     order = numbers[3, j]
@@ -305,6 +329,19 @@ def _walk(numbers, memory, j, dq, commits):
 
     A branch from a reversal (q_r, F_r) is F = F_r + 2 d B(d (q - q_r)/2) with the force B of first loading. It ends
     where it meets the start of the branch before. Entries of the stack from COUNT on may be overwritten.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    memory : (l, m) array
+        Memory of the laws, in the rows of `Masing` for this law.
+    j : int
+        Number of the point.
+    dq : float
+        Increment of the slide [m].
+    commits : bool
+        Whether the memory is advanced to the end of the increment.
     """
     direction = 1.0 if dq > 0 else -1.0
     q = memory[Masing.SLIDE, j]

@@ -223,7 +223,21 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
 
 
 def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Quantity]:
-    """Measure the worn part of a line with worn depths [m] and a lost area [m2]."""
+    """Measure the worn part of a line.
+
+    Parameters
+    ----------
+    x : (m,) array
+        Positions of the nodes [m].
+    depth : (m,) array
+        Worn depths [m].
+    is_worn : (m,) array of bool
+        Nodes that are worn.
+    error : float
+        Error of the depths [m].
+    area : float
+        Lost area [m2].
+    """
     worn = np.flatnonzero(is_worn)
     first = max(int(worn[0]) - 1, 0)
     last = min(int(worn[-1]) + 1, x.size - 1)

@@ -327,7 +327,19 @@ def _insert(record, rows, part):
 def make_results(
     models: Sequence[Model], cases: Cases, scales: Scales, refined: Refined
 ) -> CaseResults:
-    """Return the measures, errors, outcomes and reasons that single runs have."""
+    """Return the measures of n cases as their single runs would have them, with errors, outcomes and reasons.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        Models of the cases.
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases with as many steps as their tolerances need.
+    """
     values, errors = dict(refined.march.values), dict(refined.errors)
     results = CaseResults.blank(len(scales.tolerance))
     window = int(cases.parameters[0, Number.WINDOW])

@@ -179,7 +179,18 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
 
     The first entry is the error bound of the sum on forces and energies. If bonds are merged or a
     large tail is neglected, the second entry is the change of the motion with narrower strips and a
-    smaller tail. Its runs have the settings `quarter`, i.e. a quarter of the steps.
+    smaller tail.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    quarter : Numerics
+        Settings of these runs, with a quarter of the steps of the run.
+    patch : Patch or None
+        Solved patch.
+    solution : Solution
+        Results of the run.
     """
     choice = solution.bond_summation
     if choice is None or not choice.error:
