@@ -342,7 +342,19 @@ def find_balance_cycles(
 def _find_mode_cycles(
     modes: ModalBasis, group: LawGroup, mode: int, size: float
 ) -> tuple[list[LimitCycle], float]:
-    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
+    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    group : LawGroup
+        Law of the interface.
+    mode : int
+        Index of the coordinate of the mode.
+    size : float
+        Amplitude [m] at which the interface slips as a whole; the range of amplitudes is relative to it.
+    """
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
 
@@ -388,9 +400,25 @@ def _find_undamped_motions(
     path: tuple[np.ndarray, tuple[float, np.ndarray]],
     harmonics: int,
 ) -> list[LimitCycle] | None:
-    """Find the limit cycles of a mode: free motions without damping; None if free motions are not found.
+    """Find the limit cycles of a mode, which are its free motions without damping.
 
-    path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    group : LawGroup
+        Law of the interface.
+    mode : int
+        Index of the coordinate of the mode.
+    path : tuple
+        Amplitudes (k,) [m], and the frequency [rad/s] and the shape (n,) of the first motion.
+    harmonics : int
+        Number of harmonics.
+
+    Returns
+    -------
+    list of LimitCycle or None
+        None if free motions are not found at all amplitudes.
     """
     amplitudes, start = path
     samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])

@@ -230,6 +230,19 @@ def _mean_lugre(numbers, stretch, j, load, step):
     The stretch z relaxes to the steady one, z_s = g(v)/k in the direction of slip, over a path x = integral of
     |v|/|z_s|. With x by Simpson's rule and z_s linear in the path between both ends the law is solved exactly, so that
     a stiff law ends in its steady state.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    stretch : float
+        Stretch at the start of the step [m].
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    step : Step
+        Increment, duration and velocities.
     """
     dq = step.increment
     duration = step.duration

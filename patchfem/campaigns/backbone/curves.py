@@ -46,7 +46,8 @@ FLUTTER_TOL = 1e-8
 class Levels(NamedTuple):
     """Amplitudes of a backbone, or the forces that hold the phase resonance; () for a range around the onset of slip.
 
-    amplitudes: at the output [m]; forces: at the output [N].
+    - amplitudes: amplitudes at the output [m].
+    - forces: forces at the output [N].
     """
 
     amplitudes: Sequence[float] = ()

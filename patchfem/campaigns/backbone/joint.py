@@ -34,7 +34,8 @@ NO_CLOSED_FORM = (
 class StuckMode(NamedTuple):
     """Structural mode with its contact stuck.
 
-    omega: circular frequency [rad/s], None if nothing is elastic; shape: (n,).
+    - omega: circular frequency [rad/s]; None if nothing is elastic.
+    - shape (n,): modal coordinates of the mode.
     """
 
     omega: float | None

@@ -422,10 +422,25 @@ def _add_to_mean(weight, row, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_panels(weight, row, increment, bonds, v0, dt):
-    """Add a row, averaged over an increment by panels of Gauss points, to the row of the mean force.
+    """Add the average of a row of the strips over an increment, by panels of Gauss points, to the row of the mean force.
 
     Each panel is twice as long as the one before. The last one may be short, so that the mean force depends continuously
     on the increment.
+
+    Parameters
+    ----------
+    weight : float
+        Factor of the average.
+    row : int
+        Row of the strips that is averaged (`StripRows`).
+    increment : float
+        Increment from the present state [m].
+    bonds : list_rows_kernels.BondList
+        List of bonds, which is changed.
+    v0 : float
+        Velocity at the start of the increment [m/s].
+    dt : float
+        Duration of the increment [s].
     """
     path = abs(increment) / bonds.now[PATH.length]
 
