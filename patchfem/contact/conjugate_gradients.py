@@ -214,7 +214,16 @@ def solve_by_gradients(
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
     """Return nodal forces [N] as an initial guess; they need not balance the prescribed load and moment.
 
-    start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
+    Parameters
+    ----------
+    program : _QuadraticProgram
+        Contact problem.
+    start : (n_nodes,) array or None
+        Forces of the nodes [N] from which the solution starts; the springs of the holder then begin without force.
+    n_nodes : int
+        Number of nodes; the other forces are those of the springs of the holder.
+    eigenvalue_bound : float
+        Upper bound of the eigenvalues of the compliance [m/N].
     """
     n_forces = program.gap.size
     if start is not None:

@@ -111,18 +111,21 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
-    `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
-    `error`} and `meets_tolerance`. `sentence`: the cost of all measures; None for TOLERANCE, because its runs have
-    different tolerances.
-
     Parameters
     ----------
     knob : str
-        TOLERANCE or a numerical setting.
+        What varies: TOLERANCE, or the name of a numerical setting.
     runs : list of Cost
-        From coarse to fine.
+        Runs of the curve, from coarse to fine.
     tolerance : float
-        That of the scene.
+        Tolerance of the scene.
+
+    Returns
+    -------
+    dict
+        - `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
+          `error`} and `meets_tolerance`.
+        - `sentence`: the cost of all measures; None for TOLERANCE, because its runs have different tolerances.
     """
     names = find_measures_with_error(runs)
     entries = []

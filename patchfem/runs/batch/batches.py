@@ -98,7 +98,20 @@ def _solve_group(
     solve_one_by_one: Callable[[Sequence[Model]], CaseResults],
     report: Callable | None,
 ) -> CaseResults:
-    """Compute the results of a group together, or by single runs if it is None or if this fails."""
+    """Compute the results of a group of cases together, or by single runs.
+
+    Parameters
+    ----------
+    group : hashable or None
+        What the cases have in common; None for cases that must be run one by one.
+    models : sequence of Model
+        Models of the cases.
+    solve_one_by_one : callable
+        Function that takes models and returns their results by single runs. It is also used if the common computation
+        fails.
+    report : callable or None
+        Function that reports the progress.
+    """
     faults = []
     if group is not None:
         try:

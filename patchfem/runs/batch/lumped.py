@@ -473,7 +473,19 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
 def needs_single_run(
     cases: Cases, scales: Scales, refined: Refined, results: CaseResults
 ) -> np.ndarray:
-    """Return a mask (n,) of the cases that only a single run can compute."""
+    """Return a mask (n,) of the cases that only a single run can compute.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases with as many steps as their tolerances need.
+    results : CaseResults
+        Results of the march.
+    """
     march = refined.march
     values = march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
