@@ -217,7 +217,16 @@ class Clock(IntEnum):
 
 
 class Status(IntEnum):
-    """How a run ended."""
+    """How a run ended.
+
+    - DONE: at the end of its last cycle
+    - EXCEEDS_TRAVEL: the output reached `Setting.TRAVEL`
+    - LEAVES_GROOVES: the contact left its grooves
+    - TOO_MANY_STEPS: the run needs more than `Setting.MAX_STEPS` steps
+    - STEP_TOO_SMALL: the steps became smaller than round-off
+    - NO_PROGRESS: the laws changed their regime again and again at the same time
+    - TOO_STIFF: a law stretches too little before it slips
+    """
 
     DONE = 0
     EXCEEDS_TRAVEL = 1

@@ -101,9 +101,9 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     cases : Cases
         The cases that were run.
     now : (c, 17) array
-        States at the end, in the rows of `case_rows.Now`.
+        States at the end, in the order of `case_rows.Now`.
     seen : (c, 30) array
-        What was observed, in the rows of `case_rows.Seen`.
+        What was observed, in the order of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.
     """
@@ -163,7 +163,21 @@ def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
 
 
 def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
-    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
+    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration.
+
+    Parameters
+    ----------
+    cases : Cases
+        The c cases that were run.
+    now : (c, 17) array
+        States at the end, in the order of `case_rows.Now`.
+    seen : (c, 30) array
+        What was observed, in the order of `case_rows.Seen`.
+    area : (c,) array
+        Friction work per cycle [J].
+    slide_range : (c,) array
+        Range of the slide in the window [m].
+    """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
     span = seen[:, Seen.SPAN]

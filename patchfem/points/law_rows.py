@@ -4,7 +4,17 @@ from enum import IntEnum
 
 
 class Law(IntEnum):
-    """Number of a friction law or spring in row 0 of `numbers`."""
+    """Number of a friction law or spring in row 0 of `numbers`.
+
+    - COULOMB: rigid friction
+    - TANH: friction that follows the velocity, as its hyperbolic tangent
+    - JENKINS: spring and slider in series
+    - MASING: parallel sliders, see `Masing`
+    - BOUC_WEN, LUGRE: laws of these names
+    - BONDS: bonds that are summed by their moments
+    - CUBIC, INTERLOCK: nonlinear springs
+    - LIST: bonds that are summed by a list of strips
+    """
 
     COULOMB = 0
     TANH = 1

@@ -18,7 +18,13 @@ MIN_LIMIT_RATIO = 1e-9
 
 
 class LuGreNumber(IntEnum):
-    """Indices of the parameters of the law; the first one is reserved for the engines."""
+    """Indices of the parameters of the law; index 0 is reserved for the engines.
+
+    - STIFFNESS: stiffness [N/m]
+    - KINETIC, STATIC: kinetic and static friction force [N]
+    - SPEED: Stribeck velocity [m/s]
+    - MICRO_DAMPING, VISCOUS: micro-damping and viscous damping [N s/m]
+    """
 
     STIFFNESS = 1
     KINETIC = 2
