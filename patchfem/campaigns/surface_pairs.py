@@ -14,8 +14,11 @@ DIRECTIONS = ("", "x", "y")
 class TableLine(NamedTuple):
     """Line of a table of pairs.
 
-    line: its number; names: both files as written; paths: where they are; direction: "x", "y" or "";
-    labels: the other cells by column.
+    - line: number of the line in the file.
+    - names: both files as written.
+    - paths: where both files are.
+    - direction: "x", "y" or "".
+    - labels: the other cells by column.
     """
 
     line: int

@@ -37,7 +37,13 @@ OPTIONAL_PACKAGES = {
 
 
 class Finding(NamedTuple):
-    """Result of a check: its name, whether it passed, the finding, and the remedy ("" if none is needed)."""
+    """Result of a check of the installation.
+
+    - name: what was checked.
+    - fine: whether the check passed.
+    - found: what was found.
+    - cure: remedy; "" if none is needed.
+    """
 
     name: str
     fine: bool

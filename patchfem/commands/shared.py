@@ -27,7 +27,15 @@ NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if som
 
 
 def flag_option(text: str, *names: str) -> type:
-    """Return the type of an option without a value; `text` is its help text."""
+    """Return the type of an option without a value.
+
+    Parameters
+    ----------
+    text : str
+        Help text.
+    *names : str
+        Spellings of the option, such as "--quiet" and "-q"; by default, the name of the parameter.
+    """
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
     ]

@@ -83,9 +83,13 @@ class ExponentialAsperities(SmoothAsperities):
 class HertzAsperities(SmoothAsperities):
     """Asperity layer whose Hertzian peaks have Gaussian heights (Greenwood and Williamson 1966).
 
-    P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];
-    deviation [m] of the peak heights; modulus: E* [Pa] of the pair, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2. All >
-    0. The relative error of P is below 1e-13 at any s.
+    P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz with peaks of mean height 0. The relative error of P is below
+    1e-13 at any s. All numbers are above 0:
+
+    - radius: radius R of a peak [m].
+    - density: number eta of peaks per area [1/m2].
+    - deviation: standard deviation of the peak heights [m].
+    - modulus: E* of the pair [Pa], 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2.
     """
 
     radius: float

@@ -95,8 +95,16 @@ class _NewtonStep(NamedTuple):
 def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _NewtonStep:
     """Return the Newton step of the contact equations: forces, motion and separations.
 
-    slope: (n,) stiffness D of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
-    [m]; imbalance: (r,) missing load and moments.
+    Parameters
+    ----------
+    problem : AsperityProblem
+        Compliance, contact and asperity layer.
+    slope : (n,) array
+        Stiffness D of the asperity layer [N/m].
+    mismatch : (n,) array
+        Separation of the geometry less that of the law [m].
+    imbalance : (r,) array
+        Missing load and moments.
     """
     contact = problem.contact
     n_nodes = len(problem.compliance.common)

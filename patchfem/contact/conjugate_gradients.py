@@ -214,7 +214,16 @@ def solve_by_gradients(
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
     """Return nodal forces [N] as an initial guess; they need not balance the prescribed load and moment.
 
-    start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
+    Parameters
+    ----------
+    program : _QuadraticProgram
+        Contact problem.
+    start : (n_nodes,) array or None
+        Forces of the nodes [N] from which the solution starts; the springs of the holder then begin without force.
+    n_nodes : int
+        Number of nodes; the other forces are those of the springs of the holder.
+    eigenvalue_bound : float
+        Upper bound of the eigenvalues of the compliance [m/N].
     """
     n_forces = program.gap.size
     if start is not None:
@@ -235,6 +244,15 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
     """Correct forces so that they have the prescribed resultants and are nonnegative.
 
     Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
+
+    Parameters
+    ----------
+    force : (n,) array
+        Nodal forces [N].
+    rigid : (n, r) array
+        Displacements of the nodes per unit of each rigid motion.
+    target : (r,) array
+        Prescribed resultants: load and moments.
     """
     is_loaded = force > 0
     restored = np.zeros(force.size)

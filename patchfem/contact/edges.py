@@ -321,15 +321,15 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
 
 
 def parabola_change(shift: float, gain: float, loss: float) -> float:
-    """Return the change at a given shift of a contact edge, interpolated by a parabola.
+    """Return the change of a stiffness with the place of a contact edge, interpolated by a parabola.
 
-    The change is `gain` at 1, -`loss` at -1 and 0 at 0.
+    The change is `gain` at a shift of 1, -`loss` at -1 and 0 at 0.
 
     Parameters
     ----------
     shift : float or ndarray
         Shift of the edge from the middle of a cell, in cells.
     gain, loss : float or ndarray
-        Change of the stiffness with one node more, and less its change with one node less [N/m], [N m/rad].
+        Increase of the stiffness by one node more in contact, and decrease by one node less [N/m] or [N m/rad].
     """
     return shift * (gain + loss) / 2 + shift**2 * (gain - loss) / 2

@@ -366,7 +366,25 @@ def _refuse_loose_holder(force, holder: Holder) -> None:
 def _make_state(
     strips: StripModel, force, opening, motion, holder: Holder, n_iterations: int = 0, residuals=()
 ) -> StripsState:
-    """Assemble the contact state of strips from a solution with the free motions (r,) of the holder."""
+    """Assemble the contact state of s strips of m nodes from a solution.
+
+    Parameters
+    ----------
+    strips : StripModel
+        Compliance, layout and asperity layer of the strips.
+    force : (s, m) array
+        Normal forces of the nodes [N].
+    opening : (s, m) array
+        Gap of the interface under load [m].
+    motion : (r,) array
+        Free motions of the holder: approach [m], then its free rotations with the opposite sign [rad].
+    holder : Holder
+        Prescribed load, moments and rotations.
+    n_iterations : int
+        Number of iterations of the solver.
+    residuals : dict or sequence of pairs
+        Residuals of the solution by name.
+    """
     _, layout, asperities = strips
     stiffness = None
     if asperities is not None:

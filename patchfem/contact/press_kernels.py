@@ -267,7 +267,12 @@ def build_set(sets, name):
 def find_stored(sets, name):
     """Return the slot in which the target contact set is stored, or -1.
 
-    name: name of the set; sets of equal names are compared node by node.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
+    name : int
+        Hash of the target set. Different sets may have equal hashes, so that sets are also compared node by node.
     """
     stored = sets.stored
     slot = stored.heads[name & (stored.heads.size - 1)]
@@ -405,7 +410,14 @@ def find_set(sets, slot, d, t):
 def build_first_set(sets, name):
     """Compute the target contact set from an empty tableau, and return its slot.
 
-    name: name of the set. The slot is -1 if the compliance is not positive definite on the set.
+    The slot is -1 if the compliance is not positive definite on the set.
+
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
+    name : int
+        Hash of the target set.
     """
     reset_tableau(sets)
     return build_set(sets, name)

@@ -82,7 +82,14 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
     rotation of the holder if the other nodes are open then, else the mean of the two limits.
 
-    rest_rotation: rotation q [rad] that is already contained in the gap.
+    Parameters
+    ----------
+    compliance
+        Compliance of the nodes [m/N].
+    problem : ContactProblem
+        Gap, motions of the holder and prescribed load and moment.
+    rest_rotation : float
+        Rotation q [rad] that is already contained in the gap.
     """
     gap = problem.gap
     position = problem.motions[:, 1]

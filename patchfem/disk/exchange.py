@@ -38,7 +38,16 @@ def replace_folder(new: Path, target: Path) -> None:
 
 
 def restore_folder(target: Path) -> None:
-    """Restore the previous folder if a writer was killed between two renames, or remove it."""
+    """Undo or complete a replacement of a folder that was interrupted (`replace_folder`).
+
+    If the folder is missing, its previous version gets its name back. Otherwise the previous version is deleted, because
+    the new one is complete.
+
+    Parameters
+    ----------
+    target : Path
+        Folder that was replaced.
+    """
     old = make_old_folder_path(target)
     if old.is_dir() and not old.is_symlink():
         if target.exists():

@@ -109,9 +109,11 @@ def find_relay_cycles(
 ) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction in which the interface never sticks.
 
-    After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
-    period T/2. It is a limit cycle if the interface stops at the reversal, slides in one direction in
-    between, and would need more than the static friction to stick.
+    Between two reversals the friction force is constant, so that the state y = (z, z') obeys y' = A (y - e), where e is
+    the state of rest under this force. After half a period T/2 the state must be the opposite one, exp(A T/2) (y - e) + e
+    = -y, which has one solution y for each T. The limit cycles are the roots T/2 at which this y has no velocity at the
+    interface. In addition, the interface must slide in one direction in between, and at the reversal it must need more
+    than the static friction to stick.
 
     Parameters
     ----------
@@ -340,7 +342,19 @@ def find_balance_cycles(
 def _find_mode_cycles(
     modes: ModalBasis, group: LawGroup, mode: int, size: float
 ) -> tuple[list[LimitCycle], float]:
-    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
+    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    group : LawGroup
+        Law of the interface.
+    mode : int
+        Index of the coordinate of the mode.
+    size : float
+        Estimated amplitude of the coordinate [m]; the examined range of amplitudes is relative to it.
+    """
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
 
@@ -386,9 +400,25 @@ def _find_undamped_motions(
     path: tuple[np.ndarray, tuple[float, np.ndarray]],
     harmonics: int,
 ) -> list[LimitCycle] | None:
-    """Find the limit cycles of a mode: free motions without damping; None if free motions are not found.
+    """Find the limit cycles of a mode, which are its free motions without damping.
 
-    path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    group : LawGroup
+        Law of the interface.
+    mode : int
+        Index of the coordinate of the mode.
+    path : tuple
+        Amplitudes (k,) [m], and the frequency [rad/s] and the shape (n,) of the first motion.
+    harmonics : int
+        Number of harmonics.
+
+    Returns
+    -------
+    list of LimitCycle or None
+        None if free motions are not found at all amplitudes.
     """
     amplitudes, start = path
     samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])

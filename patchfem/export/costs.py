@@ -45,9 +45,12 @@ SCENE_JUDGEMENTS = {
 
 
 class Row(NamedTuple):
-    """A run of a curve, and its least accurate measure.
+    """A run of a curve of cost, and its least accurate measure.
 
-    knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve.
+    - knob: what varies along the curve: TOLERANCE, or the name of a numerical setting.
+    - run: the run.
+    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
+      curve do not count.
     """
 
     knob: str
@@ -61,14 +64,19 @@ class Row(NamedTuple):
 
 
 def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
-    """Return the answer of `cost`.
+    """Return the answer of the command `cost`: the CPU time and the accuracy of runs of a scene.
 
     Parameters
     ----------
     curves : dict of str to list of Cost
-        TOLERANCE or numerical setting -> its runs from coarse to fine.
+        The runs, from coarse to fine, by what varies: TOLERANCE, or the name of a numerical setting.
     model : Model
-        Model of the scene as it is.
+        Model of the scene as it is, which no run changes.
+
+    Returns
+    -------
+    Answer
+        The verdict is on the run with the settings of the scene, or on the best run if a numerical setting varies.
     """
     tolerance = model.accuracy.tolerance
     knob, runs = next(iter(curves.items()))
@@ -103,18 +111,21 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
-    `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
-    `error`} and `meets_tolerance`. `sentence`: the cost of all measures; None for TOLERANCE, because its runs have
-    different tolerances.
-
     Parameters
     ----------
     knob : str
-        TOLERANCE or a numerical setting.
+        What varies: TOLERANCE, or the name of a numerical setting.
     runs : list of Cost
-        From coarse to fine.
+        Runs of the curve, from coarse to fine.
     tolerance : float
-        That of the scene.
+        Tolerance of the scene.
+
+    Returns
+    -------
+    dict
+        - `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
+          `error`} and `meets_tolerance`.
+        - `sentence`: the cost of all measures; None for TOLERANCE, because its runs have different tolerances.
     """
     names = find_measures_with_error(runs)
     entries = []

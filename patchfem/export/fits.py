@@ -95,8 +95,10 @@ def compute_answer(
 class Parts(NamedTuple):
     """What differs between the kinds of fits.
 
-    residual: sentence on the distance of fit and measurement; details: further keys of fit.json, among them `measured` (name
-    of the file) and `quantity` (what was measured); scores: quantities of the residual; data.
+    - residual: sentence on the distance of fit and measurement.
+    - details: further keys of fit.json, among them `measured` (name of the file) and `quantity` (what was measured).
+    - scores: quantities of the residual.
+    - data: measured and computed values as variables of the answer.
     """
 
     residual: str

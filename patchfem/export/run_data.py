@@ -35,9 +35,11 @@ FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a
 class Row(NamedTuple):
     """Variable of a run.
 
-    dims: its dimensions; the last ones of them for an array with fewer. unit: SI unit, "" for codes and names. text:
-    description. places: where a Result has it, as dotted names of attributes, keys and indices; the first that exists.
-    has_error: whether the variable NAME_error has its error, from a place that ends in _error.
+    - dims: its dimensions; an array with fewer dimensions has the last ones of them.
+    - unit: SI unit; "" for codes and names.
+    - text: description.
+    - places: where a Result has the variable, as dotted names of attributes, keys and indices; the first that exists is
+      used.
     """
 
     dims: str

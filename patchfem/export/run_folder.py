@@ -25,7 +25,9 @@ INTERFACES_FOLDER = "interfaces"
 class WrittenRun(NamedTuple):
     """Finished run whose results are on disk.
 
-    answer, result: of the run; page_fault: why the page was not drawn, or None.
+    - answer: answer of the run.
+    - result: result of the run.
+    - page_fault: why the page was not drawn; None if it was.
     """
 
     answer: Answer

@@ -44,7 +44,10 @@ def name_in_track(name: str) -> str:
 
 
 def list_names() -> list[str]:
-    """Return the names of all definitions; the parts of a track without the prefix track_."""
+    """Return the names of all quantities that `find` defines.
+
+    Quantities of a track have the names of the same quantities of a whole comparison, without the prefix "track_".
+    """
     heights = [f"P{name}" for name in PROFILE if name != "z"]
     roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
     return list(dict.fromkeys([*_MEANINGS, *WAVES, *DEFINITIONS, *heights, *roughness, *AREAL]))

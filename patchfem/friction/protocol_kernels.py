@@ -4,7 +4,12 @@ from typing import NamedTuple
 
 
 class RelaxedStretch(NamedTuple):
-    """Stretch [m] after a step, and its derivatives by initial stretch, increment and time."""
+    """Stretch of a law after a step.
+
+    - stretch: stretch at the end of the step [m]
+    - by_stretch, by_increment: its derivatives by the stretch at the start and by the increment [1]
+    - by_time: its derivative by the duration of the step [m/s]
+    """
 
     stretch: float
     by_stretch: float

@@ -141,7 +141,17 @@ def _compute_work(case: Case, state: State) -> dict[str, float]:
 
 
 def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, float]:
-    """Return stiffness, damping and drift of the first interface, from its cycles in the window."""
+    """Return stiffness, damping and drift of the first interface, from its cycles in the window.
+
+    Parameters
+    ----------
+    case : Case
+        The case, with the stiffness to which damping refers.
+    record : Record
+        What the run recorded.
+    loop_area : float
+        Friction work per cycle [J].
+    """
     row = record.faces[0]
     slide = row[Window.SLIDE_COS] - 1j * row[Window.SLIDE_SIN]
     force = row[Window.FORCE_COS] - 1j * row[Window.FORCE_SIN]

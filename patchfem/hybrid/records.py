@@ -16,9 +16,12 @@ WINDOW_START = 28  # row of `State.rows` with the state at the start of the wind
 
 
 class Mode(IntEnum):
-    """Rows of `Rig.modes`: squared frequencies, accelerations per drive, and two participations.
+    """Rows of `Rig.modes`.
 
-    `OUTPUT` is the point whose acceleration is measured, `GAUGE` the point whose displacement is measured.
+    - STIFFNESS: squared circular frequencies [1/s2]
+    - PUSH: accelerations of the modal coordinates per drive
+    - OUTPUT: participations in the displacement of the point whose acceleration is measured
+    - GAUGE: participations in the displacement of the point whose displacement is measured
     """
 
     STIFFNESS = 0
@@ -28,11 +31,19 @@ class Mode(IntEnum):
 
 
 class Face(IntEnum):
-    """Columns of `Rig.faces`: law, place of its states, normal load, scales, then the numbers of the law.
+    """Columns of `Rig.faces`, a row for each interface.
 
-    The load is max(0, MEAN + SWING cos(RATE t + PHASE) - STIFFNESS heave). LOAD and LOAD_RATE are typical
-    magnitudes. A RIGID law rests without displacement below its static friction. LENGTH [m] is the stretch before slip
-    of a law whose force follows from the slide alone, else infinite.
+    The normal load is max(0, MEAN + SWING cos(RATE t + PHASE) - STIFFNESS heave).
+
+    - LAW: number of the law
+    - FIRST_STATE, N_STATES: first state of the law among the states of all laws, and number of its states
+    - RIGID: whether the law is rigid, that is, rests without displacement below its static friction
+    - MEAN, SWING: mean and amplitude of the load [N]
+    - RATE, PHASE: circular frequency [rad/s] and phase [rad] of the load
+    - STIFFNESS: decrease of the load per heave [N/m]
+    - LOAD, LOAD_RATE: typical magnitudes of the load [N] and of its rate [N/s]
+    - LENGTH: stretch before slip [m] of a law whose force follows from the slide alone, else infinite
+    - NUMBERS: first of the numbers of the law
     """
 
     LAW = 0
@@ -51,10 +62,11 @@ class Face(IntEnum):
 
 
 class Piece(IntEnum):
-    """Columns of `Rig.pieces`, with the time tau since START.
+    """Columns of `Rig.pieces`, a row for each piece of the drive.
 
-    The drive is CONSTANT + SLOPE tau + AMPLITUDE sin(phase), phase' = OMEGA exp(GROWTH tau) + CHIRP tau. SQUARED is 1
-    if AMPLITUDE is that of a displacement, which phase'^2 makes an acceleration.
+    With the time tau = t - START [s] the drive is CONSTANT + SLOPE tau + AMPLITUDE sin(phase), where the phase starts at
+    PHASE [rad] and phase' = OMEGA exp(GROWTH tau) + CHIRP tau [rad/s]. SQUARED is 1 if AMPLITUDE is that of a displacement
+    [m], which is multiplied by phase'^2 to become an acceleration.
     """
 
     START = 0
@@ -71,9 +83,16 @@ class Piece(IntEnum):
 class Setting(IntEnum):
     """Entries of `Rig.settings`.
 
-    Modal mass [kg], longest step [s], largest output [m], circular frequency [rad/s] and period [s] of a cycle, whether
-    the drive is the acceleration of the base, whether it is a prescribed slide (bench), step tolerance, number of cycles
-    after which the drive repeats (0: never), largest number of steps, whether an interface is rigid.
+    - MASS: modal mass [kg]
+    - LONGEST_STEP: longest step [s]
+    - TRAVEL: largest magnitude of the output [m], at which a run ends
+    - OMEGA, PERIOD: circular frequency [rad/s] and period [s] of a cycle
+    - BASE_MOVES: whether the drive is the acceleration of the base
+    - IS_BENCH: whether the drive is a prescribed slide (bench)
+    - RTOL: relative tolerance of a step
+    - REPEAT: number of cycles after which the drive repeats; 0 if it never does
+    - MAX_STEPS: largest number of steps
+    - HAS_RIGID: whether an interface has a rigid law
     """
 
     MASS = 0
@@ -145,9 +164,13 @@ class Memory(IntEnum):
 
 
 class Margin(IntEnum):
-    """Margins of a regime: direction of motion or rest, branch, contact, and a limit of the law.
+    """Margins of the present regime of a law; the regime ends when one of them becomes negative.
 
-    AFTER is no margin; it marks the row after an event at which the force of a rigid law may jump.
+    - MOTION: direction of the motion, or rest of a rigid law
+    - BRANCH: branch of the law between two limits of its own
+    - CONTACT: contact or lift-off
+    - LIMIT: a further limit of the law
+    - AFTER: no margin; it marks the row after an event at which the force of a rigid law may jump
     """
 
     MOTION = 0
@@ -160,11 +183,20 @@ class Margin(IntEnum):
 class Clock(IntEnum):
     """Entries of `State.clock`.
 
-    Time [s], proposed step [s], numbers of steps, of the piece of the drive, of the next sample and of events, sum of
-    the magnitudes of the work of the drive [J], largest energy of the modes [J], status of the run (`Status`), number of
-    cycles, whether the last step ended without an event, so that its last stage is the first of the next one, and the
-    largest magnitudes of output [m] and its velocity [m/s] so far, the length of the step [s],
-    and EXCHANGED at the start of the cycle.
+    - TIME: time [s]
+    - STEP: proposed length of the next step [s]
+    - N_STEPS: number of steps so far
+    - PIECE: index of the present piece of the drive
+    - SAMPLE: index of the next sample
+    - N_EVENTS: number of events so far
+    - EXCHANGED: sum over the steps of the magnitude of the work of the drive [J]
+    - STORED: largest energy of the modes so far [J]
+    - STATUS: how the run ended (`Status`)
+    - N_CYCLES: number of cycles so far
+    - IS_SMOOTH: 1 if the last step ended without an event, so that its last stage is the first of the next step
+    - OUTPUT_SIZE, OUTPUT_SPEED: largest magnitudes of the output [m] and of its velocity [m/s] so far
+    - LENGTH: length of the present step [s]
+    - EXCHANGED_BEFORE: value of EXCHANGED at the start of the cycle [J]
     """
 
     TIME = 0
@@ -185,7 +217,16 @@ class Clock(IntEnum):
 
 
 class Status(IntEnum):
-    """How a run ended."""
+    """How a run ended.
+
+    - DONE: at the end of its last cycle
+    - EXCEEDS_TRAVEL: the output reached `Setting.TRAVEL`
+    - LEAVES_GROOVES: the contact left its grooves
+    - TOO_MANY_STEPS: the run needs more than `Setting.MAX_STEPS` steps
+    - STEP_TOO_SMALL: the steps became smaller than round-off
+    - NO_PROGRESS: the laws changed their regime again and again at the same time
+    - TOO_STIFF: a law stretches too little before it slips
+    """
 
     DONE = 0
     EXCEEDS_TRAVEL = 1
@@ -220,9 +261,23 @@ class State(NamedTuple):
 
 
 class Probe(IntEnum):
-    """Columns of `State.probes`: four of the whole, then five of every interface from FACES on.
+    """Columns of `State.probes`: 4 of the whole motion, then 5 of each interface.
 
-    SPEED is the velocity of the output, TRAVEL the distance that is left to its largest displacement.
+    - SPEED: velocity of the output [m/s]
+    - TRAVEL: largest displacement of the output, less its present magnitude [m]
+    - GAUGE: displacement of the point whose displacement is measured [m]
+    - ACCELERATION: acceleration of the output [m/s2]
+
+    Column FACES + COUNT i + k has quantity k of interface i. As these k begin at 0 again, FORCE, SLIP, SLIDE, LOAD and
+    SLIPPING have the same values as names above.
+
+    - FACES: first column of the interfaces
+    - FORCE: friction force [N]
+    - SLIP: path of slip [m]
+    - SLIDE: relative displacement [m]
+    - LOAD: normal load, 0 after lift-off [N]
+    - SLIPPING: |slip rate| - |velocity|/2 [m/s]; negative in stick
+    - COUNT: number of columns of an interface
     """
 
     SPEED = 0
@@ -230,7 +285,7 @@ class Probe(IntEnum):
     GAUGE = 2
     ACCELERATION = 3
     FACES = 4
-    # per interface: friction force, path of slip, slide, load, and |slip rate| - |velocity|/2
+    # per interface
     FORCE = 0
     SLIP = 1
     SLIDE = 2
@@ -240,11 +295,16 @@ class Probe(IntEnum):
 
 
 class Cycle(IntEnum):
-    """Columns of `Record.cycles`: end [s], window (0, or below 0 outside of it) of each cycle, then what was measured.
+    """Columns of `Record.cycles`. The first two are given, the others are measured in each cycle.
 
-    Smallest and largest output, integrals of the output times cosine and sine, integral of the slide of the first
-    interface over time, its smallest and largest slide with the friction forces there, and 1 for a cycle that was not
-    computed, because it repeats the one before.
+    - END: time at the end [s]
+    - WINDOW: 0 in the window; below 0 outside of it (`cases.make_schedule`)
+    - MIN, MAX: smallest and largest output [m]
+    - COS, SIN: integrals of the output times the cosine and the sine of the cycle [m s]
+    - SLIDE: integral of the slide of the first interface over time [m s]
+    - MIN_SLIDE, FORCE_AT_MIN: smallest slide of the first interface [m], and its friction force there [N]
+    - MAX_SLIDE, FORCE_AT_MAX: largest slide of the first interface [m], and its friction force there [N]
+    - REPEATS: 1 for a cycle that was not computed, because it repeats the one before
     """
 
     END = 0
@@ -262,7 +322,14 @@ class Cycle(IntEnum):
 
 
 class Whole(IntEnum):
-    """Columns of `Record.whole`: extremes of gauge and acceleration, harmonics 1 and 3 of the acceleration, duration."""
+    """Entries of `Record.whole`, over the window.
+
+    - MIN, MAX: smallest and largest displacement of the gauge [m]
+    - MIN_ACCELERATION, MAX_ACCELERATION: smallest and largest acceleration of the output [m/s2]
+    - COS_1, SIN_1: integrals of this acceleration times the cosine and the sine of the cycle [m/s]
+    - COS_3, SIN_3: the same for the third harmonic [m/s]
+    - SPAN: duration [s]
+    """
 
     MIN = 0
     MAX = 1
@@ -276,11 +343,18 @@ class Whole(IntEnum):
 
 
 class Window(IntEnum):
-    """Columns of `Record.faces`.
+    """Columns of `Record.faces`, a row for each interface, over the window.
 
-    Extremes of force, slip, slide and load; time stuck and open [s]; number of slip starts with the sums of cosine and
-    sine of twice their phases; duration of the stick at the end [s], -1 of an interface that slips there; first
-    harmonics of slide and force.
+    - MIN_FORCE, MAX_FORCE: smallest and largest friction force [N]
+    - MIN_SLIP, MAX_SLIP: smallest and largest path of slip [m]
+    - MIN_SLIDE, MAX_SLIDE: smallest and largest relative displacement [m]
+    - MIN_LOAD, MAX_LOAD: smallest and largest normal load [N]
+    - STUCK, OPEN: time of stick and time without contact [s]
+    - STARTS: number of starts of slip
+    - COS_START, SIN_START: sums of the cosine and the sine of twice the phases of the cycle at these starts
+    - STICKS: duration of the stick at the end [s]; -1 if the interface slips there
+    - SLIDE_COS, SLIDE_SIN: integrals of the slide times the cosine and the sine of the cycle [m s]
+    - FORCE_COS, FORCE_SIN: the same for the friction force [N s]
     """
 
     MIN_FORCE = 0
@@ -352,7 +426,14 @@ class Friction(NamedTuple):
 
 
 class LawNumbers(NamedTuple):
-    """A law of one interface: its name in `laws.LAWS`, its numbers, first states, scales of the states, length [m]."""
+    """A law of one interface.
+
+    - law: name of the law in `laws.LAWS`
+    - numbers: numbers of the law
+    - states: its states at the start
+    - scales: smallest magnitudes of the states, to which the errors of a step are relative
+    - length: stretch before slip [m] of a law whose force follows from the slide alone, else infinite
+    """
 
     law: str
     numbers: tuple[float, ...]

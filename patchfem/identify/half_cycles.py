@@ -171,7 +171,15 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
 
 
 def _follow_half_cycles(time, value, middle: float, length: float) -> list[_FittedSines]:
-    """Fit the half cycles of a decay one after the other, until the noise is too large."""
+    """Fit the half cycles of a decay one after the other, until the noise is too large.
+
+    Parameters
+    ----------
+    time, value : (k,) array
+        Times [s] and values of the decay.
+    middle, length : float
+        Predicted midpoint and half period of the first half cycle [s].
+    """
     sines = []
     while middle + length / 2 <= time[-1]:
         sine = _fit_half_cycle(time, value, middle, length, 0.0)
@@ -191,7 +199,17 @@ def _follow_half_cycles(time, value, middle: float, length: float) -> list[_Fitt
 def _refine_half_cycles(
     time, value, sines: list[_FittedSines], *, is_viscous: bool
 ) -> list[_FittedSines]:
-    """Refit half cycles with half periods and decay rates estimated from their neighbours."""
+    """Refit half cycles with half periods and decay rates that follow from their neighbours.
+
+    Parameters
+    ----------
+    time, value : (k,) array
+        Times [s] and values of the decay.
+    sines : list of _FittedSines
+        First fits, a sine for each half cycle.
+    is_viscous : bool
+        Whether the amplitude decays within a half cycle.
+    """
     if len(sines) < 3:
         return sines
     fitted = _FittedSines(*np.array(sines).T)
@@ -213,8 +231,19 @@ def _refine_half_cycles(
 def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _FittedSines | None:
     """Fit a sine to the samples around the predicted midpoint of one half cycle.
 
-    Returns None with too few samples, or if the midpoint is too far from its prediction. `length` is the half
-    period [s], `rate` the decay rate [1/s].
+    Parameters
+    ----------
+    time, value : (k,) array
+        Times [s] and values of the decay.
+    middle, length : float
+        Predicted midpoint and half period of the half cycle [s].
+    rate : float
+        Decay rate of the amplitude [1/s].
+
+    Returns
+    -------
+    _FittedSines or None
+        None if there are too few samples, or if the midpoint is too far from its prediction.
     """
     predicted = middle
     for _ in range(MAX_MIDPOINT_ITERATIONS):

@@ -22,8 +22,12 @@ EXPORTED_NAMES = {
 class Loop:
     """A measured friction loop.
 
-    time: (k,) [s] or None; displacement: (k,) [m], 0 in the first row; reading: (k,), a "force" [N] or a
-    "friction_ratio" [1], as `quantity` says; labels: other column, such as `run` -> k strings.
+    - path: file.
+    - time (k,): [s]; None if it was not measured.
+    - displacement (k,): [m], 0 in the first row.
+    - reading (k,): force [N] or friction ratio [1].
+    - quantity: "force" or "friction_ratio".
+    - labels: k texts of each other column, such as `run`, by its name.
     """
 
     path: Path

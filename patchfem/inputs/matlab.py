@@ -96,7 +96,19 @@ def _read_version_5(data: bytes, arrays: Arrays) -> None:
 
 
 def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
-    """Add an array that SciPy has read, or the fields of a structure."""
+    """Add an array that SciPy has read, or the fields of a structure.
+
+    Parameters
+    ----------
+    arrays : dict of str to array
+        Arrays by name, which are extended.
+    name : str
+        Name of the variable; fields of a structure are named NAME.FIELD.
+    value
+        What SciPy has read.
+    depth : int
+        Number of structures that contain the value; below MAX_NESTING, structures are opened.
+    """
     if sparse.issparse(value):
         arrays[name] = _check_sparse(sparse.csc_array(value))
     elif value.dtype.kind in NUMBER_KINDS:

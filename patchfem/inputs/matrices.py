@@ -33,9 +33,9 @@ MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
 class Matrix(NamedTuple):
     """Sparse matrix that was read from a file.
 
-    values: sparse array (n, n); places: node and direction 1 to 6 of each row (n, 2), or None if the
-    file does not state them; has_size: whether the file states its size; else it ends with the last row
-    that has an entry.
+    - values (n, n): sparse array.
+    - places (n, 2): node and direction 1 to 6 of each row; None if the file does not state them.
+    - has_size: whether the file states its size; else the matrix ends with the last row that has an entry.
     """
 
     values: sparse.csr_array

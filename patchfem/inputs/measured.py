@@ -28,8 +28,10 @@ FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat
 class MeasuredRow:
     """One measured condition in SI; a missing value is None.
 
-    frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], all >= 0; flag: letters of
-    `FLAG_MEANINGS`, may be empty.
+    - frequency: frequency of the drive [Hz], >= 0.
+    - input: amplitude of the drive [m s-2], >= 0.
+    - acceleration, displacement: measured amplitudes [m s-2] and [m], >= 0.
+    - flag: letters of `FLAG_MEANINGS`; may be empty.
     """
 
     frequency: float

@@ -19,10 +19,13 @@ _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])
 class Channel(NamedTuple):
     """One channel as a file contains it.
 
-    name: its text in the file; place: node and direction such as "12:+x", or ""; quantity: key of
-    `units.CHANNEL_UNITS`, or "" if the file does not state it; unit: as written in the file, or "";
-    values: (k,) in that unit; time: (k,) [s], or None if time is a channel of its own; factor: to SI if
-    the file states it apart from the unit, else None.
+    - name: its text in the file.
+    - place: node and direction, such as "12:+x", or "".
+    - quantity: key of `units.CHANNEL_UNITS`, or "" if the file does not state it.
+    - unit: unit as written in the file, or "".
+    - values (k,): in this unit.
+    - time (k,): [s]; None if time is a channel of its own.
+    - factor: factor to SI if the file states it apart from the unit, else None.
     """
 
     name: str
@@ -37,7 +40,9 @@ class Channel(NamedTuple):
 class RequestedChannel(NamedTuple):
     """A channel that the user requests with ``--map quantity=source [unit]``.
 
-    source: name of the channel, its number from 1, or its place; unit: "" for that of the file.
+    - quantity: what the channel is, such as "force".
+    - source: name of the channel, its number from 1, or its place.
+    - unit: unit of the values; "" for that of the file.
     """
 
     quantity: str
@@ -49,8 +54,10 @@ class RequestedChannel(NamedTuple):
 class Records:
     """Channels in SI with a common time axis.
 
-    values: quantity -> (k,), with `time` [s] first if there is one; notes: sentences on what was not read
-    as it stands; channel_list: all channels of the file in words.
+    - path: file that was read.
+    - values: values (k,) of each quantity by name, with `time` [s] first if there is one.
+    - notes: sentences on what was not read as it stands.
+    - channel_list: all channels of the file in words.
     """
 
     path: Path

@@ -31,10 +31,11 @@ _NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "e
 class TableFormat(NamedTuple):
     """Columns that a table may have, and the words for them in error messages.
 
-    units: column of numbers -> unit -> factor to SI; the unit "" stands for a column without a unit.
-    required: columns that must be there; "displacement slide" accepts either name.
-    example: header of such a table. contents: what the file is, such as "a drive". remedy: end of the
-    message if there is no file.
+    - units: factors to SI by unit, for each column of numbers by its name; the unit "" stands for a column without a unit.
+    - required: columns that must be there; "displacement slide" accepts either name.
+    - example: header of such a table.
+    - contents: what the file is, such as "a drive".
+    - remedy: end of the message if there is no file.
     """
 
     units: Mapping
@@ -48,7 +49,9 @@ class TableFormat(NamedTuple):
 class Columns:
     """Columns of a table; row i is on line i + 2 of the file, because the header is on line 1.
 
-    values: column -> (k,) in SI; labels: column that is not known as a number -> k strings; rows: k.
+    - values: values (k,) in SI of each column of numbers, by its name.
+    - labels: k texts of each other column, by its name.
+    - rows: number k of rows.
     """
 
     values: dict[str, np.ndarray]
@@ -59,8 +62,10 @@ class Columns:
 class TextTable(NamedTuple):
     """Text of a table.
 
-    names, units: name and unit of each column; the unit is None if there is none. separator: sign between the
-    cells. lines: lines below the header, without blank ones at the end.
+    - path: file.
+    - names, units: name and unit of each column; the unit is None if there is none.
+    - separator: sign between the cells.
+    - lines: lines below the header, without blank ones at the end.
     """
 
     path: Path

@@ -124,6 +124,19 @@ def _make_channel(
     """Make a channel of a record from a dataset of a universal file.
 
     Its factor to SI is that of its unit label if this is a unit of its quantity, else that of dataset 164, else 1.
+
+    Parameters
+    ----------
+    path : Path
+        File, for messages.
+    number : int
+        Number of the record, for messages.
+    dataset : dict
+        Dataset 58.
+    factors : dict or None
+        Unit factors of dataset 164, if the file has one.
+    notes : list of str
+        Receives sentences on what was not read as it stands.
     """
     location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])

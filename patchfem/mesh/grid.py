@@ -286,7 +286,10 @@ def graded_grid(
 
 
 def row_scale(n_columns: int) -> float:
-    """Return the ratio of the rows of a grid with equal columns to those with N_REFERENCE_COLUMNS columns."""
+    """Return the factor by which the rows of a grid with equal columns are shorter than with N_REFERENCE_COLUMNS columns.
+
+    It is at most 1: with fewer columns the rows stay as short.
+    """
     return min(1.0, N_REFERENCE_COLUMNS / n_columns)
 
 

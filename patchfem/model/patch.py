@@ -245,7 +245,14 @@ class PatchMesh:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchModel:
-    """Two pieces that are pressed together."""
+    """Two pieces that are pressed together.
+
+    - pieces: shape and material of both pieces.
+    - gap: gap between them before they are loaded.
+    - loading: what presses them together.
+    - interface: asperity layer, strips and shear compliance.
+    - mesh: how they are meshed.
+    """
 
     pieces: PatchPieces
     gap: Gap

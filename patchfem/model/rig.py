@@ -236,7 +236,13 @@ class RigStructure:
 class Rig:
     """Modes of a structure with the drive signal, the interfaces and the springs.
 
-    - start: initial motion, None at rest.
+    - modes: modes without the contact.
+    - drive: drive signal and how it acts.
+    - start: initial motion; None at rest.
+    - friction: laws and loads of the interfaces.
+    - springs: springs in addition to the contact, and the limit of the motion.
+    - first_mode: first elastic mode of the scene.
+    - structure: natural frequencies, and where the modes come from.
     """
 
     modes: ModalBasis

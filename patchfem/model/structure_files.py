@@ -68,7 +68,21 @@ def is_universal(path: Path) -> bool:
 def _build_modes(
     path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
 ) -> FileModes:
-    """Build modes from the content of a file; `mass` is the number of the mass that a force drives."""
+    """Build the modes of a structure from the content of a file.
+
+    Parameters
+    ----------
+    path : Path
+        Universal file, or file of matrices.
+    structure
+        Table [structure] of the scene.
+    drive_kind : str
+        "force", or another kind of the drive.
+    mass : int or None
+        Number of the mass that a force drives.
+    needs_interface : bool
+        Whether the modes must have an interface that slides.
+    """
     content = read_content(path)
     is_forced = drive_kind == "force"
     if is_universal(path):

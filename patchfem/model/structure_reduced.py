@@ -35,7 +35,13 @@ class ReducedModes(NamedTuple):
 
 
 class _ReducedFiles(NamedTuple):
-    """Matrices of the files by key, boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
+    """What the files of a reduced structure contain.
+
+    - values: matrices by key.
+    - boundary (b,): rows of the boundary coordinates.
+    - moved (n,): motion of the coordinates for a unit motion of the base; None if the base does not move.
+    - notes: sentences on the files.
+    """
 
     values: dict[str, Any]
     boundary: np.ndarray
@@ -115,7 +121,19 @@ def read_matrix(path: Path, key: str) -> matrices.Matrix:
 
 @cache_by_file
 def _reduce(paths: tuple[Path, ...], keys: tuple[str, ...], table, is_base_driven: bool):
-    """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes."""
+    """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+        Files of the matrices.
+    keys : tuple of str
+        What each file contains: "stiffness", "mass" or "damping".
+    table
+        Table [structure.reduced] of the scene.
+    is_base_driven : bool
+        Whether the base drives the structure.
+    """
     files = _read_files(dict(zip(keys, paths)), table, is_base_driven)
     values = {key: matrix / table.unit for key, matrix in files.values.items()}
     reduction = reduced.reduce_matrices(
@@ -151,7 +169,17 @@ def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
 
 
 def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _ReducedFiles:
-    """Read the matrices, and find the rows of the boundary coordinates and of those that move with the base."""
+    """Read the matrices, and find the rows of the boundary coordinates and of those that move with the base.
+
+    Parameters
+    ----------
+    paths : dict of str to Path
+        Files by what they contain: "stiffness", "mass" or "damping".
+    table
+        Table [structure.reduced] of the scene.
+    is_base_driven : bool
+        Whether the base drives the structure.
+    """
     read = [read_matrix(path, key) for key, path in paths.items()]
     with name_key("structure.reduced.mass"):
         aligned = matrices.align_rows(*read)

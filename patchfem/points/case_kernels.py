@@ -115,9 +115,9 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -202,9 +202,9 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     hold : float
         Force that would keep the point at rest at the end of the step [N].
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -266,9 +266,9 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         Largest difference [N] of the mean force from the mean of the forces at both ends; above it the law has a
         corner in the step.
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -358,9 +358,9 @@ def find_force(wave, case, now, numbers, memory, j):
     wave : float
         Sine of the drive at the end of the step.
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -400,7 +400,7 @@ def find_middle(h, start, now):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`.
+        State of the case, in the order of `case_rows.Now`.
     """
     q = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
     v = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
@@ -418,11 +418,11 @@ def add_energies(waves, h, case, start, now):
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     """
     middle = find_middle(h, start, now).velocity
     end = now[Now.VELOCITY]
@@ -450,7 +450,7 @@ def find_turn(h, start, now):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     """
     first = start[1]
     last = now[Now.VELOCITY]
@@ -481,9 +481,9 @@ def observe_extremes(h, law, start, now, seen, observes):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     observes : bool
         Whether the cycle is measured.
     """
@@ -529,7 +529,7 @@ def find_acceleration(sine, q, v, force, case):
     force : float
         Friction force [N].
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     """
     a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
     return case[Number.OUTPUT] * (a - case[Number.MOBILITY] * force) + case[Number.BASE] * sine
@@ -558,7 +558,12 @@ def find_parabola_extreme(first, middle, last):
 
 @njit(**NJIT_KERNEL)
 def observe_acceleration(waves, h, case, start, now, seen):
-    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event.
+    """Update the largest acceleration by that of a step.
+
+    Without an event it is the extreme of the parabola through both ends and the middle of the step. At an event, where the
+    point stops, reverses or is released (`Now.EVENT`), the velocity is 0 and the force may jump, so that the accelerations
+    before and after it count. The slide there is taken from the end of the step, which differs by O(h^2), because the
+    velocity is 0 at the event.
 
     Parameters
     ----------
@@ -567,13 +572,13 @@ def observe_acceleration(waves, h, case, start, now, seen):
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -607,9 +612,9 @@ def observe_harmonics(time, h, omega, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -652,9 +657,9 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     # Irreversible fraction of the path in the step, less one half.
     dq = now[Now.SLIDE] - start[0]
@@ -703,8 +708,8 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         if last < 0:
             angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
             seen[Seen.STARTS] += 1
-            seen[Seen.START_COS] += cos(angle)
-            seen[Seen.START_SIN] += sin(angle)
+            seen[Seen.SLIP_START_PHASE_COS] += cos(angle)
+            seen[Seen.SLIP_START_PHASE_SIN] += sin(angle)
 
     seen[Seen.STUCK] += sticking
     seen[Seen.MIDDLE] = centre
@@ -722,7 +727,7 @@ def find_extreme_slip(h, start, now, numbers, memory, j, load):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -754,7 +759,7 @@ def find_largest_force(h, start, now, numbers, j, load):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     j : int
@@ -786,7 +791,7 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -796,7 +801,7 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
     load : float
         Normal load [N].
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
@@ -825,9 +830,9 @@ def end_cycle(now, seen, history):
     Parameters
     ----------
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor; output.
     """
@@ -863,9 +868,9 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
+        Numbers of the case, in the order of `case_rows.Number`.
     now : (17,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
@@ -873,7 +878,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     j : int
         Number of the point.
     seen : (30,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -943,15 +948,15 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
     steps : int
         Steps per cycle.
     parameters : (c, 12) array
-        Numbers of the cases, in the rows of `case_rows.Number`.
+        Numbers of the cases, in the order of `case_rows.Number`.
     numbers : (k, c) array
         Numbers of the laws; row 0 is the `Law`.
     memory : (l, c) array
         Memory of the laws; changed in place.
     nows : (c, 17) array
-        States of the cases, in the rows of `case_rows.Now`; output.
+        States of the cases, in the order of `case_rows.Now`; output.
     seens : (c, 30) array
-        What was observed, in the rows of `case_rows.Seen`; output.
+        What was observed, in the order of `case_rows.Seen`; output.
     histories : (c, n, 4) array
         Extremes and phasor of every cycle; output.
     table : (LEVELS + 1, 2, 5) array

@@ -10,11 +10,21 @@ SAME_CASE_CYCLE = 1e-8
 
 
 class Number(IntEnum):
-    """Columns of `Cases.parameters`.
+    """Columns of `Cases.parameters`; kernels get the row of one case.
 
-    Of q'' + DAMPING q' + STIFFNESS q = DRIVE sin(OMEGA t) - MOBILITY F with the slide q [m] and the friction F [N];
-    normal load [N]; output per slide, amplitude of the acceleration of the base [m s-2]; slide [m] and velocity [m/s]
-    at the start; number of cycles, and of the last of them that are measured.
+    The slide q [m] obeys q'' + DAMPING q' + STIFFNESS q = DRIVE sin(OMEGA t) - MOBILITY F with the friction force F [N].
+
+    - DAMPING: [1/s]
+    - STIFFNESS: squared circular frequency [1/s2]
+    - DRIVE: amplitude of the drive [m s-2]
+    - MOBILITY: acceleration of the slide per friction force [1/kg]
+    - OMEGA: circular frequency of the drive [rad/s]
+    - LOAD: normal load [N]
+    - OUTPUT: displacement of the output per slide [1]
+    - BASE: amplitude of the acceleration of the base [m s-2]
+    - SLIDE, VELOCITY: at the start [m], [m/s]
+    - CYCLES: number of cycles
+    - WINDOW: number of the last cycles, which are measured
     """
 
     DAMPING = 0
@@ -32,12 +42,23 @@ class Number(IntEnum):
 
 
 class Now(IntEnum):
-    """Columns of the state of a case.
+    """Columns of the state (c, 17) of c cases; kernels get the row of one case.
 
-    Slide, velocity, mean force of the last step, force, irreversible slide; extremes, cosine and sine integrals of the
-    slide in the cycle; work of the drive, its magnitude, loss of the damper, friction work per mass, largest energy;
-    fraction of the last step at which a rigid point stops, turns or is released, -1 without such an event; elastic energy
-    of the law at the end; time mean of the force over the last step.
+    - SLIDE, VELOCITY: at the end of the last step [m], [m/s]
+    - MEAN: friction force [N] as a mean over the path of the last step
+    - FORCE: friction force [N] at its end
+    - SLIP: irreversible slide [m]
+    - MIN, MAX: smallest and largest slide in the cycle [m]
+    - COS, SIN: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) over the cycle [m s]
+    - WORK_IN: work of the drive per mass since the start [J/kg]
+    - POWER: sum over the steps of the magnitude of this work [J/kg]
+    - VISCOUS: loss of the damper per mass [J/kg]
+    - FRICTION: friction work per mass [J/kg]
+    - STORED: largest kinetic and elastic energy per mass so far [J/kg]
+    - EVENT: fraction of the last step at which the velocity changes its sign, or at which a rigid point stops or is
+      released; -1 without such an event
+    - ELASTIC: elastic energy of the friction law at the end of the run [J]
+    - TIME_MEAN: friction force [N] as a mean over the time of the last step
     """
 
     SLIDE = 0
@@ -60,13 +81,29 @@ class Now(IntEnum):
 
 
 class Seen(IntEnum):
-    """Columns of what is observed in the window, per unit of the slide and of the force.
+    """Columns of what is observed (c, 30) in the window of c cases; kernels get the row of one case.
 
-    Extremes of acceleration, force and slip; time stuck; number of slip starts with the sums of cosine and sine of
-    twice their phases; middle of the last step and its excess of slip over half of the slide; integrals of slide and
-    force times harmonic 1; friction work by mean forces, by the trapezoidal rule, and its magnitude; integral of the
-    slide in the first and in the last cycle; sums of range and secant, number of secants; forces at the extremes of the
-    cycle; slide and velocity at the start; duration; number of cycles; integrals of the force times harmonic 3.
+    - MAX_ACCELERATION: largest magnitude of the acceleration of the output [m s-2]
+    - MAX_FORCE: largest magnitude of the friction force [N]
+    - MIN_SLIP, MAX_SLIP: smallest and largest irreversible slide [m]
+    - STUCK: time of stick [s]
+    - STARTS: number of starts of slip
+    - SLIP_START_PHASE_COS, SLIP_START_PHASE_SIN: sums of cosine and sine of twice the phases of the drive at these starts
+    - MIDDLE: time in the cycle at the middle of the last step [s]
+    - EXCESS: irreversible fraction of the path of the last step, less 1/2
+    - COS_1, SIN_1: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) [m s]
+    - FORCE_COS_1, FORCE_SIN_1: the same of the friction force [N s]
+    - WORK: friction work by the mean forces of the steps [J]
+    - SAMPLED: friction work by the trapezoidal rule [J]
+    - PASSED: sum over the steps of the magnitude of the friction work [J]
+    - FIRST_MEAN, LAST_MEAN: integrals of the slide over the first and over the last cycle [m s]
+    - RANGE: sum over the cycles of the range of the slide [m]
+    - SECANT, N_SECANTS: sum of the secant stiffnesses of the cycles [N/m], and their number
+    - FORCE_AT_MIN, FORCE_AT_MAX: friction force [N] at the smallest and largest slide of the cycle; NaN if unknown
+    - START_SLIDE, START_VELOCITY: at the start of the window [m], [m/s]
+    - SPAN: duration [s]
+    - N_CYCLES: number of cycles
+    - FORCE_COS_3, FORCE_SIN_3: integrals of the friction force times cos(3 OMEGA t) and sin(3 OMEGA t) [N s]
     """
 
     MAX_ACCELERATION = 0
@@ -75,8 +112,8 @@ class Seen(IntEnum):
     MAX_SLIP = 3
     STUCK = 4
     STARTS = 5
-    START_COS = 6
-    START_SIN = 7
+    SLIP_START_PHASE_COS = 6
+    SLIP_START_PHASE_SIN = 7
     MIDDLE = 8
     EXCESS = 9
     COS_1 = 10

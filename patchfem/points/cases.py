@@ -101,9 +101,9 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     cases : Cases
         The cases that were run.
     now : (c, 17) array
-        States at the end, in the rows of `case_rows.Now`.
+        States at the end, in the order of `case_rows.Now`.
     seen : (c, 30) array
-        What was observed, in the rows of `case_rows.Seen`.
+        What was observed, in the order of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.
     """
@@ -133,7 +133,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
         "stick_fraction": np.where(stuck > 1 - ALWAYS_STUCK, 1.0, stuck),
         "slip_start_phase": path_work.mean_slip_phase(
-            seen[:, Seen.STARTS], seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
+            seen[:, Seen.STARTS], seen[:, Seen.SLIP_START_PHASE_COS], seen[:, Seen.SLIP_START_PHASE_SIN]
         ),
         "normal_load": columns[Number.LOAD],
         "loop_area": work / count,
@@ -163,7 +163,21 @@ def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
 
 
 def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
-    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
+    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration.
+
+    Parameters
+    ----------
+    cases : Cases
+        The c cases that were run.
+    now : (c, 17) array
+        States at the end, in the order of `case_rows.Now`.
+    seen : (c, 30) array
+        What was observed, in the order of `case_rows.Seen`.
+    area : (c,) array
+        Friction work per cycle [J].
+    slide_range : (c,) array
+        Range of the slide in the window [m].
+    """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
     span = seen[:, Seen.SPAN]

@@ -4,7 +4,17 @@ from enum import IntEnum
 
 
 class Law(IntEnum):
-    """Number of a friction law or spring in row 0 of `numbers`."""
+    """Number of a friction law or spring in row 0 of `numbers`.
+
+    - COULOMB: rigid friction
+    - TANH: friction that follows the velocity, as its hyperbolic tangent
+    - JENKINS: spring and slider in series
+    - MASING: parallel sliders, see `Masing`
+    - BOUC_WEN, LUGRE: laws of these names
+    - BONDS: bonds that are summed by their moments
+    - CUBIC, INTERLOCK: nonlinear springs
+    - LIST: bonds that are summed by a list of strips
+    """
 
     COULOMB = 0
     TANH = 1
@@ -21,8 +31,13 @@ class Law(IntEnum):
 class Masing(IntEnum):
     """Rows of the memory of parallel sliders, which follow Masing's rules.
 
-    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
-    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
+    - SLIDE, FORCE: displacement [m] and force [N]
+    - DIRECTION: sign of the last motion
+    - COUNT: number of reversals on the stack
+    - VIRGIN: 1 until the sliders have slipped as a whole, then -1
+    - ENERGY: stored energy [J]
+    - STRETCH: mean stretch [m]
+    - STACK: first row of pairs of displacement [m] and force [N] at the reversals
     """
 
     SLIDE = 0

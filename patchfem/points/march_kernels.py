@@ -846,6 +846,7 @@ def find_event(system, drive, is_shortest):
     points = system.points
     found = False
     is_any_held = False
+    # Row 0 of the memory of a rigid point is its direction of slip, 0 at rest.
     for j in range(points.port.size):
         if points.numbers[0, j] != Law.COULOMB:
             continue
@@ -860,7 +861,8 @@ def find_event(system, drive, is_shortest):
     if not is_any_held:
         return False
 
-    # Of the points whose limit is exceeded, that with the largest ratio is released.
+    # Of the points whose limit is exceeded, that with the largest ratio is released; row 2 of the state is that at the end
+    # of the trial step.
     find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
@@ -943,7 +945,7 @@ def commit(system, h):
     energy = find_motion_energy(system)
     system.totals[Total.REST] = 0.0
     if options.is_rigid and system.sets.counters[PRESENT_SLOT] >= 0:
-        rest_ports(system)
+        return_ports_to_rest(system)
         system.totals[Total.REST] = find_motion_energy(system) - energy
 
     # The mean of the rise speed over the step is slope dq/h.
@@ -1018,7 +1020,10 @@ def relax_pieces(system):
 
 @njit(**NJIT_CALL)
 def commit_list(system, j, h):
-    """Advance the list of a point; without shear of the pieces it moves at the velocities of its port.
+    """Advance the list of bonds of a point over an accepted step.
+
+    The growth of bonds needs the velocities v0 and v1 at both ends of the step. Without shear of the pieces they are those
+    of the port. With shear, the slide of a point is known only as a mean over the step, so that both are its mean speed.
 
     Parameters
     ----------
@@ -1039,6 +1044,7 @@ def commit_list(system, j, h):
         v1 = system.ports.values[Port.END_VELOCITY, points.port[j]]
         values[Point.SPEED, j] = v1
     else:
+        # Mean speeds hold in the middle of a step; a line through the last two gives the speed at the end of this one.
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
     if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
@@ -1104,7 +1110,7 @@ def find_motion_energy(system):
 
 
 @njit(**NJIT_CALL)
-def rest_ports(system):
+def return_ports_to_rest(system):
     """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
 
     A constant force over the step only makes their velocity vanish at its end. `Port.FREE` has their displacements.
@@ -1135,10 +1141,7 @@ def rest_ports(system):
 
 @njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
-    """Advance by a step of a level; return False if it contains an event; without a contact set `PRESENT_SLOT` becomes -1.
-
-    `row`, `begin` and `end` are the number of the whole step and the fractions of it; `drive` is the parabola of the
-    drive at the start of this step.
+    """Advance the motion by a step, unless the step must be halved.
 
     Parameters
     ----------
@@ -1155,6 +1158,13 @@ def try_step(system, level, row, begin, end, drive):
     drive : tuple of float
         Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
         squared.
+
+    Returns
+    -------
+    bool
+        False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
+        halved; then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact set
+        was found, in which case the counter `PRESENT_SLOT` is -1.
     """
     points = system.points
     shear = points.shear
@@ -1219,7 +1229,11 @@ def try_step(system, level, row, begin, end, drive):
 
 @njit(**NJIT_CALL)
 def add_energies(system, level):
-    """Add the work of the drive and the viscous loss of a step.
+    """Add the work of the drive and the viscous loss of a step, and update the largest energy of the modes.
+
+    Both are forms of `system.structure.inputs`: 2 n modal coordinates and velocities at the start of the step, value, slope
+    and second derivative of the drive there, and n modal forces per mass. `Total.POWER` adds up |work| [J], the size to
+    which the error of the energy balance is compared.
 
     Parameters
     ----------

@@ -124,8 +124,9 @@ class Flank(IntEnum):
 class Total(IntEnum):
     """Entries of `System.totals`.
 
-    - WORK_IN, POWER, VISCOUS, FRICTION: work of the drive, its magnitude, viscous loss and friction work since the start
-      [J]
+    - WORK_IN: work of the drive since the start [J]
+    - POWER: sum over the steps of the magnitude of this work [J]
+    - VISCOUS, FRICTION: viscous loss and friction work since the start [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - IS_FULL: 1 if a list of bonds is full
@@ -272,7 +273,17 @@ class Options(NamedTuple):
 
 
 class System(NamedTuple):
-    """All arrays of a march; `state` (3, 2 n) is the motion, its free motion in a step, and its trial."""
+    """All arrays of a march.
+
+    - structure: modes in steps of several lengths
+    - ports, points, lists: places where forces act on the modes, contact points at them, and their lists of bonds
+    - flank: grooves, see `Flank`; (0,) without grooves
+    - sets: contact sets of a patch
+    - state (3, 2 n): modal coordinates and velocities; row 0 at the start of a step, row 1 at its end without forces, row 2
+      at its end in the present trial
+    - totals: energies and counts since the start, see `Total`
+    - options: numbers of the march
+    """
 
     structure: Structure
     ports: Ports

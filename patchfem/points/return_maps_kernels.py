@@ -50,7 +50,13 @@ DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre la
 
 
 class Step(NamedTuple):
-    """Increment [m] and duration [s], velocities at both ends [m/s], and velocity per force [m/(s N)]."""
+    """Step of a contact point.
+
+    - increment: increment of the slide [m]
+    - duration: duration [s]
+    - start_velocity, end_velocity: velocities at both ends [m/s]
+    - mobility: change of the velocity at the end per mean force of the step [m/(s N)]
+    """
 
     increment: float
     duration: float
@@ -60,11 +66,13 @@ class Step(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
+    """Friction force of a point over a step.
 
-    For a step that is long for the law "tanh" the force at the end is that at the start, as if it did not change. `bend`
-    [N] is the mean force less the mean of the forces at both ends, for the law "tanh", and the change of the elastic
-    force, for the LuGre law.
+    - force: mean over the path of the step [N]
+    - by_increment, by_velocity: its derivatives by the increment [N/m] and by the velocity at the end [N s/m]
+    - end: force at the end [N]. For a step that is long for the law "tanh" it is that at the start, as if it did not change
+    - bend: for the law "tanh", the mean force less the mean of the forces at both ends [N]; for the LuGre law, the change of
+      the elastic force [N]
     """
 
     force: float
@@ -222,6 +230,19 @@ def _mean_lugre(numbers, stretch, j, load, step):
     The stretch z relaxes to the steady one, z_s = g(v)/k in the direction of slip, over a path x = integral of
     |v|/|z_s|. With x by Simpson's rule and z_s linear in the path between both ends the law is solved exactly, so that
     a stiff law ends in its steady state.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    stretch : float
+        Stretch at the start of the step [m].
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    step : Step
+        Increment, duration and velocities.
     """
     dq = step.increment
     duration = step.duration
@@ -268,7 +289,21 @@ def _mean_spring(numbers, slide, j, dq):
 
 @njit(**NJIT_KERNEL)
 def _walk_bouc_wen(numbers, z, j, load, dq):
-    """Return force and path-mean force of the Bouc-Wen law."""
+    """Return the force of the Bouc-Wen law at the end of an increment, and its mean over the path.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    z : float
+        State of the law at the start.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    dq : float
+        Increment of the slide [m].
+    """
     direction = 1.0 if dq > 0 else -1.0
     path = follow_path(direction * z, abs(dq) / numbers[2, j], numbers[3, j], numbers[4, j])
     limit = direction * numbers[1, j] * load
@@ -277,7 +312,17 @@ def _walk_bouc_wen(numbers, z, j, load, dq):
 
 @njit(**NJIT_KERNEL)
 def _first_loading(numbers, j, x):
-    """Return the force of first loading and its integral, of Segalman's sliders (2005, eq. 22)."""
+    """Return the force [N] of Segalman's sliders (2005, eq. 22) on first loading, and its integral [J].
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    j : int
+        Number of the point.
+    x : float
+        Displacement since the start of loading [m], >= 0.
+    """
     phi = numbers[2, j]
     beta = numbers[4, j]
     order = numbers[3, j]
@@ -297,6 +342,19 @@ def _walk(numbers, memory, j, dq, commits):
 
     A branch from a reversal (q_r, F_r) is F = F_r + 2 d B(d (q - q_r)/2) with the force B of first loading. It ends
     where it meets the start of the branch before. Entries of the stack from COUNT on may be overwritten.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points; row 0 is the `Law`.
+    memory : (l, m) array
+        Memory of the laws, in the rows of `Masing` for this law.
+    j : int
+        Number of the point.
+    dq : float
+        Increment of the slide [m].
+    commits : bool
+        Whether the memory is advanced to the end of the increment.
     """
     direction = 1.0 if dq > 0 else -1.0
     q = memory[Masing.SLIDE, j]

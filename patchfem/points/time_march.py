@@ -406,7 +406,7 @@ def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLi
             np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 14)), *[empty] * 3
         )
     bonds, reach, merge = contact.bond_sum
-    capacity = list_numbers.list_capacity(reach, merge)
+    capacity = list_numbers.estimate_list_capacity(reach, merge)
     if count > 1:
         step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
         capacity = min(capacity, FIRST_STRIPS + step)

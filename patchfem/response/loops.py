@@ -99,7 +99,17 @@ def find_reversals(
 def _find_largest(time, y, v, time_tolerance: float) -> tuple[int, float, float]:
     """Find the maximum of a quantity on the cubics through its values and rates.
 
-    Returns the index of the preceding sample, the maximum, and its position as a fraction of the step.
+    Parameters
+    ----------
+    time, y, v : (k,) array
+        Times [s], values and rates of the samples.
+    time_tolerance : float
+        Steps that are not longer than this time [s] are not searched.
+
+    Returns
+    -------
+    tuple
+        Index of the preceding sample, the maximum, and its position as a fraction of the step.
     """
     peak = int(np.argmax(y))
     best = (peak, float(y[peak]), 0.0)
@@ -149,7 +159,22 @@ def _force_at_reversal(
 
 
 def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
-    """Return the mean of the friction forces [N] before and after rest; None if one is unknown."""
+    """Return the mean of the friction forces [N] before and after a rest at a reversal.
+
+    Parameters
+    ----------
+    slide, force : (k,) array
+        Relative displacements [m] and friction forces [N] of the samples.
+    sample : int
+        Index of a sample at rest.
+    value : float
+        Relative displacement of the reversal [m].
+
+    Returns
+    -------
+    float or None
+        None if there is no motion before or after the rest.
+    """
     step = np.abs(np.diff(slide))
     is_moving = step > MIN_REST_END_STEP * step.max(initial=0.0)
     is_moving &= np.maximum(

@@ -212,7 +212,13 @@ def slip_start_measure(phases) -> Values:
 
 
 def compute_ledger_measures(ledger) -> Values:
-    """Return the final friction work and energies [J] of a run, as a dict."""
+    """Return the last values of the friction work and the energies [J] of a run, by the names of their measures.
+
+    Parameters
+    ----------
+    ledger : (4, k) array
+        Histories [J] of the friction work and of the stored, dissipated and created energy, in this order.
+    """
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 

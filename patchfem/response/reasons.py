@@ -178,7 +178,21 @@ def _reason_for_missing_phase(values, drive) -> str:
 def _reason_for_missing_cycle_value(
     name: str, values, window, drive, other_modes_fraction: float
 ) -> str:
-    """Return the reason why a cycle measure has no value."""
+    """Return the reason why a measure of the last cycles has no value.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure.
+    values : dict
+        Values of the measures that have one, by name.
+    window : Response
+        Samples of the last cycles.
+    drive
+        Drive of the run.
+    other_modes_fraction : float
+        Contribution of other modes than the first one to the slide.
+    """
     if not drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):

@@ -209,7 +209,21 @@ def _drift_scale(values: Values):
 def _random_rows(
     name: str, unit: str, floor: float, definition: str, group: str = "motion"
 ) -> tuple[MeasureDefinition, MeasureDefinition]:
-    """Return the rows of a measure under a random drive and of its statistical scatter."""
+    """Return the definitions of a measure under a random drive and of its statistical scatter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure; the scatter is named NAME_scatter.
+    unit : str
+        SI unit of both.
+    floor : float
+        Absolute error that is allowed in addition to a tolerance times the value.
+    definition : str
+        What the measure is.
+    group : str
+        Group of measures in which both are printed.
+    """
     scatter = f"{name}_scatter"
     value_row = MeasureDefinition(
         name,

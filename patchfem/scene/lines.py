@@ -174,7 +174,21 @@ def find_key_lines(text: str) -> dict[str, int]:
 def _record_header(
     lines: dict[str, int], last_item: dict[str, int], parts: list[str], line: int, *, is_array: bool
 ) -> str:
-    """Record the line of the header of a table, and return the dotted key of the table."""
+    """Record the line of the header of a table, and return the dotted key of the table.
+
+    Parameters
+    ----------
+    lines : dict of str to int
+        Lines by dotted key, which are extended.
+    last_item : dict of str to int
+        Index of the last item of each array of tables, by its dotted key; it is updated.
+    parts : list of str
+        Names in the header, such as ["structure", "interface"].
+    line : int
+        Number of the line.
+    is_array : bool
+        Whether the header is that of an item of an array, [[...]].
+    """
     path = ""
     for part in parts:
         item = f".{last_item[path]}" if path in last_item else ""

@@ -135,7 +135,8 @@ class PlainNumbers:
     """Generator of scenes that differ only in numeric values that affect no check.
 
     - scene: one of these scenes.
-    - limits: key of each number that differs, with modes by number -> limit below which the value affects no check.
+    - limits: upper limit [SI] of each number that differs, by its dotted key, in which modes have numbers. No check depends
+      on a value above 0 and below its limit.
     """
 
     scene: Scene

@@ -46,7 +46,24 @@ def read_tables(draft: SceneDraft) -> None:
 
 
 def _read_table(draft: SceneDraft, model: type[Table], raw: TomlTable, table_key: str) -> Table:
-    """Read one table of a scene, and report missing or wrong values."""
+    """Read one table of a scene, and report missing or wrong values.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+        Scene that is being read; it collects the mistakes.
+    model : type of Table
+        Class of the table, whose attributes are the keys.
+    raw : dict
+        Values of the keys as TOML has them.
+    table_key : str
+        Dotted key of the table; "" for the whole scene.
+
+    Returns
+    -------
+    Table
+        A missing or wrong value is None, so that the rules can go on.
+    """
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)]
     # Inner tables are read first; the rest is left to the validator of the table.

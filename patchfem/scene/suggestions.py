@@ -140,7 +140,21 @@ def _list_tables_with_key(key: str, table_key: str = "") -> list[str]:
 def _suggest_name(
     model: type[Table], raw: TomlTable, table_key: str, key: str, sets: Collection[str]
 ) -> str:
-    """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
+    """Return the key or table that was probably meant by an unknown one, or "" if none is similar.
+
+    Parameters
+    ----------
+    model : type of Table
+        Class of the table that contains the unknown key.
+    raw : dict
+        Values of this table as TOML has them.
+    table_key : str
+        Dotted key of this table; "" for the whole scene.
+    key : str
+        The unknown key.
+    sets : collection of str
+        Dotted keys that --set gives.
+    """
     if _is_table(raw[key]):
         table = _suggest_table(model, key, raw[key])
         # A table with another name is no second one of a table that the scene has.

@@ -240,7 +240,14 @@ def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray
 def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _YieldSequence:
     """Return the yield displacements of nodes for an assumed order of yielding.
 
-    c: (n, n) compliance [m/N]; force: (n,) yield forces [N].
+    Parameters
+    ----------
+    c : (n, n) array
+        Compliance [m/N].
+    force : (n,) array
+        Yield forces of the nodes [N].
+    order : (n,) array of int
+        Nodes in the assumed order of yielding.
     """
     cholesky_factor = _factorise(c[np.ix_(order, order)])
     inverse_ones = dtrsm(1.0, cholesky_factor, np.ones((force.size, 1)), lower=1)[:, 0]

@@ -104,7 +104,17 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
 def _advise_on_slides(omega, joint) -> str:
     """Return advice by which factor to multiply `slide` of all modes or their mass so that a joint can be removed.
 
-    joint: (n, n) stiffness of the joint over the mass [rad2 s-2]; "" if no factor suffices.
+    Parameters
+    ----------
+    omega : (n,) array
+        Circular frequencies of the modes [rad/s].
+    joint : (n, n) array
+        Stiffness of the joint over the mass [rad2 s-2].
+
+    Returns
+    -------
+    str
+        "" if no factor suffices, because a mode is rigid.
     """
     if not omega.all():
         return ""

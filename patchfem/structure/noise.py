@@ -110,7 +110,24 @@ def _cut_spectrum(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Restrict a spectrum to the range between two frequencies [Hz].
 
-    Returns frequencies (j,) [Hz] and densities (j,); raises PatchfemError if an end lies outside the spectrum.
+    Between its values the spectrum is linear in double logarithmic scale.
+
+    Parameters
+    ----------
+    frequency, density : (k,) array
+        Frequencies [Hz] and densities of the spectrum.
+    low, high : float or None
+        Ends of the range [Hz]; None for an end of the spectrum.
+
+    Returns
+    -------
+    frequency, density : (j,) array
+        Values in the range, and at both of its ends.
+
+    Raises
+    ------
+    PatchfemError
+        If an end of the range lies outside the spectrum.
     """
     low = frequency[0] if low is None else low
     high = frequency[-1] if high is None else high

@@ -17,10 +17,12 @@ PLACES_RANK_TOL = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Areal:
-    """Areal scan: heights z (m, n) [m] at x (n,) [m] along rows and y (m,) [m] along columns.
+    """Areal scan of a surface.
 
-    Missing heights are NaN; x and y increase. source: name of the scan for messages; notes:
-    sentences on its treatment.
+    - x (n,), y (m,): increasing positions along rows and along columns [m].
+    - z (m, n): heights [m]; NaN where one is missing.
+    - source: name of the scan for messages.
+    - notes: sentences on its treatment.
     """
 
     x: np.ndarray

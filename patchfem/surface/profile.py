@@ -27,10 +27,12 @@ EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trac
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Trace of heights z (n,) [m] at increasing positions x (n,) [m]; heights that were not measured are NaN.
+    """Trace of a surface, which is straight between its samples.
 
-    Between samples the trace is straight. source: name of the trace for messages; notes: sentences
-    on its treatment.
+    - x (n,): increasing positions [m].
+    - z (n,): heights [m]; NaN where one was not measured.
+    - source: name of the trace for messages.
+    - notes: sentences on its treatment.
     """
 
     x: np.ndarray
@@ -119,8 +121,19 @@ def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
 def clean(profile: Profile, max_gap: float) -> Profile:
     """Bridge spikes and missing heights by straight lines, and cut off missing ends.
 
-    max_gap: longest distance [m] between good samples that a line may bridge. The notes state the
-    counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
+    The notes of the new trace count the spikes and the missing heights.
+
+    Parameters
+    ----------
+    profile : Profile
+        Measured trace.
+    max_gap : float
+        Longest distance [m] between good samples that a line may bridge.
+
+    Raises
+    ------
+    PatchfemError
+        For a longer gap, and for fewer than two good heights.
     """
     is_spike = find_spikes(profile)
     if is_spike.any():

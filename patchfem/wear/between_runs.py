@@ -96,8 +96,8 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
     depth = second.depth - _interpolate(x, first.x, first.depth)
     area = float(second.area.sum())
     length = float(np.ptp(x))
-    volume, volume_error = _subtract(first, second, "worn_volume")
-    _, depth_error = _subtract(first, second, "worn_depth_max")
+    volume, volume_error = _measure_change(first, second, "worn_volume")
+    _, depth_error = _measure_change(first, second, "worn_depth_max")
     if depth_error is not None:
         depth_error += _interpolation_error(first, x)
     error = depth_error or 0.0
@@ -152,8 +152,11 @@ def _interpolate(x, given_x, values) -> np.ndarray:
     return np.apply_along_axis(lambda row: np.interp(x, given_x, row), -1, values)
 
 
-def _subtract(first: PatchState, second: PatchState, name: str) -> tuple[float, float | None]:
-    """Return the change of a measure and the sum of its errors, which is None if one is unknown."""
+def _measure_change(first: PatchState, second: PatchState, name: str) -> tuple[float, float | None]:
+    """Return the change of a measure from the first to the second state, and its error.
+
+    The error is the sum of the errors of both values, or None if one of them is unknown.
+    """
     value, error = second.measures[name]
     earlier, earlier_error = first.measures.get(name, (0.0, 0.0))
     return value - earlier, None if None in (error, earlier_error) else error + earlier_error
@@ -220,7 +223,21 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
 
 
 def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Quantity]:
-    """Measure the worn part of a line with worn depths [m] and a lost area [m2]."""
+    """Measure the worn part of a line.
+
+    Parameters
+    ----------
+    x : (m,) array
+        Positions of the nodes [m].
+    depth : (m,) array
+        Worn depths [m].
+    is_worn : (m,) array of bool
+        Nodes that are worn.
+    error : float
+        Error of the depths [m].
+    area : float
+        Lost area [m2].
+    """
     worn = np.flatnonzero(is_worn)
     first = max(int(worn[0]) - 1, 0)
     last = min(int(worn[-1]) + 1, x.size - 1)

@@ -86,7 +86,7 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
     problem : WearProblem
         Contact, slip path and wear law.
     depth : (m,) array, optional
-        Depth [m] that was worn before.
+        Depth [m] that was worn before; by default, none.
 
     Returns
     -------
@@ -173,7 +173,28 @@ def _correct_path(
     length: float,
     tolerance: float,
 ) -> tuple[WearState, float]:
-    """Repeat a jump with the mean of the slip paths at both ends; return the state and error / tolerance."""
+    """Repeat a jump with the mean of the slip paths at both of its ends.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        Contact, slip path and wear law.
+    state, after : WearState
+        States before and after the jump.
+    error : float
+        Error of the jump over its tolerance.
+    length : float
+        Length of the jump in cycles.
+    tolerance : float
+        Relative tolerance.
+
+    Returns
+    -------
+    WearState
+        State after the repeated jump, or `after` if the slip path has not changed.
+    float
+        Its error over the tolerance.
+    """
     path = problem.path(after.depth)
     if path is state.path:
         return after, error

@@ -341,7 +341,19 @@ def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = 
 def _make_result(
     bins: Bins, history: WearHistory, best: Place, others: list[Place]
 ) -> PredictedWear:
-    """Return the fitted wear; its intervals contain the other places that fit as well."""
+    """Return the fitted wear, with intervals that contain the other places that fit as well.
+
+    Parameters
+    ----------
+    bins : Bins
+        Measured depths.
+    history : WearHistory
+        Computed depths in the course of a run.
+    best : Place
+        Place with the smallest residual.
+    others : list of Place
+        Other places that fit as well.
+    """
     computed = history.average(bins.edges, best)
     residual = bins.depth - computed
     jacobian = _differentiate(bins, history, best)

@@ -181,7 +181,7 @@ GROWING_LISTS = {
 
 def march_list(law, capacity, monkeypatch):
     """Return a march of three cycles at 5 g with room for a number of strips at its start."""
-    monkeypatch.setattr(engine.list_numbers, "list_capacity", lambda *_: capacity)
+    monkeypatch.setattr(engine.list_numbers, "estimate_list_capacity", lambda *_: capacity)
     contact = make_lists(law, 98.0665, None, np.inf, 0.0)
     return march(
         make_one_mode(OMEGA, 0.01, 1.0), SineDrive(49.0, OMEGA), contact, 3, 100, window=3, frames=4

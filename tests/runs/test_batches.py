@@ -185,7 +185,7 @@ def test_always_fault_of_batch_falls_back_to_single_runs(fault, monkeypatch):
     def fail(models, say):
         raise fault
 
-    monkeypatch.setattr(batches, "MIN_CASES", 1)
+    monkeypatch.setattr(batches, "MIN_CASES_TO_GROUP", 1)
     monkeypatch.setattr(lumped, "solve", fail)
     models = [pf.build(text) for text in (RIG, BENCH, RIG)]
     messages = []

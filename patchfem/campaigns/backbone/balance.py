@@ -124,9 +124,27 @@ def tabulate_free_motions(
 def _find_motions(
     group: LawGroup, joint: JointMode, amplitudes, harmonics: int, excitation=None, starts=None
 ) -> list[FreeSolution | None]:
-    """Find the free motions at amplitudes (k,) [m] of the output, from similar ones if they are given.
+    """Find the free motions of a mode at given amplitudes of the output.
 
-    excitation: matrix E of `FreeBalance`.
+    Parameters
+    ----------
+    group : LawGroup
+        Laws of the interfaces.
+    joint : JointMode
+        The mode and its contact.
+    amplitudes : (k,) array
+        Increasing amplitudes of the output [m].
+    harmonics : int
+        Number of harmonics.
+    excitation : (n, n) array, optional
+        Matrix E of `make_free_balance`.
+    starts : list of (FreeSolution or None), optional
+        Similar motions at the same amplitudes, from which the search starts.
+
+    Returns
+    -------
+    list of (FreeSolution or None)
+        None at an amplitude without a motion.
     """
     equations = make_free_balance(
         joint.modes,
@@ -149,7 +167,20 @@ def find_forces(
     harmonics: int,
     motions: list[FreeSolution | None],
 ) -> np.ndarray:
-    """Find the forces at the output that hold the phase resonance, from the motions of `tabulate_free_motions`.
+    """Find the forces at the output that hold the phase resonance.
+
+    Parameters
+    ----------
+    group : LawGroup
+        Laws of the interfaces.
+    joint : JointMode
+        The mode and its contact.
+    amplitudes : (k,) array
+        Amplitudes of the output [m].
+    harmonics : int
+        Number of harmonics.
+    motions : list of (FreeSolution or None)
+        Free motions at these amplitudes, from `tabulate_free_motions`.
 
     Returns
     -------

@@ -17,9 +17,12 @@ LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
 class SteadyLoop(NamedTuple):
-    """Steady run of a contact under a sinusoidal displacement, with its model and its number of steps.
+    """Steady run of a contact under a sinusoidal displacement.
 
-    change: change of each of LOOP_MEASURES by the later half of the cycles.
+    - run: the run.
+    - model: model of the run.
+    - steps: number of steps per cycle.
+    - change: change of each of LOOP_MEASURES by the later half of the cycles.
     """
 
     run: bench.BenchRun

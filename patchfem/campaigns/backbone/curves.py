@@ -46,7 +46,8 @@ FLUTTER_TOL = 1e-8
 class Levels(NamedTuple):
     """Amplitudes of a backbone, or the forces that hold the phase resonance; () for a range around the onset of slip.
 
-    amplitudes: at the output [m]; forces: at the output [N].
+    - amplitudes: amplitudes at the output [m].
+    - forces: forces at the output [N].
     """
 
     amplitudes: Sequence[float] = ()
@@ -261,7 +262,7 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     modes = joint.modes
 
     def find(rows, stiffness: float) -> float:
-        """Return the frequency [Hz] of the mode with springs [N/m] on the rows."""
+        """Return the frequency [Hz] of the mode `joint.mode` if springs [N/m] hold the interfaces of the given rows."""
         return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
 
     free = modes.omega[joint.mode] / (2 * np.pi)

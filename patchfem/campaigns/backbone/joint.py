@@ -34,7 +34,8 @@ NO_CLOSED_FORM = (
 class StuckMode(NamedTuple):
     """Structural mode with its contact stuck.
 
-    omega: circular frequency [rad/s], None if nothing is elastic; shape: (n,).
+    - omega: circular frequency [rad/s]; None if nothing is elastic.
+    - shape (n,): modal coordinates of the mode.
     """
 
     omega: float | None
@@ -190,7 +191,7 @@ class JointMode(NamedTuple):
         return self.output_amplitude(self.slip_displacement)
 
     def slides(self, amplitudes) -> np.ndarray:
-        """Return the amplitudes (k,) [m] of the dominant interface in the stuck mode for those at the output."""
+        """Return the amplitudes (k,) [m] of the slide of the first interface, in the stuck mode, for those at the output."""
         return np.abs(self.modes.interfaces[0] @ self.shape) * np.asarray(amplitudes) / self.reach
 
     def steady_laws(self) -> LawGroup:

@@ -70,7 +70,10 @@ class Band(NamedTuple):
 
     The curve is that of `balance` where it exists: a steady vibration in phase resonance.
 
-    method: of the recommended curve; amplitude (k,) [m]; limits (k,) of the frequency [Hz] and of the damping ratio.
+    - method: method of the recommended curve.
+    - amplitude (k,): amplitudes of the curve [m].
+    - frequency_low, frequency_high (k,): limits of the frequency [Hz].
+    - damping_low, damping_high (k,): limits of the damping ratio [1].
     """
 
     method: str
@@ -107,8 +110,10 @@ def make_band(curves: dict[str, Curve]) -> Band | None:
 class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a sticking contact.
 
-    stuck: None if the contact does not move in the mode; stuck_error: None if it is not known; free_error: due to a
-    joint that was subtracted from the modes.
+    - free: frequency without the contact.
+    - stuck: frequency with a sticking contact; None if the contact does not move in the mode.
+    - stuck_error: error of `stuck`; None if it is not known.
+    - free_error: error of `free` due to a joint that was subtracted from the modes.
     """
 
     free: float
@@ -122,7 +127,8 @@ class LossExponents(NamedTuple):
 
     An exponent is None if it is not determined.
 
-    micro: in micro-slip; gross: in gross slip.
+    - micro: exponent in micro-slip.
+    - gross: exponent in gross slip.
     """
 
     micro: float | None = None

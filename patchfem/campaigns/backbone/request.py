@@ -41,7 +41,9 @@ class BackboneRequest(NamedTuple):
 class BackboneCases(NamedTuple):
     """Backbones of a scene for the values of a key, or a single one.
 
-    axis: the key with its values; None without one. backbones: for each value. source: of the first one.
+    - axis: the key with its values; None for a single backbone.
+    - backbones: a backbone for each value.
+    - source: source of the first one.
     """
 
     axis: Axis | None

@@ -466,7 +466,8 @@ def _widen_by_missing_modes(
     except PatchfemError as reason:
         return fit, f"{NO_MODE_ERROR}: {reason}"
 
-    # the fit to the curve with the estimated error of the modes
+    # The neglected modes change the computed curve by `error`. A fit to the measured curve less this error shows how far
+    # they shift each value, and the interval of the value is widened by its shift to both sides.
     reference = curves.compute(fit.values, method)
     change = np.nan_to_num(richer_curve - reference)
     error = convergence_error(change, ratio=0.5, order=2.0)

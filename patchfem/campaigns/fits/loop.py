@@ -176,7 +176,16 @@ class BenchModel:
         return np.abs(fine - coarse).max()
 
     def refine_steps(self, values: np.ndarray) -> None:
-        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them."""
+        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
+
+        The effect is negligible if halving the steps changes no reading by more than STEP_FRACTION times the tolerance
+        of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
+
+        Parameters
+        ----------
+        values : (n,) array
+            Values of the n free keys [SI].
+        """
         limit = STEP_FRACTION * self.keys.scene.accuracy.tolerance
         while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
             if self.measure_step_error(values) <= limit * np.abs(self(values)).max():

@@ -34,7 +34,10 @@ COEFFICIENT_KEY = "wear.coefficient"
 class MeasuredDepth:
     """Measured wear depth with its interval.
 
-    name: one of QUANTITIES; value, low, high: [m]; source: "--to" or a file.
+    - name: one of QUANTITIES.
+    - value: depth [m].
+    - low, high: ends of its interval [m].
+    - source: "--to" or a file.
     """
 
     name: str

@@ -211,7 +211,16 @@ def _advise_condition(
 ) -> str:
     """Return a sentence on the measured condition whose repetition would narrow an interval most, or "".
 
-    training: mask (n,) of the fitted readings.
+    Parameters
+    ----------
+    readings : Readings
+        Measured readings.
+    fit : Fit
+        Fitted values with their intervals.
+    ranges : sequence of Range
+        Ranges of the fitted keys.
+    training : (n,) array of bool
+        Mask of the fitted readings.
     """
     condition = readings.condition[training]
     is_acceleration = readings.is_acceleration[training]
@@ -228,7 +237,14 @@ def _advise_condition(
 def _warn_of_doubtful_fit(readings: Readings, fit: Fit, logs: np.ndarray) -> list[str]:
     """Return warnings about rows without readings, unstable readings and an unreliable search.
 
-    logs: log ratios (n,) of the best fit.
+    Parameters
+    ----------
+    readings : Readings
+        Measured readings.
+    fit : Fit
+        Fitted values with their intervals.
+    logs : (n,) array
+        Log ratios ln(computed/measured) of the best fit.
     """
     warnings = []
     if readings.empty_rows:

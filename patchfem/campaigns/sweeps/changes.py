@@ -21,10 +21,10 @@ class MeasureRange(NamedTuple):
     ----------
     measure : str
     low_case, high_case : int
-        Their cases.
+        Indices of the cases with the smallest and the largest value.
     relative : float
-        Difference of both relative to the first case, or to the larger one if the first case does
-        not count; infinite if the first case has the value 0.
+        Difference of both values over |value of case 0|, or over the larger magnitude of both if case 0 does
+        not count; infinite if this reference does not exceed the error floor of case 0.
     """
 
     measure: str

@@ -128,13 +128,13 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     heights = height[top] / np.sqrt(known[:, 1])
     widths = frequencies[:, 2] - frequencies[:, 1]
 
-    # The errors of the heights shift each crossing of the half-power level by this fraction of the width.
     width = widths[0]
     frequency_error = _estimate_error(frequencies[:, 0])
     height_error = _estimate_error(heights)
     if len(known) < len(shapes):  # a curve through other cases shows no peak here
         frequency_error += spacing
         height_error += heights[0] - height[near].min()
+    # The errors of the heights shift each crossing of the half-power level by this fraction of the width.
     slack = np.nanmax(error[near]) / height[top] + height_error / heights[0]
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     width_error = _estimate_error(widths) + 2 * width * slack

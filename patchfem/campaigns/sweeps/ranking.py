@@ -45,7 +45,13 @@ SPREAD_ROUND_OFF = 1e-9  # relative spread of values that differ by round-off on
 
 
 class SobolIndex(NamedTuple):
-    """First-order and total Sobol index of a key, with the interval of the total index."""
+    """Sobol indices of a key: fractions of the variance of a measure over a sweep.
+
+    - key: swept key.
+    - first: first-order index, the part that this key causes alone.
+    - total: total index, the part that this key causes alone or together with others.
+    - low, high: interval of the total index.
+    """
 
     key: str
     first: float

@@ -64,7 +64,13 @@ class SweptKey:
 
 @dataclass(frozen=True)
 class MeasureColumn:
-    """Values, errors and absolute floors (n,) of a measure in SI; NaN where a case has none."""
+    """Values of a measure in the n cases of a sweep, in SI units.
+
+    - unit: unit of the measure.
+    - values (n,): NaN where a case has no value.
+    - errors (n,): NaN where an error is not known.
+    - floors (n,): absolute errors that are allowed in addition to a tolerance times the value.
+    """
 
     unit: str
     values: np.ndarray

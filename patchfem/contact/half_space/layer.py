@@ -64,7 +64,14 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
 def _solve_waves(k, depths: list[float], moduli: list[tuple[float, float]]) -> WaveCompliance:
     """Compute the compliance for wavenumbers k (n,) [1/m] whose waves reach all layers.
 
-    depths: thickness [m] of each layer from the face down; moduli: its Lamé constants [Pa].
+    Parameters
+    ----------
+    k : (n,) array
+        Wavenumbers [1/m].
+    depths : list of float
+        Thickness [m] of each layer from the face down.
+    moduli : list of tuple
+        Lamé constants [Pa] of each layer.
     """
     n_unknowns = 4 * len(depths)
     scale = moduli[0][1]

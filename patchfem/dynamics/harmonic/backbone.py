@@ -151,7 +151,7 @@ class FreeBalance:
         # Equations: slides, amplitude and phase of the coordinate, and the condition of the motion.
         first = motion.modal[1, self.mode]
         by_first = slopes[1, self.mode]
-        condition, gradient = self._find_condition(x, amplitude, motion.modal, slopes)
+        condition, gradient = self._evaluate_amplitude_condition(x, amplitude, motion.modal, slopes)
         slides = x[:-3] - split_equations(motion.modal @ balance.rows.T)
         residual = np.append(slides, [first.real - a, first.imag, condition])
         jacobian = np.eye(x.size)
@@ -163,7 +163,7 @@ class FreeBalance:
             residual, jacobian, FreeMotion(a, omega, zeta, slides, motion.force, motion.modal)
         )
 
-    def _find_condition(
+    def _evaluate_amplitude_condition(
         self, x, amplitude: float | None, modal, slopes
     ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
@@ -232,6 +232,12 @@ class FreeBalance:
         start, target : float
             First and last amplitude [m].
 
+        Returns
+        -------
+        x : (N,) array
+            Unknowns at the last amplitude.
+        motion : FreeMotion
+
         Raises
         ------
         NotConverged
@@ -239,6 +245,7 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
+            # First guess: slides and amplitude in proportion to the target; frequency and damping ratio stay.
             scaled = x * (targets[-1] / start)
             scaled[-3:-1] = x[-3:-1]
             try:

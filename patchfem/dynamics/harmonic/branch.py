@@ -82,7 +82,21 @@ def trace_over_frequency(
 
 
 def _trace_with_harmonics(modes, drive: SineDrive, omegas, first: SteadyMotion, h: int) -> Branch:
-    """Trace a branch with h harmonics, and with enough samples per cycle for the largest amplitude."""
+    """Trace a branch with h harmonics, and with enough samples per cycle for the largest amplitude.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    drive : SineDrive
+        Drive, whose frequency is varied.
+    omegas : tuple of float
+        First and last circular frequency [rad/s].
+    first : SteadyMotion
+        Motion near the first frequency, from which the branch starts.
+    h : int
+        Number of harmonics.
+    """
     group = first.group
     samples = group.samples_for(h, find_amplitudes(first.slides))
     for _ in range(MAX_SAMPLE_CHANGES):

@@ -54,7 +54,13 @@ class Motion(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Residual (N,), its derivatives (N, N) by the unknowns and (N,) by frequency and drive level, and the motion."""
+    """Equations of a harmonic balance at a set of N unknowns.
+
+    - residual (N,): what a solution makes zero
+    - jacobian (N, N): its derivatives by the unknowns
+    - by_omega, by_level (N,): its derivatives by circular frequency and drive level
+    - motion: motion of the modes with these unknowns
+    """
 
     residual: np.ndarray
     jacobian: np.ndarray

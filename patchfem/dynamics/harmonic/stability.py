@@ -102,7 +102,10 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
                     if stiffness.any():
                         memories.append(_Memory(i, still, still, stiffness, node))
 
-    # Matrices of the rates of the state by theta.
+    # Matrices of the linear equations of a perturbation (z, dz/dtheta, u), with theta = omega t, the modal coordinates z,
+    # the memories u, the slides q = R z and a force stiffness u of each memory:
+    #   d2z/dtheta2 = -(omega_j/omega)^2 z - C/omega dz/dtheta - R^T (slope q + omega damping dq/dtheta + force)/(m omega^2)
+    #   du/dtheta = gain dq/dtheta - loss u
     size = 2 * n + len(memories)
     to_rate = rows.T / (modes.mass * omega**2)
     rates = np.zeros((widths.size, size, size))

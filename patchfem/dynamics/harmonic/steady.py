@@ -191,9 +191,25 @@ def list_coexisting_slides(motion: SteadyMotion, drive) -> list[np.ndarray]:
 
 
 def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple[np.ndarray, int]:
-    """Solve a balance from slides (i, K + 1) [m] or None, from the stuck contact, and finally from weaker drives.
+    """Solve a balance from given slides, from the stuck contact, and finally from weaker drives.
 
-    Returns the unknowns, and the number of Newton steps.
+    Parameters
+    ----------
+    balance : HarmonicBalance
+        Equations of the motion.
+    drive : core.SineDrive
+        Frequency and level.
+    h : int
+        Number H of harmonics of the motion.
+    slides : (i, K + 1) array or None
+        Harmonics 0 to K of the slides of all interfaces [m], from which the first trial starts.
+
+    Returns
+    -------
+    x : (N,) array
+        Unknowns of the balance.
+    count : int
+        Number of Newton steps.
     """
     omega = drive.omega
     level = drive.acceleration

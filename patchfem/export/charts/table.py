@@ -55,9 +55,10 @@ class Chart:
 class Column(NamedTuple):
     """Column of a CSV file or of a table.
 
-    heading; name: variable of the answer, or key in each row of its details; style: "" or, for a table, "name" for words
-    with underscores, "quantity" with the unit, the error and the interval of its row, "rounded" for three digits, or
-    "percent" for a relative change.
+    - heading: text above the column.
+    - name: variable of the answer, or key in each row of its details.
+    - style: "" for values as they are. In a table also "name" for words with underscores, "quantity" for a value with the
+      unit, the error and the interval of its row, "rounded" for three digits, and "percent" for a relative change.
     """
 
     heading: str
@@ -66,7 +67,10 @@ class Column(NamedTuple):
 
 
 def parse_columns(line: str) -> list[Column]:
-    """Return the columns of a heading line such as "x, height = before, at = value:quantity"."""
+    """Return the columns of a heading line such as "x, height = before, at = value:quantity".
+
+    Each part is NAME, HEADING = NAME or HEADING = NAME:STYLE, as the fields of `Column`; without a heading the name is used.
+    """
     columns = []
     for part in line.split(", "):
         heading, _, source = part.partition(" = ")
@@ -78,10 +82,11 @@ def parse_columns(line: str) -> list[Column]:
 class CsvFile(NamedTuple):
     """CSV file of an answer.
 
-    columns: heading line, where a heading may end in a unit of CSV_UNITS; source: "" for variables, a dimension for all of
-    its variables, "curves" for the curves of a backbone below each other, or the key of a list of objects in the details,
-    whose texts the columns name; nested: key of the quantities in each of these objects, "" if they are its own keys. A
-    quantity has the columns NAME, NAME_low and NAME_high.
+    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS.
+    - source: "" for variables, a dimension for all of its variables, "curves" for the curves of a backbone below each
+      other, or the key of a list of objects in the details, whose texts the columns name.
+    - nested: key of the quantities in each of these objects, "" if they are its own keys. A quantity has the columns NAME,
+      NAME_low and NAME_high.
     """
 
     columns: str
@@ -92,8 +97,10 @@ class CsvFile(NamedTuple):
 class Table(NamedTuple):
     """Table of an answer.
 
-    title: heading; source: path of a list of objects in `details`, such as "limits" or "cases/failed", or the name of a
-    dimension of `data`; columns: heading line, where "NAME:STYLE" has the style of a `Column`.
+    - title: heading.
+    - source: path of a list of objects in `details`, such as "limits" or "cases/failed", or the name of a dimension of
+      `data`.
+    - columns: heading line (`parse_columns`).
     """
 
     title: str

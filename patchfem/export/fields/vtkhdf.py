@@ -39,7 +39,15 @@ class Frames(NamedTuple):
 
 
 def write_fields(result, path: Path) -> None:
-    """Write the fields of both pieces and their interface of a run, and add notes on yielding to this result."""
+    """Write the fields of both pieces and their interface of a run as a VTKHDF file, which ParaView reads.
+
+    Parameters
+    ----------
+    result : Result
+        Result of a run; notes on yielding are added to it.
+    path : Path
+        File to write.
+    """
     pieces = compute_pieces(result)
     add_yielding_notes(result, pieces)
     write_blocks(path, make_blocks(pieces), pieces.time)

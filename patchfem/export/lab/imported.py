@@ -119,7 +119,24 @@ def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
 
 
 def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict[str, object]:
-    """Write measured records as a table."""
+    """Write measured records as a table.
+
+    Parameters
+    ----------
+    file : Path
+        Laboratory file.
+    out : Path
+        Table to write.
+    requests : iterable of str
+        Channels that are asked for, such as "force=Load cell [lbf]"; without any, those that the file states.
+    zero : bool
+        Whether time and displacements are shifted to start at 0.
+
+    Returns
+    -------
+    dict
+        Number of rows, units, notes, and a text on what was written.
+    """
     found = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(found.values) if zero else found.values
     units = {name: SI_UNITS[name] for name in values}
@@ -133,7 +150,19 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
 def _write_decay(
     values: dict[str, np.ndarray], out: Path, begin: float | None, notes: list[str]
 ) -> dict[str, object]:
-    """Write frequency and damping ratio of a measured decay as a table."""
+    """Write frequency and damping ratio of a measured decay as a table.
+
+    Parameters
+    ----------
+    values : dict of str to array
+        Records in SI by quantity.
+    out : Path
+        Table to write.
+    begin : float or None
+        Time at which the decay begins [s]; None: it is found.
+    notes : list of str
+        Notes on the records.
+    """
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
     columns = [
         Column(f"decay_{name}", DECAY_UNITS[name.removesuffix("_error")], column)

@@ -36,7 +36,10 @@ SI_UNITS = {
 class Column(NamedTuple):
     """Values of a quantity along the rows of a file.
 
-    name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if there is only one.
+    - name: name of the quantity.
+    - unit: unit as in netCDF, such as "m s-2".
+    - values (k,): one value for each row.
+    - number: number of the interface or mode, from 1; 0 if there is only one.
     """
 
     name: str

@@ -125,7 +125,10 @@ class Words(NamedTuple):
 
 
 def to_answer(quantity: Quantity) -> answer.Quantity:
-    """Return a measured quantity as that of an answer, with its reason in words."""
+    """Convert a measured quantity to a quantity of an answer.
+
+    The code of a reason for a missing interval or value, such as "few_files", becomes a sentence of REASONS.
+    """
     reason = REASONS.get(quantity.reason, quantity.reason)
     value, low, high, unit = quantity[:4]
     return answer.Quantity(value, unit, low=low, high=high, reason=reason)

@@ -27,7 +27,7 @@ from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks
 from ..folder import LOCK, refuse_others, remove, remove_partial_files
 from .store import CHUNKS, Chunks, case_folder_name, write_chunk
 
-CASES = "cases"
+CASES_FOLDER = "cases"  # name of the folder with the results of single cases
 TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
 
 
@@ -108,7 +108,9 @@ class Writer:
         from ..folder import Folder as ResultsFolder
         from ..run_folder import draw_page, write_results
 
-        with ResultsFolder(self.target / CASES / case_folder_name(self.names[number])) as folder:
+        with ResultsFolder(
+            self.target / CASES_FOLDER / case_folder_name(self.names[number])
+        ) as folder:
             write_results(result, folder.path, self._name_case(number))
             fault = draw_page(folder.path) if self.keep == "pages" else None
         if fault is not None:
@@ -136,7 +138,7 @@ class Writer:
             for case, text in enumerate(texts):
                 # The other cases have a results folder already.
                 if self.keep == "summaries" or case in results.messages:
-                    folder = self.target / CASES / case_folder_name(names[case])
+                    folder = self.target / CASES_FOLDER / case_folder_name(names[case])
                     folder.mkdir(parents=True, exist_ok=True)
                     write_text(folder / answers.SUMMARY, text)
             write_chunk(self.target / CHUNKS, names, results)
@@ -190,7 +192,7 @@ class Folder:
         self.chunks = Chunks(self.target / CHUNKS, names)
 
     def __enter__(self) -> Folder:
-        allowed = (CASES, CHUNKS, *TABLES)
+        allowed = (CASES_FOLDER, CHUNKS, *TABLES)
         refuse_others(self.target, self.shown, allowed, "those of a sweep", dots=True)
         try:
             (self.target / CHUNKS).mkdir(parents=True, exist_ok=True)
@@ -215,7 +217,7 @@ class Folder:
 
     def _remove_empty(self) -> None:
         """Remove the folders of the sweep that are empty."""
-        for folder in (self.target / CASES, self.target / CHUNKS, self.target):
+        for folder in (self.target / CASES_FOLDER, self.target / CHUNKS, self.target):
             with suppress(OSError):  # a folder with results is kept
                 folder.rmdir()
 
@@ -249,13 +251,13 @@ class Folder:
             is_stored[numbers] = True
             for case, number in enumerate(numbers.tolist()) if required else ():
                 files = required[:1] if case in results.messages else required  # a case that failed
-                folder = self.target / CASES / case_folder_name(self.chunks.names[number])
+                folder = self.target / CASES_FOLDER / case_folder_name(self.chunks.names[number])
                 is_stored[number] = all((folder / name).is_file() for name in files)
         return is_stored
 
     def case_folder_names(self) -> list[str]:
         """Return the folder names of the cases in cases/, or [] if no case has a folder."""
-        if not (self.target / CASES).is_dir():
+        if not (self.target / CASES_FOLDER).is_dir():
             return []
         return [case_folder_name(name) for name in self.chunks.names]
 
@@ -278,11 +280,11 @@ class Folder:
         remove_partial_files(self.target)
         own = set() if keep == "none" else set(self.case_folder_names())
         stored = set(self.chunks.list_files())
-        stored |= {self.target / CASES / name for name in own}
-        for folder in (CHUNKS, CASES):
+        stored |= {self.target / CASES_FOLDER / name for name in own}
+        for folder in (CHUNKS, CASES_FOLDER):
             for path in (self.target / folder).glob("*"):
                 is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
                 if path not in stored and (is_incomplete or removes_others):
                     remove(path)
         with suppress(OSError):  # the folder does not exist, or still contains cases
-            (self.target / CASES).rmdir()
+            (self.target / CASES_FOLDER).rmdir()

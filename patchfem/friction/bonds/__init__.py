@@ -1,6 +1,7 @@
-"""Friction law as a sum over bonds (eq. 2.17): the moments of the bonds, and the list of their strips.
+"""Friction law as a sum over bonds: the moments of the bonds, and the list of their strips.
 
-In: bond parameters, relative displacement and pressure. Out: traction and energies. The two readings of eq. 2.17
+In: bond parameters, relative displacement and pressure. Out: traction and energies. In this folder "eq. n" is equation n
+of Srinivasan, Cassenti and Cutts, Study of Characteristics of Dry Friction Damping (1985). The two readings of eq. 2.17
 (`Bonds.reading`):
 
 - "report": eqs. 2.14 to 2.17 as printed. A bond carries (R/eps)^p exp(-R/eps) along u/|u|, with u its stretch and R the path

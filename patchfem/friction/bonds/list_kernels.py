@@ -248,7 +248,7 @@ def target_length(before, after, exponent):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def divide(path, eps, growth, law):
-    """Divide an increment into strips.
+    """Divide an increment into strips, so that two Gauss points sum each of them accurately.
 
     Their length increases with exp(R/(AGE_PER_WIDTH eps)), so that old strips, which carry less, are longer.
 
@@ -275,7 +275,9 @@ def divide(path, eps, growth, law):
     covered = -expm1(-min(x, cutoff) / AGE_PER_WIDTH)
     count = AGE_PER_WIDTH / MAX_STRIP_LENGTH * covered
 
-    # Growing bonds also need strips so short that the growth J in each stays small
+    # Growing bonds also need strips so short that the growth J in each stays small. Bonds that form on an increment carry
+    # about (path/eps_0)^(1 + min(p, 0)) of the friction limit; the exponent is below 1 for p < 0, as young bonds then carry
+    # more. The error of n strips is at most this over n^4, so that never more than (limit/NEW_BOND_TOL)^0.25 are needed.
     if form == FORM_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
         min_count = (limit / NEW_BOND_TOL) ** 0.25
@@ -420,10 +422,25 @@ def _add_to_mean(weight, row, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_panels(weight, row, increment, bonds, v0, dt):
-    """Add a row, averaged over an increment by panels of Gauss points, to the row of the mean force.
+    """Add the average of a row of the strips over an increment, by panels of Gauss points, to the row of the mean force.
 
     Each panel is twice as long as the one before. The last one may be short, so that the mean force depends continuously
     on the increment.
+
+    Parameters
+    ----------
+    weight : float
+        Factor of the average.
+    row : int
+        Row of the strips that is averaged (`StripRows`).
+    increment : float
+        Increment from the present state [m].
+    bonds : list_rows_kernels.BondList
+        List of bonds, which is changed.
+    v0 : float
+        Velocity at the start of the increment [m/s].
+    dt : float
+        Duration of the increment [s].
     """
     path = abs(increment) / bonds.now[PATH.length]
 

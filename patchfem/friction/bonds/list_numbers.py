@@ -116,7 +116,7 @@ def gamma_table(law: Bonds) -> np.ndarray:
     return gammainc(law.order + 1, np.arange(n_nodes) / N_TABLE_STEPS)
 
 
-def list_capacity(reach: float, merge: float) -> int:
+def estimate_list_capacity(reach: float, merge: float) -> int:
     """Return the number of strips for which memory is allocated in a bond list.
 
     Parameters

@@ -194,7 +194,19 @@ def _make_space(count, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_weights(width, eps, bonds, column):
-    """Write the scaled weights of a strip of a given damage along it, for reading="stretch"."""
+    """Write the scaled weights of a strip, for reading="stretch".
+
+    Parameters
+    ----------
+    width : float
+        Damage along the strip [1].
+    eps : float
+        Bond length when the bonds of the strip formed [m].
+    bonds : list_rows_kernels.BondList
+        List of bonds, which is changed.
+    column : int
+        Column of the strip.
+    """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     weight = strips[STRIP.covered, column] / power(eps, p)
@@ -205,10 +217,21 @@ def _write_weights(width, eps, bonds, column):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_start_lengths(low, width, before, after, bonds, column):
-    """Write the scaled starting lengths of a strip of growing bonds that ends at a fraction `low` of the increment.
+    """Write the scaled starting lengths of a strip of growing bonds.
 
     At a Gauss point it is the mature length when its bonds formed, times exp(J - reference) at that time. Later, the
     length of these bonds is that of mature bonds less exp(reference - J) times this number.
+
+    Parameters
+    ----------
+    low, width : float
+        End and length of the strip, as fractions of the increment from its end.
+    before, after : PathValues
+        Path states before and after the increment.
+    bonds : list_rows_kernels.BondList
+        List of bonds, which is changed.
+    column : int
+        Column of the strip.
     """
     reference = bonds.now[PATH.reference]
     growth = after.growth - before.growth

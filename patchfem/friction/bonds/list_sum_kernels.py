@@ -59,7 +59,15 @@ class BondSum(NamedTuple):
 
 
 class PathValues(NamedTuple):
-    """Path state of a list after an increment, and the bond length [m] in the middle of it."""
+    """State of the path of a list of bonds after an increment.
+
+    - displacement: relative displacement [m]
+    - path: length of the path [m]
+    - damage: integral of dR/eps along the path [1], for reading="stretch"
+    - growth: exponent J of the growth of bonds [1]
+    - length: bond length [m]
+    - middle_length: bond length in the middle of the increment [m]
+    """
 
     displacement: float
     path: float
@@ -111,7 +119,10 @@ def sum_strips(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _value_scale(after, bonds):
-    """Return the factor that undoes the scale of the values of the strips."""
+    """Return the factor that undoes the scale of the values of the strips.
+
+    The values are stored relative to a reference (`list_rows_kernels`), so that an increment need not change all of them.
+    """
     reference = bonds.now[PATH.reference]
     if bonds.law[LAW.form] == FORM_STRETCH:
         return exp(reference - after.damage)
@@ -120,7 +131,24 @@ def _value_scale(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _suits_gauss(after, bonds, column, p, form):
-    """Return whether two Gauss points sum a strip exactly enough."""
+    """Return whether two Gauss points sum a strip exactly enough.
+
+    They do not near u = 0, where the force has a kink or is singular, nor among young growing bonds of an order that is no
+    whole number.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strip is summed.
+    bonds : list_rows_kernels.BondList
+        List of bonds.
+    column : int
+        Column of the strip.
+    p : float
+        Order of the law.
+    form : float
+        FORM_STRETCH or FORM_GROWING.
+    """
     strips = bonds.bondlist
     start = strips[STRIP.start, column]
     end = strips[STRIP.end, column]
@@ -139,7 +167,17 @@ def _suits_gauss(after, bonds, column, p, form):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
-    """Write force and energy of all strips for reading="stretch" by two Gauss points each."""
+    """Write force and energy of all strips for reading="stretch" by two Gauss points each.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strips are summed.
+    force_factor, energy_factor : float
+        Factors of the sums, which include the scale of the values of the strips.
+    bonds : list_rows_kernels.BondList
+        List of bonds, whose forces and energies are overwritten.
+    """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     is_whole = p == 0.0 or p == 1.0 or p == 2.0
@@ -163,7 +201,19 @@ def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_growing(after, scale, factor, bonds):
-    """Write force and energy of all strips of growing bonds by two Gauss points each."""
+    """Write force and energy of all strips of growing bonds by two Gauss points each.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strips are summed.
+    scale : float
+        Factor that undoes the scale of the values of the strips (`_value_scale`).
+    factor : float
+        Factor of forces and energies, 1/(Gamma(p + 1) eps_0) [1/m].
+    bonds : list_rows_kernels.BondList
+        List of bonds, whose forces and energies are overwritten.
+    """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     is_whole = p == 0.0 or p == 1.0 or p == 2.0
@@ -261,7 +311,23 @@ def _integrate_strip(after, scale, bonds, column):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_stretch_piece(after, bonds, column, low, high):
-    """Integrate c |u|^p sgn u, and this times |u|, between two positions of a strip of weight c."""
+    """Integrate c |u|^p sgn u and c |u|^(p + 1) over a part of a strip, with the stretch u and the weight c of its bonds.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strip is summed.
+    bonds : list_rows_kernels.BondList
+        List of bonds.
+    column : int
+        Column of the strip.
+    low, high : float
+        Ends of the part, as fractions of the length of the strip from its end.
+
+    Returns
+    -------
+    BondSum
+    """
     strips = bonds.bondlist
     value_1 = strips[STRIP.value_1, column]
     value_2 = strips[STRIP.value_2, column]
@@ -280,10 +346,27 @@ def _integrate_stretch_piece(after, bonds, column, low, high):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_growing_piece(after, scale, bonds, column, low, high):
-    """Integrate (R/eps)^p exp(-R/eps) sgn u, and this times |u|, between two positions of a strip on one side of u = 0.
+    """Integrate (R/eps)^p exp(-R/eps) sgn u, and this times |u|, over a part of a strip on one side of u = 0.
 
     Young bonds that grew along the strip have a length proportional to R, so (R/eps)^p is smooth. Where they grew at
     rest instead, R^p is integrated exactly and the rest is taken as linear.
+
+    Parameters
+    ----------
+    after : PathValues
+        Path state at which the strip is summed.
+    scale : float
+        Factor that undoes the scale of the values of the strips.
+    bonds : list_rows_kernels.BondList
+        List of bonds.
+    column : int
+        Column of the strip.
+    low, high : float
+        Ends of the part, as fractions of the length of the strip from its end.
+
+    Returns
+    -------
+    BondSum
     """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
@@ -335,7 +418,19 @@ def _integrate_growing_piece(after, scale, bonds, column, low, high):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _bond_length(fraction, after, scale, value_1, value_2):
-    """Return the length [m] of growing bonds at a position within a strip."""
+    """Return the length [m] of growing bonds at a position within a strip.
+
+    Parameters
+    ----------
+    fraction : float
+        Position, as a fraction of the length of the strip from its end.
+    after : PathValues
+        Path state, with the length of mature bonds.
+    scale : float
+        Factor that undoes the scale of the values of the strips.
+    value_1, value_2 : float
+        Values of the strip at its Gauss points.
+    """
     start = interpolate_value(fraction, value_1, value_2)
     return max(after.length - scale * start, MIN_BOND_RATIO * after.length)
 

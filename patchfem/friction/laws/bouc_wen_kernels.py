@@ -22,7 +22,13 @@ SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
 
 
 class BoucWenNumber(IntEnum):
-    """Indices of the parameters of the law; the first one is reserved for the engines."""
+    """Indices of the parameters of the law; index 0 is reserved for the engines.
+
+    - LIMIT: friction limit mu N [N]
+    - LENGTH: length eps [m]
+    - EXPONENT: exponent n
+    - SHAPE: weight s of the two terms of the law
+    """
 
     LIMIT = 1
     LENGTH = 2

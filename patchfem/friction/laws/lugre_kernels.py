@@ -18,7 +18,13 @@ MIN_LIMIT_RATIO = 1e-9
 
 
 class LuGreNumber(IntEnum):
-    """Indices of the parameters of the law; the first one is reserved for the engines."""
+    """Indices of the parameters of the law; index 0 is reserved for the engines.
+
+    - STIFFNESS: stiffness [N/m]
+    - KINETIC, STATIC: kinetic and static friction force [N]
+    - SPEED: Stribeck velocity [m/s]
+    - MICRO_DAMPING, VISCOUS: micro-damping and viscous damping [N s/m]
+    """
 
     STIFFNESS = 1
     KINETIC = 2
@@ -30,14 +36,22 @@ class LuGreNumber(IntEnum):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def relaxation_length(numbers, velocity):
-    """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s].
+    """Return the path over which the stretch z relaxes to its steady value at a constant velocity.
+
+    This path is g(v)/stiffness, with g(v) = F_k + (F_s - F_k) exp(-(v/v_s)^2), the kinetic and static forces F_k and F_s,
+    and the Stribeck velocity v_s.
 
     Parameters
     ----------
     numbers : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order of `LuGreNumber`.
     velocity : float
-        Velocity [m/s].
+        Velocity v [m/s].
+
+    Returns
+    -------
+    (float, float)
+        The path [m], and its derivative with respect to the velocity [s].
     """
     stiffness = numbers[LuGreNumber.STIFFNESS]
     kinetic = numbers[LuGreNumber.KINETIC]

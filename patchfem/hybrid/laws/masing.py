@@ -30,8 +30,14 @@ MIN_BRANCH = 1e-13  # shortest branch between two reversals, relative to phi_max
 
 
 class Branch(NamedTuple):
-    """Current branch: number of reversals, ratio of the scales of first loading and of the branch, force at its start [N],
-    displacement [m] from its origin on the curve of first loading, and from the origin of the interface."""
+    """Current branch of a hysteresis loop, which is the curve of first loading enlarged by 1/ratio (Masing's rule).
+
+    - count: number of reversal points that the law remembers.
+    - ratio: 1 on first loading, 1/2 on a branch that starts at a reversal.
+    - start_force: force at the start of the branch [N].
+    - x: displacement on the curve of first loading [m]: `ratio` times the displacement since the start of the branch.
+    - q: displacement from the origin of the interface [m].
+    """
 
     count: int
     ratio: float

@@ -16,13 +16,13 @@ from . import lumped, one_by_one
 from .case_results import CaseResults
 
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
-MIN_CASES = 32
+MIN_CASES_TO_GROUP = 32
 MIN_CHUNK_CASES = 256
 
 
 def find_group(model: Model, n_study_cases: int) -> Hashable | None:
     """Return the key of the models that are computed together with a model; None if it is computed by a single run."""
-    if n_study_cases < MIN_CASES or model.kind != "rig":
+    if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
         return None if lumped.refusal_reason(model) else lumped.group_key(model)
@@ -98,7 +98,20 @@ def _solve_group(
     solve_one_by_one: Callable[[Sequence[Model]], CaseResults],
     report: Callable | None,
 ) -> CaseResults:
-    """Compute the results of a group together, or by single runs if it is None or if this fails."""
+    """Compute the results of a group of cases together, or by single runs.
+
+    Parameters
+    ----------
+    group : hashable or None
+        What the cases have in common; None for cases that must be run one by one.
+    models : sequence of Model
+        Models of the cases.
+    solve_one_by_one : callable
+        Function that takes models and returns their results by single runs. It is also used if the common computation
+        fails.
+    report : callable or None
+        Function that reports the progress.
+    """
     faults = []
     if group is not None:
         try:

@@ -77,7 +77,7 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
-RIGID_SECANT = "secant_stiffness"
+SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
 class Scales(NamedTuple):
@@ -327,7 +327,19 @@ def _insert(record, rows, part):
 def make_results(
     models: Sequence[Model], cases: Cases, scales: Scales, refined: Refined
 ) -> CaseResults:
-    """Return the measures, errors, outcomes and reasons that single runs have."""
+    """Return the measures of n cases as their single runs would have them, with errors, outcomes and reasons.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        Models of the cases.
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases with as many steps as their tolerances need.
+    """
     values, errors = dict(refined.march.values), dict(refined.errors)
     results = CaseResults.blank(len(scales.tolerance))
     window = int(cases.parameters[0, Number.WINDOW])
@@ -368,7 +380,7 @@ def make_results(
         sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
         moves = values[AMPLITUDE] > 0
         _put_reason(
-            results, RIGID_SECANT, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
+            results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
         )
 
     # Measures that a case lacks get the reasons that a single run states.
@@ -407,7 +419,22 @@ def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
 
 
 def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
-    """Return the indices of CLASSES (n,), and the steady amplitudes with errors (n,) [m]."""
+    """Classify the motions of n cases by their outcome, and estimate their steady amplitudes.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Magnitudes of the motions, with the decay rates of the modes `decay` (n,) [1/s].
+    refined : Refined
+        March of the cases, with the smallest and largest output `extremes` (n, cycles, 2) [m] of each cycle.
+
+    Returns
+    -------
+    tuple
+        Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each, in this order.
+    """
     march, values = refined.march, refined.march.values
     omega = cases.parameters[:, Number.OMEGA]
     cycles = march.extremes.shape[1]
@@ -431,7 +458,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
             ),
         )
 
-    # A periodic motion about a moving mean is transient, which is class 0.
+    # A periodic motion about a moving mean is transient.
     drifts = is_drifting(
         values["drift_per_cycle"],
         refined.errors["drift_per_cycle"],
@@ -440,13 +467,25 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
         error_floor("drift_per_cycle", scales.displacement),
     )
     is_steady = classes == CLASSES.index(Outcome.STEADY)
-    return np.where(is_steady & drifts, 0, classes), *steady
+    return np.where(is_steady & drifts, CLASSES.index(Outcome.TRANSIENT), classes), *steady
 
 
 def needs_single_run(
     cases: Cases, scales: Scales, refined: Refined, results: CaseResults
 ) -> np.ndarray:
-    """Return a mask (n,) of the cases that only a single run can compute."""
+    """Return a mask (n,) of the cases that only a single run can compute.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases with as many steps as their tolerances need.
+    results : CaseResults
+        Results of the march.
+    """
     march = refined.march
     values = march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))

@@ -19,7 +19,10 @@ def _import_averaged_law():
 
 
 def average_behind(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
-    """Return the pressure (m,) [Pa] that the law averages behind the nodes of the upper piece.
+    """Return the averaged pressure (m,) [Pa] at the nodes of the upper piece.
+
+    The law averages the pressure over the part of the surface that the node has just passed, that is, behind it in the
+    direction of the motion.
 
     Parameters
     ----------

@@ -171,7 +171,21 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
 def _compute_loop_measures(
     model, time, slide, histories: SlideHistories, cycle_start: int, omega: float
 ) -> Values:
-    """Compute the measures of the friction loop in the last cycle, which starts at sample `cycle_start`."""
+    """Compute the measures of the friction loop in the last cycle.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    time, slide : (k,) array
+        Times [s] and relative displacements [m] of all samples.
+    histories : SlideHistories
+        Friction force and energies at the samples.
+    cycle_start : int
+        Index of the sample at which the last cycle starts.
+    omega : float
+        Circular frequency of the cycle [rad/s].
+    """
     time = time[cycle_start:]
     slide = slide[cycle_start:]
     force = histories.force[cycle_start:]

@@ -21,7 +21,7 @@ MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 
 
-# Methods of computing the friction force with a meaning beyond their names in summaries and plans.
+# Names of two methods of computing the friction force. Summaries and plans print them, and the code compares with them.
 CLOSED_FORM = "closed form"
 PARALLEL_ELEMENTS = "parallel elements"
 
@@ -215,7 +215,7 @@ class BenchSizes(NamedTuple):
     """Sizes of a bench run.
 
     - engine: name of the engine.
-    - unknowns: entries of a list of bonds, by name.
+    - unknowns: {"bond_list_about": expected number of strips of a list of bonds}; {} without a list.
     - samples: number of samples that the run and its comparison runs keep.
     """
 

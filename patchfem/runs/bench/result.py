@@ -130,7 +130,19 @@ def _compute_loop_closing_error(fine) -> float:
 
 
 def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
-    """Return a list with a warning if the last friction loop is not closed, and its area is not that of a longer run."""
+    """Return a list with a warning if the last friction loop is not closed, and its area is not that of a longer run.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    patch : Patch or None
+        Solved patch.
+    fine : BenchRun
+        The run.
+    steps : int
+        Steps per cycle of the longer run.
+    """
     tolerance = model.accuracy.tolerance
     slide = model.slide
     if slide.period is None or slide.cycles < 1 or not fine.values.get("loop_area"):

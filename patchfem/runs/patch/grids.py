@@ -35,8 +35,8 @@ CELL_GROWTH = {
 }  # Growth of the cell length with distance on the coarsest grid [1].
 # Ratio of the contact length to the cell length at the contact edges, on the coarsest grid.
 EDGE_CELLS = {True: 20, False: 10}
-# Smallest ratio of cell length to interface length on the coarsest grid: some tens of picometres,
-# near round-off.
+# Smallest ratio of cell length to interface length on the coarsest grid. For an interface of 10 mm this is a cell of 40 pm,
+# whose length, a difference of coordinates, still has about 7 digits.
 MIN_CELL_RATIO = 4e-9
 # Ratio of the cell length at a contact edge to that at a step of the gap.
 STEP_CELL_FACTOR = 8

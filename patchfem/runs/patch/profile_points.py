@@ -301,9 +301,18 @@ def _row_depths(piece, layout: Layout) -> tuple[np.ndarray, int]:
 
 
 def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
-    """Solve the contact problem of a patch on a given number of equally spaced points.
+    """Solve the contact problem of a patch on equally spaced points.
 
-    start: forces (n,) [N] on the level with half as many points, or None.
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Pieces and loading.
+    ends : FreeEnds
+        Correction of the compliance for the free ends of the pieces.
+    count : int
+        Number of points.
+    start : (count/2,) array, optional
+        Forces [N] on the level with half as many points, from which the solution starts.
     """
     length = patch_model.pieces.length
     normal, shear = make_point_compliances(patch_model, ends, count)
@@ -398,7 +407,19 @@ def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) 
 
 
 def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
-    """Solve for the nodal forces of a refinement level under the prescribed load or approach."""
+    """Solve for the nodal forces of a refinement level under the prescribed load or approach.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Pieces and loading.
+    normal : PointCompliance
+        Normal compliance of the n points of the level.
+    gap : (n,) array
+        Gap of the unloaded pieces [m].
+    start : (n/2,) array or None
+        Forces [N] on the level with half as many points.
+    """
     x = normal.x
     loading = patch_model.loading
     initial_force = None if start is None else np.repeat(start, 2) / 2

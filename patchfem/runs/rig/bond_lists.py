@@ -174,7 +174,20 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters) -> bool:
 
 
 def estimate_bond_list_length(model: Model, numerics: Numerics) -> int:
-    """Return the expected number of strips of a bond list; a list that grows in every step contains all strips."""
+    """Return the expected number of strips of a bond list at the end of a run.
+
+    Parameters
+    ----------
+    model : Model
+        Model with bonds.
+    numerics : Numerics
+        Cycles and steps per cycle of the run.
+
+    Returns
+    -------
+    int
+        As many as there are steps if every step adds a strip that is neither joined nor dropped.
+    """
     steps = numerics.cycles * numerics.steps
     if is_stuck_by_printed_law(model) and not model.partial_slip:
         return int(steps)

@@ -154,6 +154,17 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
     - another number of shear modes, if the load varies, the slide goes over grooves, or a law with bonds
       acts at the nodes of a patch;
     - other settings of a bond summation.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    numerics : Numerics
+        Settings of the run.
+    patch, coarse : Patch or None
+        Solved patch, and the patch on a coarser mesh.
+    solution : Solution
+        Results of the run.
     """
     quarter = _divide_steps(numerics, 4)
     varies = model.rig.friction.load_varies
@@ -179,7 +190,18 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
 
     The first entry is the error bound of the sum on forces and energies. If bonds are merged or a
     large tail is neglected, the second entry is the change of the motion with narrower strips and a
-    smaller tail. Its runs have the settings `quarter`, i.e. a quarter of the steps.
+    smaller tail.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    quarter : Numerics
+        Settings of these runs, with a quarter of the steps of the run.
+    patch : Patch or None
+        Solved patch.
+    solution : Solution
+        Results of the run.
     """
     choice = solution.bond_summation
     if choice is None or not choice.error:
@@ -243,6 +265,17 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     The mesh matters only for patches that slip part by part, for the loads of strips, and for the slip force of an
     averaged law. The measures of independent strips also have the error of the trapezoidal rule with 400 samples per
     cycle.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    numerics : Numerics
+        Settings of the run.
+    patch, coarse : Patch or None
+        Solved patch, and the patch on a coarser mesh.
+    solution : Solution
+        Results of the run.
     """
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     strips_slide_apart = model.rig.friction.strips_slide_apart

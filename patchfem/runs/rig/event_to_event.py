@@ -164,7 +164,21 @@ def run_from_event_to_event(
     rig = model.rig
 
     def integrate(drive, before, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
+        """Integrate the motion under a drive.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        before
+            Run from whose end the motion goes on; None for the start of the rig.
+        watch : callable or None
+            Function that takes the completed fraction.
+        is_last : bool
+            Whether this is the last of several runs, whose frames are kept.
+        cycles : float
+            Number of cycles of the drive.
+        """
         state = None if before is None else before.end
         run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
 
@@ -234,7 +248,21 @@ class LumpedEvaluator(RunEvaluator):
         return describe_escape(self.model.rig, travel)
 
     def _run(self, drive, cycles: float, times, travel: float, state: State | None):
-        """Return the `hybrid.runs.Motion` of a drive."""
+        """Return the `hybrid.runs.Motion` of a drive.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        times : (k,) array
+            Times of the samples [s].
+        travel : float
+            Largest magnitude of the output [m], at which the run ends.
+        state : State or None
+            State at the start; None for the start of the rig.
+        """
         numerics = self.numerics
         schedule = cases.Schedule(cycles, numerics.window, np.unique(times), travel)
         case = cases.make_rig_case(

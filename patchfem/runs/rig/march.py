@@ -60,7 +60,21 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     travel = find_travel(rig)
 
     def integrate(drive, before, watch, is_last, cycles=numerics.cycles):
-        """Integrate under a drive from the end of another run, None for the start of the rig."""
+        """Integrate the motion under a drive.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        before
+            Run from whose end the motion goes on; None for the start of the rig.
+        watch : callable or None
+            Function that takes the completed fraction.
+        is_last : bool
+            Whether this is the last of several runs, whose frames are kept.
+        cycles : float
+            Number of cycles of the drive.
+        """
         run = engine.march(
             rig.modes,
             drive,

@@ -119,7 +119,7 @@ def compute_dimensionless_groups(model: Model) -> Values:
     """Return a dict of the dimensionless groups of the motion of a rig.
 
     - D: ratio of the static friction limit to the largest force of the drive, both as they act on
-      the first mode, D of (2.3) at resonance.
+      the first mode; at resonance it is D of eq. 2.3 of Srinivasan, Cassenti and Cutts (1985).
     - D_kinetic: the same ratio with the kinetic limit, if it differs.
     - knee [m s-2], or knee_force [N] for a drive by force: largest drive at which friction alone
       bounds the motion of a sliding block at resonance.
@@ -133,7 +133,7 @@ def compute_dimensionless_groups(model: Model) -> Values:
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
 
-    # D of (2.3): both forces as they act on the first mode.
+    # D of eq. 2.3: both forces as they act on the first mode.
     drive_force = drive.force or rig.first_mode.mass * find_max_acceleration(drive.signal)
     participation = _find_participation_ratio(rig)
     if drive_force > 0:
@@ -241,7 +241,7 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
 def _describe_sliding(friction_ratio: float) -> str:
     """Describe whether friction bounds the resonance of a block that slips.
 
-    `friction_ratio` is D of equation (2.3), below 1.
+    `friction_ratio` is D of eq. 2.3 (`compute_dimensionless_groups`), below 1.
     """
     if friction_ratio > pi / 4:
         return f"D = {friction_ratio:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"

@@ -180,6 +180,13 @@ def first_mode_stiffness(model, window) -> float:
     """Return the stiffness [N/m] of the first mode, referred to the displacement at the contact.
 
     It is 0 if other modes contribute more than MAX_OTHER_MODES_FRACTION of this displacement.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    window : Response
+        Samples of the last cycles.
     """
     first_mode = model.rig.first_mode
     if first_mode.fraction_of_other_modes(window.modal) > MAX_OTHER_MODES_FRACTION:

@@ -101,7 +101,21 @@ class Runner:
         return self._solve(model, replace(numerics, whole=needs_whole), patch)
 
     def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
-        """Solve a rig, and count its CPU time and steps."""
+        """Solve a rig, and count its CPU time and steps.
+
+        Parameters
+        ----------
+        model : Model
+            Model of the rig.
+        numerics : Numerics
+            Cycles, steps and other settings of the run.
+        patch : Patch or None
+            Solved patch.
+        frames : int
+            Number of frames of the fields in the last cycle.
+        say : callable, optional
+            Function that takes a line of text on the progress.
+        """
         begin = process_time()
         report = self._make_callback(numerics.steps)
         solution = solve_rig(model, numerics, patch, frames, say, report)

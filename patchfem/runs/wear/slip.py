@@ -193,7 +193,17 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
 
 
 def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
-    """Compute the slip path of the interface nodes in the last cycle of a bench."""
+    """Compute the slip path of the interface nodes in the last cycle of a bench.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench.
+    patch : Patch
+        Solved patch.
+    frames : int
+        Number of frames per cycle, if the nodes do not slip alike.
+    """
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
     n_frames = 0 if is_uniform else frames * cycles
@@ -225,7 +235,17 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
 
 
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
-    """Compute the slip path of the interface nodes in the last cycle of a rig."""
+    """Compute the slip path of the interface nodes in the last cycle of a rig.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig.
+    patch : Patch
+        Solved patch.
+    frames : int
+        Number of frames in the last cycle, if the nodes do not slip alike.
+    """
     settings = numerics.choose_numerics(model)
     is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
     solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)

@@ -209,7 +209,7 @@ def describe_error(key: Key, error: ErrorDetails, value: TomlValue, path: str) -
     if error["type"] == "missing" and isinstance(value, list) and value:
         return f"{needed}, not {len(value)} value{'s' if len(value) > 1 else ''}"
 
-    # Values that no limit describes.
+    # Texts that are empty, and values that the validator of a table refuses with its own sentence.
     if error["type"] == "string_too_short":
         return "must not be an empty text"
     if error["type"] == "value_error":

@@ -116,7 +116,17 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
 
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
-    """Return the depths at all points, if the place was fitted to a part of them."""
+    """Return the depths at all points, if the place was fitted to a part of them.
+
+    Parameters
+    ----------
+    aligned : Aligned
+        Fitted place and datum.
+    first, second : Raster
+        Both surfaces.
+    digit : float
+        Standard deviation [m] due to the printed digits of the heights.
+    """
     fit = aligned.fit
     model = aligned.model
     if model.own.z.shape == order(first, second)[0].z.shape:
@@ -164,7 +174,19 @@ def _estimate_chance(first, second, noise: float) -> float:
 
 
 def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
-    """Fit datums with more and more terms, and return the last one that explains the depths better."""
+    """Fit datums with more and more terms, and return the last one that explains the depths better.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the depths.
+    state : (k,) array
+        Parameters of the model at the start.
+    digit : float
+        Standard deviation [m] due to the printed digits of the heights.
+    is_straight : bool
+        Whether only the datum with the fewest terms is fitted.
+    """
     best = None
     for n_terms in N_TERMS[model.n_axes]:
         if best is not None and is_straight:

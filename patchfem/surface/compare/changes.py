@@ -80,7 +80,13 @@ def find_changed(depth, noise) -> np.ndarray:
 
 
 class Boxes(NamedTuple):
-    """Spans (k, 2) of parts, and unit boxes (k, N_PARTS) over them, free of the datum."""
+    """Box functions over spans of the N_PARTS parts of a trace, from which a polynomial datum is subtracted.
+
+    - spans (k, 2): first part of each span, and the first one beyond it.
+    - shapes (k, N_PARTS): boxes over the spans without the datum, divided by their norms.
+    - sizes (k,): these norms.
+    - datum (N_PARTS, j): orthonormal polynomials of the datum.
+    """
 
     spans: np.ndarray
     shapes: np.ndarray

@@ -52,7 +52,13 @@ MIN_TOPS_FRACTION = 0.6
 
 
 class Names(NamedTuple):
-    """Names of the quantities of traces or scans; wear: those that need wear, place: those that need a common place."""
+    """Names of the quantities of a comparison of traces, or of scans.
+
+    - lost, grown: lost and grown material.
+    - region: size of the part that both surfaces show.
+    - wear: quantities that have a value only if there is wear.
+    - place: quantities that have a value only if a common place is found.
+    """
 
     lost: str
     grown: str
@@ -195,7 +201,7 @@ def _measure(
     names = NAMES[rasters[0].z.ndim]
     if not aligned.reason:
         depths = make_depths(aligned.model, aligned.fit, aligned.gain_error)
-        placement = _describe_place(aligned)
+        placement = _make_placement(aligned)
         hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     else:
         depths = find_flanked_track(*rasters) if is_trace else None
@@ -275,8 +281,8 @@ def _find_detection_limit(depths: DepthMap) -> float:
     return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
 
 
-def _describe_place(aligned: Aligned) -> Placement:
-    """Return shift, turn and gain with the errors that follow from the unworn heights."""
+def _make_placement(aligned: Aligned) -> Placement:
+    """Return shift, rotation and gain of the second surface, with the errors that follow from the unworn heights."""
     state = aligned.fit.state
     errors = aligned.fit.errors
     placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))

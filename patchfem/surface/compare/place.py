@@ -25,9 +25,12 @@ CLEAR_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
-    """Place of the second surface: shift (d,) [m] and turn of the map from own to other points (`model`).
+    """Place of one surface on the other: the map from own to other points (`model`) in d dimensions.
 
-    mirrored: whether the second surface was measured against the direction of x. significance: of the correlation.
+    - shift (d,): shift of the map [m].
+    - turn: stretch of traces [1], or rotation of scans [rad].
+    - mirrored: whether the second surface was measured against the direction of x.
+    - significance: significance of the correlation of both surfaces at this place.
     """
 
     shift: np.ndarray

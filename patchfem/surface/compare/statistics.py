@@ -16,7 +16,9 @@ FALSE_POSITIVE_RATE = 1e-3
 TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
 WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
-MIN_NEIGHBOURS = 0.2  # smallest fraction of neighbours that tell the level beside a height
+MIN_NEIGHBOUR_FRACTION = (
+    0.2  # smallest weight of the neighbours in the mask that determines the level beside a height
+)
 MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
 
 
@@ -121,7 +123,7 @@ def subtract_local_level(values, mask) -> np.ndarray:
     deviations = np.array(values.shape) / WAVES_PER_SIDE
     weight = smooth(mask.astype(float), deviations)
     level = smooth(np.where(mask, values, 0.0), deviations) / np.maximum(weight, TINY)
-    return np.where(weight > MIN_NEIGHBOURS, values - level, np.nan)
+    return np.where(weight > MIN_NEIGHBOUR_FRACTION, values - level, np.nan)
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:

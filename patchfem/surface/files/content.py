@@ -30,8 +30,10 @@ DAMAGED = "the file is cut off or damaged; save or export it anew"
 class Content(NamedTuple):
     """Content of a surface file after unpacking.
 
-    path: name for messages; kind: "text", "npy", "mat" or "instrument"; data: bytes; is_packed: whether the file itself
-    has other bytes.
+    - path: name for messages.
+    - kind: "text", "npy", "mat" or "instrument".
+    - data: unpacked bytes.
+    - is_packed: whether the file itself has other bytes, because it is packed.
     """
 
     path: Path

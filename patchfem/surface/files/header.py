@@ -43,9 +43,10 @@ class Column(NamedTuple):
 class Header(NamedTuple):
     """What stands above the numbers of a text file.
 
-    columns: those that a line names, [] without one; facts: what is said of a matrix or of points, such as {"width":
-    "4 um"}; count: numbers in the first row, or columns that a line names with their units; number: of the line of
-    names, or of the first row.
+    - columns: columns that a line names; [] without such a line.
+    - facts: what is said of a matrix or of points, such as {"width": "4 um"}.
+    - count: number of values in the first row, or of columns that a line names with their units.
+    - number: number of the line of names, or of the first row.
     """
 
     columns: list[Column]

@@ -38,11 +38,16 @@ MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered p
 class Table(NamedTuple):
     """Numbers of a file in its own units.
 
-    columns: "x" and "z" (n,) of a trace, with "y" (n,) of the points of a scan, or "z" (m, n) of a matrix with
-    "x" (n,) and "y" (m,); NaN: missing height. units: of each column, none where the file states none. place: file,
-    with the line that names the columns if there is one. lines: of each sample in the file. notes: sentences on the
-    file. are_units_fixed: whether the format defines or always states its units. remedy: how the file would state its
-    units. length: of the scan [m], if the header gives it.
+    - path: file, for messages.
+    - columns: "x" and "z" (n,) of a trace, with "y" (n,) of the points of a scan; or "z" (m, n) of a matrix, with "x" (n,)
+      and "y" (m,). A missing height is NaN.
+    - units: unit of each column; None where the file states none.
+    - place: file, with the line that names the columns if there is one.
+    - lines: line of the file of each sample; None if the file has no lines.
+    - notes: sentences on the file.
+    - are_units_fixed: whether the format defines or always states its units.
+    - remedy: how the file would state its units.
+    - length: length of the scan [m], if the header gives it.
     """
 
     path: object

@@ -77,7 +77,24 @@ def _decode(content: Content) -> str:
 def _find_roles(
     place: str, header: Header, *, has_units: bool
 ) -> tuple[list[Column], tuple[str, ...]]:
-    """Return the columns with their roles, by order if units are given and names are unknown, and a note on that."""
+    """Find which columns of a text file are x, y and z.
+
+    Parameters
+    ----------
+    place : str
+        File and line, for messages.
+    header : Header
+        What stands above the numbers.
+    has_units : bool
+        Whether the user states the units; then columns of unknown names have their roles in their order.
+
+    Returns
+    -------
+    columns : list of Column
+        The columns with their roles.
+    notes : tuple of str
+        A note if the roles follow from the order.
+    """
     names = {2: "xz", 3: "xyz"}.get(header.count, "z")
     columns = header.columns or [Column(role) for role in names]
     data = [column for column in columns if column.role != "index"]
@@ -112,7 +129,17 @@ def _find_roles(
 
 
 def _make_matrix(path, facts: dict[str, str], z) -> Table:
-    """Return the table of a matrix of heights (m, n), with the size and the units that its header states."""
+    """Return the table of a matrix of heights, with the size and the units that its header states.
+
+    Parameters
+    ----------
+    path : Path
+        File, for messages.
+    facts : dict of str to str
+        What the header states, such as {"width": "4 um"}.
+    z : (m, n) array
+        Heights in the unit of the file.
+    """
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])

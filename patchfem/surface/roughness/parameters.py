@@ -62,10 +62,22 @@ def compute_moments(z) -> dict[str, float | None]:
 
 
 def _compute_element_length(z, step: float, rough: float, section: float) -> float | None:
-    """Compute Sm from hills and dales that are high and wide enough, relative to Rz and the section [m].
+    """Compute Sm, the mean length of the profile elements [m]; None if there are not enough elements.
 
     An element reaches from a rise through the mean line to the next rise, or from a fall to the next
-    fall. Neighbours of one sign, between which others are left out, are one hill or dale.
+    fall. Hills and dales that are too low or too narrow are left out, and neighbours of one sign between which
+    others are left out are one hill or dale.
+
+    Parameters
+    ----------
+    z : (n,) array
+        Heights above the mean line [m].
+    step : float
+        Sampling interval [m].
+    rough : float
+        Rz [m], of which a hill or dale must have the fraction MIN_HEIGHT_FRACTION.
+    section : float
+        Length of a section [m], of which a hill or dale must have the fraction MIN_WIDTH_FRACTION.
     """
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing

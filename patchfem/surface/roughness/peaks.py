@@ -59,9 +59,9 @@ class Peaks(NamedTuple):
 class TraceMoments(NamedTuple):
     """Spectral moments of a trace, with notes on their reliability.
 
-    fine: from all samples;
-    not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
-    were left out or that look like dust.
+    - fine: moments from all samples.
+    - not_gaussian: a clause if the heights are not Gaussian, else "".
+    - dust: clauses on heights that were left out or that look like dust.
     """
 
     fine: Moments

@@ -44,9 +44,10 @@ class Sampling(NamedTuple):
 class Treatment(NamedTuple):
     """Form removal, filters and window that were applied to a surface.
 
-    form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
-    waviness and roughness, for a scan the nesting index of the L-filter; window: first and last
-    position, for a scan in x and then in y; all in m.
+    - form: name of the least-squares form.
+    - short: nesting index of the S-filter [m].
+    - cutoff: cut-off between waviness and roughness [m]; for a scan, the nesting index of the L-filter.
+    - window: first and last position [m], for a scan in x and then in y.
     """
 
     form: str
@@ -68,9 +69,13 @@ class TraceParts(NamedTuple):
 class RoughnessReport:
     """Roughness parameters of one measured surface.
 
-    values: Quantity of each parameter, with its name, and the code of the reason where it has no
-    value; notes: sentences about the file and its treatment; surface: what the parameters are read
-    from; heights: those of the Abbott curve (n,) [m].
+    - source: name of the surface.
+    - sampling: positions at which the heights were measured.
+    - treatment: form removal, filters and window.
+    - values: Quantity of each parameter, with its name, and the code of the reason where it has no value.
+    - notes: sentences about the file and its treatment.
+    - surface: the surface from which the parameters are computed.
+    - heights: heights of the Abbott curve (n,) [m].
     """
 
     source: str

@@ -153,7 +153,21 @@ class ShootingFinder:
         )
 
     def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
-        """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point."""
+        """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point.
+
+        Parameters
+        ----------
+        values : dict
+            Values of the measures by name.
+        motion
+            Periodic motion that was found, with its fixed point.
+        run : LumpedRun
+            Run from which the values follow.
+        drive
+            Drive of the run.
+        is_stuck : bool
+            Whether the interface sticks all the time.
+        """
         coarse = replace(
             self.numerics,
             local=hybrid_runs.COARSE * RTOL,
