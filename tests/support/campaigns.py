@@ -25,7 +25,6 @@ KINDS = {  # Name on the command line -> module and function.
     "shear-rigs": ("shear_scenes", "compare_rig"),
     "shear-chains": ("shear_scenes", "compare_chain"),
     "made-fits": ("made_fits", "compare_fit"),
-    "trace-pairs": ("surface_pairs", "compare_traces"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60
