@@ -21,9 +21,6 @@ from typing import NamedTuple
 import numpy as np
 
 KINDS = {  # Name on the command line -> module and function.
-    "shear-joints": ("shear_scenes", "compare_joint"),
-    "shear-rigs": ("shear_scenes", "compare_rig"),
-    "shear-chains": ("shear_scenes", "compare_chain"),
     "made-fits": ("made_fits", "compare_fit"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
