@@ -35,8 +35,9 @@ def test_always_errors_of_random_scene_cover_fine_results(name):
     Errors from a single coarser mesh were up to 22 times too small.
     """
     text, keys, tolerance = SCENES[name].values()
-    measures = pf.run(text, **keys, **{"accuracy.max_seconds": 1e-3}).measures
-    fine = pf.run(text, **keys, **{"accuracy.tolerance": tolerance}).measures
+    keys = keys | {"accuracy.max_seconds": 1e-3}
+    measures = pf.run(text, **keys).measures
+    fine = pf.run(text, **keys | {"accuracy.tolerance": tolerance}).measures
     truths = {one: fine[one].value for one in NAMES if one in fine and fine[one].value is not None}
     rows = measure_rows(measures, truths, {})
     assert len(rows) >= 7 and all(row.holds for row in rows), rows
