@@ -5,9 +5,10 @@ import re
 
 import pytest
 from command_line import run_cli
-from surface_pairs import draw_pair, write_traces
+from traces import write_traces
 
 UM = 1e-6
+SHIFT, DEPTH = -18.0326681977835 * UM, 4.10145533624890 * UM  # shift and largest depth of the pair
 NAMES = (
     "shift",
     "worn_depth_max",
@@ -19,22 +20,21 @@ NAMES = (
 
 
 @pytest.fixture(scope="module")
-def trace_pair(tmp_path_factory) -> tuple:
-    """Return the paths of a trace before and after wear, and the pair."""
-    pair = draw_pair("groove", 30077)
-    return *write_traces(pair, tmp_path_factory.mktemp("traces"), "before", "after"), pair
+def trace_pair(tmp_path_factory) -> list:
+    """Return the paths of a trace before and after wear."""
+    return write_traces("groove", 30077, tmp_path_factory.mktemp("traces"), ("before", "after"))
 
 
 @pytest.fixture(scope="module")
 def comparison(trace_pair, tmp_path_factory) -> tuple:
     """Return the answer and the folder of a comparison of both traces along y."""
     out = tmp_path_factory.mktemp("compared") / "out"
-    return run_cli("compare", *trace_pair[:2], "--direction", "y", "-o", out), out
+    return run_cli("compare", *trace_pair, "--direction", "y", "-o", out), out
 
 
-def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
+def test_exact_compare_reports_shift_and_worn_depth(comparison):
     """The command finds the shift within 0.1 um and the worn depth within 0.1 um, with intervals, units and a report."""
-    p, (answer, out) = trace_pair[2], comparison
+    answer, out = comparison
     assert answer.code == 0
     assert re.match(
         r"Worn depth \S+ um \(\S+ to \S+\), the mean of the lost material over the common length.",
@@ -49,8 +49,8 @@ def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
             assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
     assert found["worn_depth_mean"]["over"] == "common length"
     assert [found[name]["unit"] for name in NAMES] == ["m", "m", "m", "m2", "1", "1"]
-    assert found["shift"]["value"] == pytest.approx(-p.shift, abs=0.1 * UM)
-    assert found["worn_depth_max"]["value"] == pytest.approx(p.worn.max(), abs=0.1 * UM)
+    assert found["shift"]["value"] == pytest.approx(-SHIFT, abs=0.1 * UM)
+    assert found["worn_depth_max"]["value"] == pytest.approx(DEPTH, abs=0.1 * UM)
     page = (out / "report.html").read_text()
     assert page.index("the mean of the lost material over the common length.") < page.index(
         "<figure"
@@ -60,6 +60,5 @@ def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
 
 def test_exact_given_shift_is_used(trace_pair):
     """A given shift in um is used: beyond the traces it gives no common place."""
-    shift = -trace_pair[2].shift
-    words = ("compare", *trace_pair[:2], "--shift", f"{shift / UM + 10_000:.1f} um", "--json")
+    words = ("compare", *trace_pair, "--shift", f"{10_000 - SHIFT / UM:.1f} um", "--json")
     assert json.loads(run_cli(*words).out)["reference"] != "place"

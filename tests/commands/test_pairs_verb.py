@@ -5,7 +5,7 @@ import json
 
 import pytest
 from command_line import run_cli
-from surface_pairs import draw_pair, write_traces
+from traces import write_traces
 
 import patchfem as pf
 from patchfem.campaigns import read_pairs
@@ -18,7 +18,7 @@ def pairs_table(tmp_path_factory):
     """Return a table of three pairs with a wear track; the last pair has no file after wear."""
     place = tmp_path_factory.mktemp("pairs")
     for k in range(2):
-        write_traces(draw_pair("groove", 7100 + k), place, f"before{k}", f"after{k}")
+        write_traces("groove", 7100 + k, place, (f"before{k}", f"after{k}"))
     path = place / "pairs.csv"
     path.write_text(
         "specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"

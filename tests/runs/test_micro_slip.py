@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from scene_texts import COATED, COULOMB, DRIVE, MODE, SHEAR
 
 import patchfem as pf
 from patchfem.scene import loads
@@ -87,3 +88,16 @@ def test_status_agrees_with_traction_and_slip():
     assert 0 < slips[1].sum() < slips.max(axis=0).sum() < loaded[0].sum()
     np.testing.assert_array_equal(slips, at_limit & loaded)
     np.testing.assert_array_equal(slips, (change > 1e-6 * change.max()) & loaded)
+
+
+def test_status_of_first_frame_in_rig_agrees_with_traction():
+    """The first frame of a motion after earlier cycles has no slip to compare with: a node slips whose traction is at the
+    limit."""
+    scene = COATED + '[contact.crown]\nradius = "1 m"\n' + SHEAR + COULOMB + MODE + DRIVE
+    fields = pf.run(scene, **{"drive.acceleration": "2 g", "accuracy.tolerance": 1e-2}).fields
+    traction, pressure, status = (
+        fields[name][1] for name in ("shear_stress", "normal_stress", "status")
+    )
+    at_limit = (np.abs(traction) > 0.3 * (1 - 1e-9) * pressure) & (pressure > 0)
+    np.testing.assert_array_equal(status == 2, at_limit)
+    assert 0 < at_limit.sum() < (pressure > 0).sum()

@@ -1,32 +1,45 @@
-"""Errors of random joints and rigs with partial slip cover results on much finer meshes and steps."""
+"""Errors of random joints, rigs and chains with partial slip cover results on much finer meshes and steps."""
+
+import json
+from pathlib import Path
 
 import pytest
-from shear_scenes import (
-    MOTION,
-    RIG_TOLERANCE,
-    compare_scene,
-    draw_chain,
-    draw_rig,
-)
+from campaigns import measure_rows
 
 import patchfem as pf
 from patchfem.scene import loads
 
-CHAIN_TOLERANCE = 1e-4  # of the reference of a chain: a hundredth of that of its scene
-
-
-# The chain takes minutes.
-@pytest.mark.share(0)
-@pytest.mark.parametrize(
-    "draw, tolerance", [(draw_rig, RIG_TOLERANCE), (draw_chain, CHAIN_TOLERANCE)]
+# Random scenes with the tolerance of their reference, drawn by the campaigns `shear-rigs`, `shear-joints` and `shear-chains`
+# (`support/shear_scenes.py` of version 1.11).
+SCENES = json.loads((Path(__file__).parent / "found/shear_scenes.json").read_text("utf-8"))
+NAMES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_force_peak",
+    "secant_stiffness",
+    "energy_stored",
+    "slip_amplitude",
+    "energy_dissipated",
+    "equivalent_stiffness",
+    "equivalent_damping",
 )
-def test_always_errors_of_random_rig_and_chain_cover_fine_results(draw, tolerance):
-    """The errors of a random rig and a chain with partial slip cover results on finer meshes and steps; none is repeated.
 
-    Errors from a single coarser mesh were up to 22 times too small; the campaign `shear-joints` has joints.
+
+# The joints take seconds and the chain minutes.
+@pytest.mark.share(0, 1)
+@pytest.mark.parametrize("name", SCENES)
+def test_always_errors_of_random_scene_cover_fine_results(name):
+    """The errors of a random scene with partial slip cover results on finer meshes and steps; none is repeated.
+
+    Errors from a single coarser mesh were up to 22 times too small.
     """
-    text, keys = draw(3000)
-    rows = compare_scene(text, keys | {"accuracy.max_seconds": 1e-3}, tolerance, MOTION)["rows"]
+    text, keys, tolerance = SCENES[name].values()
+    keys = keys | {"accuracy.max_seconds": 1e-3}
+    measures = pf.run(text, **keys).measures
+    fine = pf.run(text, **keys | {"accuracy.tolerance": tolerance}).measures
+    truths = {one: fine[one].value for one in NAMES if one in fine and fine[one].value is not None}
+    rows = measure_rows(measures, truths, {})
     assert len(rows) >= 7 and all(row.holds for row in rows), rows
 
 

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
-from torture import grammar, scenes
+from torture import scenes
 from torture.toml import to_toml
 from torture.trial import Trial
 
@@ -21,7 +21,7 @@ def test_always_changed_scene_is_refused_with_places_or_read_again():
     trial = Trial(np.random.default_rng(81))
     n_refused = 0
     for _ in range(COUNT):
-        tables = grammar.draw_scene(trial)
+        tables = scenes.draw_scene(trial)
         for _ in range(trial.draw(0, 1, 1, 1, 2)):
             scenes.mutate_scene(trial, tables)
         text = to_toml(tables).encode("utf-8", "replace").decode()

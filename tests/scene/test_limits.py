@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import islice, product
 from pathlib import Path
 
 import pytest
@@ -17,13 +16,11 @@ from scene_texts import (
 )
 
 from patchfem.scene import load, loads
-from patchfem.scene.scene import SceneError
 
 SHEAR = "contact.shear={}"
-COULOMB, PLASTIC = "friction.law=coulomb", "friction.law=elastic-plastic"
+PLASTIC = "friction.law=elastic-plastic"
 LOWER = "contact.tilt.on=lower"
 PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
-POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 REPORT = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report"]
 STEADY = "accuracy.method=harmonic"
 
@@ -142,33 +139,3 @@ STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 def test_exact_study_scenes_load_without_remarks(path):
     """Every scene of the studies loads without remarks."""
     assert load(path).remarks == []
-
-
-OPTIONS = [
-    ["", COULOMB, PLASTIC, "friction.law=convolution"], ["", "friction.reading=report"],
-    ["", "friction.order=0.5", "friction.order=-0.5"],
-    ["", SHEAR], ["", LOWER], ["", "contact.crown.radius=1 m"], ["", "friction.kinetic=0.2"],
-    ["", "accuracy.method=exact", "accuracy.method=march"],
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("each", [23, pytest.param(1, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("text", [RIG, PATCH_BENCH], ids=["rig", "bench"])
-def test_always_loaded_scene_can_be_planned(text, each):
-    """Every combination of options that passes the check of the scene can be planned.
-
-    A normal run takes one of 23, so that any two options meet.
-    """
-    from patchfem.runs.plan import plan
-
-    passed = 0
-    for sets in islice(product(*OPTIONS), 0, None, each):
-        chosen = [one for one in (*REPORT[:2], *sets) if one]
-        try:
-            scene = loads(text, sets=chosen)
-        except SceneError as error:
-            keys = [message.split(": ")[1] for message in error.mistakes]
-            assert len(set(keys)) == len(keys), error.mistakes
-        else:
-            passed += bool(plan(scene))
-    assert passed > 50 / each

@@ -21,11 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 KINDS = {  # Name on the command line -> module and function.
-    "shear-joints": ("shear_scenes", "compare_joint"),
-    "shear-rigs": ("shear_scenes", "compare_rig"),
-    "shear-chains": ("shear_scenes", "compare_chain"),
     "made-fits": ("made_fits", "compare_fit"),
-    "trace-pairs": ("surface_pairs", "compare_traces"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60

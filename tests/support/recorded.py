@@ -32,7 +32,7 @@ sys.path[:0] = [str(HERE), str(TESTS)] if __name__ == "__main__" else []
 
 import recorded_scenes  # noqa: E402
 import scene_texts  # noqa: E402
-from surface_pairs import KINDS, draw_pair, write_traces  # noqa: E402
+from traces import KINDS, write_traces  # noqa: E402
 
 from patchfem.scene import UNIT_FACTORS  # noqa: E402
 
@@ -154,7 +154,7 @@ def write_measurements(folder: Path) -> None:
 def write_surfaces(folder: Path) -> None:
     """Write a pair of traces of each kind, a table of two pairs, and a pair of scans."""
     for kind in KINDS:
-        write_traces(draw_pair(kind, 41003), folder, f"{kind}_before", f"{kind}_after")
+        write_traces(kind, 41003, folder, (f"{kind}_before", f"{kind}_after"))
     (folder / "pairs.csv").write_text(
         "before,after\ngroove_before.csv,groove_after.csv\ngroove_after.csv,groove_before.csv\n",
         "utf-8",

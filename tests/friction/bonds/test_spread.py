@@ -93,9 +93,3 @@ def test_refuses_spread_without_width_or_bonds():
                 sets=[*SPREAD, f"friction.law={law}", "friction.reference_speed=1 mm/s"],
             )
         assert len(caught.value.mistakes) == 1
-
-
-def test_exact_unused_width_is_reported():
-    """A width without spread gives a remark that it is not used."""
-    scene = loads(POINT + NONLOCAL_2UM + TRIANGLE, sets=["normal.width=1 mm"])
-    assert scene.remarks == ["normal.width has no meaning without friction.spread and is not used"]

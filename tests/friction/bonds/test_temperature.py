@@ -88,21 +88,3 @@ def test_refuses_scene_with_growth_rates_out_of_range():
         r"rest_growth would be about 1e-",
     ):
         plan(scene)
-
-
-@pytest.mark.parametrize(
-    "text, reason",
-    [
-        (GROWING, "activation temperatures"),
-        (
-            '[friction]\nlaw = "nonlocal"\nstatic = 0.6\nbond_length = "2 um"\n',
-            "growth of the bonds",
-        ),
-    ],
-)
-def test_exact_temperature_table_without_effect_is_reported(text, reason):
-    """A temperature table that has no effect gives a remark and is dropped."""
-    table = WARM if "growth" in reason else WARM.split("rest_act")[0]
-    scene = loads(POINT + text + table + CONSTANT_SPEED)
-    assert [r for r in scene.remarks if "friction.temperature has no effect" in r and reason in r]
-    assert scene.friction.temperature is None and loads(scene.resolved()).remarks == []
