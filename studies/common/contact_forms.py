@@ -110,37 +110,6 @@ def hertz_peak(line_load, radius, modulus):
     return 2 * line_load / (np.pi * hertz_half_width(line_load, radius, modulus))
 
 
-def hertz_pressure(x, line_load, radius, modulus):
-    """Return the pressure of the line contact of a crown (Hertz 1882).
-
-    It is p_0 sqrt(1 - x^2/a^2), and 0 outside the contact.
-
-    Parameters
-    ----------
-    x : array_like
-        Positions [m], from the middle.
-    line_load : float
-        Load P per width [N/m].
-    radius : float
-        Radius R of the crown [m].
-    modulus : float
-        Combined modulus E* [Pa] of `combined_modulus`.
-
-    Returns
-    -------
-    ndarray
-        Pressure [Pa].
-
-    Raises
-    ------
-    ValueError
-        If an argument is not positive.
-    """
-    half = hertz_half_width(line_load, radius, modulus)
-    square = np.maximum(1 - (np.asarray(x) / half) ** 2, 0)
-    return hertz_peak(line_load, radius, modulus) * np.sqrt(square)
-
-
 def rounded_punch_pressure(x, line_load, flat, radius, modulus):
     """Return the pressure under a flat punch with rounded edges, which is finite everywhere.
 
@@ -219,12 +188,6 @@ def westergaard_full_pressure(wavelength, amplitude, modulus):
     return np.pi * modulus * amplitude / wavelength
 
 
-def _find_load_fraction(mean, wavelength, amplitude, modulus):
-    """Return the mean pressure divided by that of full contact."""
-    require_positive(mean=mean)
-    return np.asarray(mean, float) / westergaard_full_pressure(wavelength, amplitude, modulus)
-
-
 def westergaard_half_width(mean, wavelength, amplitude, modulus):
     """Return the contact half width of each crest of a wavy gap.
 
@@ -249,77 +212,11 @@ def westergaard_half_width(mean, wavelength, amplitude, modulus):
     Raises
     ------
     ValueError
-        If an argument is not positive.
+        If the wavelength, the amplitude or the modulus is not positive.
     """
-    fraction = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
+    full = westergaard_full_pressure(wavelength, amplitude, modulus)
+    fraction = np.minimum(np.asarray(mean) / full, 1)
     return wavelength / np.pi * np.arcsin(np.sqrt(fraction))
-
-
-def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
-    """Return the pressure in a wavy gap with crests at whole wavelengths.
-
-    With s = sin(pi a/lambda): 2 p cos(pi x/lambda)/s^2 sqrt(s^2 - sin^2(pi x/lambda)), and 0 outside the contact. Above
-    full contact: p + p* cos(2 pi x/lambda).
-
-    Parameters
-    ----------
-    x : array_like
-        Positions [m], from the middle.
-    mean : float
-        Pressure p [Pa] averaged over a wavelength.
-    wavelength : float
-        Wavelength lambda [m].
-    amplitude : float
-        Amplitude A [m], half of valley to peak.
-    modulus : float
-        Combined modulus E* [Pa] of `combined_modulus`.
-
-    Returns
-    -------
-    ndarray
-        Pressure [Pa].
-
-    Raises
-    ------
-    ValueError
-        If an argument is not positive.
-    """
-    fraction = float(_find_load_fraction(mean, wavelength, amplitude, modulus))
-    angle = np.pi * np.asarray(x, float) / wavelength
-    if fraction >= 1:
-        return mean + mean / fraction * np.cos(2 * angle)
-    root = np.sqrt(np.maximum(fraction - np.sin(angle) ** 2, 0))
-    return 2 * mean / fraction * np.abs(np.cos(angle)) * root
-
-
-def westergaard_approach(mean, wavelength, amplitude, modulus):
-    """Return the approach of two wavy bodies: the mean gap that the mean pressure closes.
-
-    It is A f (1 - ln f) with f = p/p*, and A from full contact on.
-
-    Parameters
-    ----------
-    mean : array_like
-        Pressure p [Pa] averaged over a wavelength.
-    wavelength : float
-        Wavelength lambda [m].
-    amplitude : float
-        Amplitude A [m], half of valley to peak.
-    modulus : float
-        Combined modulus E* [Pa] of `combined_modulus`.
-
-    Returns
-    -------
-    ndarray
-        Approach [m].
-
-    Raises
-    ------
-    ValueError
-        If an argument is not positive.
-    """
-    fraction = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
-    return amplitude * fraction * (1 - np.log(fraction))
 
 
 def layered_compliance(k, coating, substrate, thickness):

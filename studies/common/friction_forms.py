@@ -95,10 +95,10 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
     return length * (ratio + (1 - ratio) * slow * slow)
 
 
-def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
-    """Return the friction after a first slide in one direction (eq. 2.17, constant bond length).
+def virgin_force(slide, length, order=1.0, initial=1.0):
+    """Return the friction/limit after a first slide in one direction (eq. 2.17, constant bond length).
 
-    limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
+    P(p + 1, x) + m_0 phi_p(x), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
     Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
 
     Parameters
@@ -111,8 +111,6 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
         p > -1.
     initial : float
         Fraction m_0 of bonds at the start.
-    limit : float
-        mu_s N [N].
     """
     require_positive(length=length)
     x = np.asarray(slide, float) / length
@@ -125,13 +123,13 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
         )
     with np.errstate(divide="ignore", invalid="ignore"):
         first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
-    return limit * (gammainc(order + 1, x) + first)
+    return gammainc(order + 1, x) + first
 
 
-def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
-    """Return the friction after a long slide and a slide back; it is positive in the first direction.
+def reversal_force(back, length, order=1.0, reading="stretch"):
+    """Return the friction/limit after a long slide and a slide back; it is positive in the first direction.
 
-    x = back/length; report: limit*(2 Q(p + 1, 2x) - 1), so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
+    x = back/length; report: 2 Q(p + 1, 2x) - 1, so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
     e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
     ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
 
@@ -143,8 +141,6 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
         Bond length [m].
     order : float
     reading : {"stretch", "report"}
-    limit : float
-        mu_s N [N].
     """
     require_positive(length=length)
     _reading(reading)
@@ -154,31 +150,29 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     if reading == "report":
         if order <= -1:
             raise ValueError(f"order must exceed -1, got {order}")
-        return limit * (2 * gammaincc(order + 1, 2 * x) - 1)
+        return 2 * gammaincc(order + 1, 2 * x) - 1
     if order < 0:
         raise ValueError(f"with reading 'stretch' order must not be negative, got {order}")
     if order == 1:
-        return limit * (2 * np.exp(-x) - 1)
+        return 2 * np.exp(-x) - 1
     old = x ** (order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
-    return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
+    return np.exp(-2 * x) - gammainc(order + 1, x) - old
 
 
-def stretch_loop(amplitude, length, limit=1.0):
-    """Return area [J] and end force [N] of the steady loop of the stretch reading (p = 1), which is Dahl's loop.
+def stretch_loop(amplitude, length):
+    """Return area/limit [m] and end force/limit of the steady loop of the stretch reading (p = 1), Dahl's loop.
 
-    The bond length is constant. With x = amplitude/length they are 4 limit (amplitude - length tanh x) and limit tanh x.
+    The bond length is constant. With x = amplitude/length they are 4 (amplitude - length tanh x) and tanh x.
     ValueError unless amplitude and length are positive.
 
     Parameters
     ----------
     amplitude, length : float
         [m]
-    limit : float
-        mu_s N [N].
     """
     require_positive(amplitude=amplitude, length=length)
     end = np.tanh(np.asarray(amplitude, float) / length)
-    return 4 * limit * (amplitude - length * end), limit * end
+    return 4 * (amplitude - length * end), end
 
 
 def dither_drift(low, high):

@@ -8,39 +8,30 @@ Method: constrained conjugate gradients of Polonsky and Keer (Wear 231, 1999, 20
 iteration, memory of a few arrays.
 """
 
-from dataclasses import dataclass
-from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, rfft
 
-from patchfem.core import NotConverged, PatchfemError, frozen_array
+from patchfem.core import NotConverged
 
+TOLERANCE = 1e-11  # gap on the contact at which the iteration ends, as `LIMIT`
 LIMIT = 1e-9  # largest relative residual that still counts as solved
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class PeriodicContact:
+class PeriodicContact(NamedTuple):
     """Solution of one period of a wavy contact.
 
-    pressure: (n,) [Pa], >= 0; gap: (n,) [m] after closing, >= 0; closing [m] of the mean planes; residuals: relative,
-    recomputed from the definition.
+    pressure: (n,) [Pa], >= 0; gap: (n,) [m] after closing, >= 0; closing [m] of the mean planes.
     """
 
     pressure: np.ndarray
     gap: np.ndarray
     closing: float
-    iterations: int
-    residuals: MappingProxyType
 
 
-def wave_numbers(points: int, length: float) -> np.ndarray:
-    """Return the wave numbers k (points//2 + 1,) [1/m], from 0, of a period `length` [m] with `points` equal intervals."""
-    return 2 * np.pi * np.arange(points // 2 + 1) / length
-
-
-def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> MappingProxyType:
-    """Return the relative residuals of a solution: load, tension, penetration and complementarity.
+def find_residual(compliance_k, gap, pressure, closing: float, mean: float) -> float:
+    """Return the largest relative residual of a solution: of load, tension, penetration and complementarity.
 
     Depths are measured in what the pressure itself moves, not in the height of the gap.
 
@@ -55,83 +46,40 @@ def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> Mappi
     mean : float
         Pressure of the load [Pa].
     """
-    sunk = np.fft.irfft(np.asarray(compliance_k) * np.fft.rfft(pressure), gap.size)
+    sunk = np.fft.irfft(compliance_k * np.fft.rfft(pressure), gap.size)
     opening = gap - closing + sunk
     depth = np.ptp(sunk) + mean * np.max(compliance_k[1:])
-    out = {
-        "load": abs(pressure.mean() - mean) / mean,
-        "tension": max(0.0, -pressure.min()) / mean,
-        "penetration": max(0.0, -opening.min()) / depth,
-        "complementarity": np.abs(pressure * opening).mean() / (mean * depth),
-    }
-    return MappingProxyType({key: float(value) for key, value in out.items()})
+    residuals = [
+        abs(pressure.mean() - mean) / mean,
+        -pressure.min() / mean,
+        -opening.min() / depth,
+        np.abs(pressure * opening).mean() / (mean * depth),
+    ]
+    return float(np.max(residuals))
 
 
-def _check_arguments(compliance_k, gap, length: float, load: float) -> tuple:
-    gap = np.asarray(gap, float)
-    compliance_k = np.asarray(compliance_k, float)
-    if gap.ndim != 1 or gap.size < 4 or not np.isfinite(gap).all():
-        raise PatchfemError("contact: the gap must be a row of at least 4 finite heights")
-    if compliance_k.shape != (gap.size // 2 + 1,):
-        raise PatchfemError(
-            f"contact: {gap.size} points have {gap.size // 2 + 1} waves, "
-            f"the compliance has {compliance_k.size}; see wave_numbers"
-        )
-    if not (
-        np.isfinite(compliance_k).all() and compliance_k[0] >= 0 and (compliance_k[1:] > 0).all()
-    ):
-        raise PatchfemError(
-            "contact: the compliance must be finite, positive for every wave and >= 0 for k = 0; "
-            "a half plane has none for k = 0: give 0 there"
-        )
-    if not (np.isfinite(load) and load > 0 and length > 0):
-        raise PatchfemError(
-            f"contact.load: load ({load:.6g} N/m) and length ({length:.6g} m) must be positive"
-        )
-    return compliance_k, gap, load / length
+def press_periodic(compliance_k, gap, mean: float) -> PeriodicContact:
+    """Solve the contact of one period under the pressure `mean` [Pa] with the gap (n,) [m] at equidistant points.
 
-
-def press_periodic(
-    compliance_k,
-    gap,
-    length: float,
-    load: float,
-    limit: int | None = None,
-    tolerance: float = 1e-11,
-) -> PeriodicContact:
-    """Solve the contact of a period `length` [m] under `load` per width [N/m] with the gap (n,) [m] at equidistant points.
-
-    compliance_k (n//2 + 1,) [m/Pa]: displacement per pressure of each wave of `wave_numbers(n, length)`, both bodies
-    together. The entry for k = 0 only moves the whole face: with 0 there (half planes, whose own is infinite)
-    `closing` is the mean gap closed, mean(gap before) - mean(gap after); with the compression of finite bodies it
-    contains that too. Pressure and gap do not depend on it. Cost: 1 to 4 sqrt(n) iterations, 10 sqrt(n) seen
-    at worst, each two pairs of transforms. PatchfemError for arguments without a meaning, NotConverged when a residual
-    exceeds 1e-9 after `limit` iterations (50 sqrt(n) + 1000 unless given).
+    compliance_k (n//2 + 1,) [m/Pa]: displacement per pressure of each wave, from k = 0, both bodies together; it is 0
+    for k = 0, as for half planes, whose own is infinite. `closing` is the mean gap closed, mean(gap before) -
+    mean(gap after). Cost: 1 to 4 sqrt(n) iterations, 10 sqrt(n) seen at worst, each two pairs of transforms.
+    NotConverged when a residual exceeds 1e-9 after 50 sqrt(n) + 1000 iterations.
     """
-    compliance_k, gap, mean = _check_arguments(compliance_k, gap, length, load)
-    limit = int(50 * np.sqrt(gap.size) + 1000) if limit is None else limit
-    waves = compliance_k.copy()
-    waves[0] = 0.0  # a uniform motion changes no gap difference; it is added to the closing below
     # subtracted, because a light load may close the gap by less than the round-off of the heights
     first = float(gap.min())
-    pressure, closing, count = _polonsky_keer(waves, gap - first, mean, limit, tolerance)
-    checks = residuals(waves, gap - first, pressure, closing, mean)
-    if not all(value <= LIMIT for value in checks.values()):  # written so that NaN also raises
-        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(
-            f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e} after {count} iterations; "
-            "take fewer points or a rounder gap"
-        )
-    opening = (gap - first) - closing + irfft(waves * rfft(pressure), gap.size)
+    gap = gap - first
+    pressure, closing = _polonsky_keer(compliance_k, gap, mean)
+    residual = find_residual(compliance_k, gap, pressure, closing, mean)
+    if not residual <= LIMIT:  # written so that NaN also raises
+        raise NotConverged(f"contact: the residual {residual:.2e} exceeds {LIMIT:.0e}")
+    opening = gap - closing + irfft(compliance_k * rfft(pressure), gap.size)
     opening[pressure > 0] = 0.0
-    closing += first + mean * float(compliance_k[0])
-    return PeriodicContact(
-        frozen_array(pressure), frozen_array(np.maximum(opening, 0.0)), closing, count, checks
-    )
+    return PeriodicContact(pressure, np.maximum(opening, 0.0), closing + first)
 
 
-def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:
-    """Return pressure (n,) [Pa], closing [m] and number of iterations by the method of Polonsky and Keer.
+def _polonsky_keer(waves, gap, mean: float) -> tuple[np.ndarray, float]:
+    """Return pressure (n,) [Pa] and closing [m] by the method of Polonsky and Keer.
 
     The first entry of `waves` must be 0.
     """
@@ -142,7 +90,7 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
     # `own` is the displacement of a point under its own pressure
     old = 0.0
     own = irfft(waves, n)[0]
-    for count in range(1, limit + 1):
+    for count in range(1, int(50 * np.sqrt(n)) + 1001):
         carried = sunk is not None
         if not carried:
             sunk = irfft(waves * rfft(pressure), n)
@@ -151,9 +99,9 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         closing = opening[touching].mean()
         opening -= closing
         depth = np.ptp(sunk) + mean * waves[1]
-        if max(np.abs(opening[touching]).max(), -opening.min()) <= tolerance * depth:
+        if max(np.abs(opening[touching]).max(), -opening.min()) <= TOLERANCE * depth:
             if not carried:
-                return pressure, float(closing), count
+                return pressure, float(closing)
             # convergence is confirmed with displacements computed again from the pressure
             sunk = None
             old = 0.0
@@ -163,7 +111,7 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         answer = irfft(waves * rfft(direction), n)
         bend = (answer[touching] - answer[touching].mean()) @ direction[touching]
         if not bend > 0 and opening.min() >= 0:  # only round-off is left
-            return pressure, float(closing), count
+            return pressure, float(closing)
         # a single contact point gives no direction, so neighbours enter by their own compliance
         step = (opening[touching] @ direction[touching]) / bend if bend > 0 else 1 / own
         pressure = pressure - step * direction
@@ -180,4 +128,4 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         pressure *= scale
         # updated along the direction, and computed again every 50 steps, since round-off accumulates
         sunk = None if clipped or enters or count % 50 == 0 else (sunk - step * answer) * scale
-    return pressure, float(closing), limit
+    return pressure, float(closing)

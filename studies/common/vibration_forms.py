@@ -5,20 +5,12 @@ and input a in the same unit (an acceleration, or a force over the same mass), m
 """
 
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from patchfem.closed_forms.contact import require_positive
 
 COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
-
-
-def decay_half_cycles(start, friction) -> int:
-    """Return the number N_0 of half cycles until a released Coulomb oscillator rests.
-
-    N_0 = max(0, ceil((|x_0|/friction - 1)/2)).
-    """
-    require_positive(friction=friction)
-    return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
 
 
 def decay_rest(start, friction, omega) -> tuple:
@@ -35,8 +27,9 @@ def decay_rest(start, friction, omega) -> tuple:
     omega : float
         [rad/s]
     """
-    require_positive(omega=omega)
-    count = decay_half_cycles(start, friction)
+    require_positive(omega=omega, friction=friction)
+    # number of half cycles until rest
+    count = max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
     sign = 1.0 if start >= 0 else -1.0
     return np.pi * count / omega, sign * (-1.0) ** count * (abs(start) - 2 * count * friction)
 
@@ -67,11 +60,6 @@ def decay(time, start, friction, omega):
     return np.where(time < stop, (1.0 if start >= 0 else -1.0) * moving, place)
 
 
-def bounded_input(friction):
-    """Return the largest base acceleration for which friction bounds the resonance: (4/pi) f, in the unit of f."""
-    return friction / COULOMB_RESONANCE
-
-
 def sliding_amplitude(r, friction, damping=0.0) -> float:
     """Return the amplitude, relative to a/omega_n^2, of a steady motion that slides without a stop (Den Hartog 1931).
 
@@ -98,9 +86,7 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
             f"= {damping}"
         )
     if damping == 0 and r == 1:
-        raise ValueError(
-            "without damping no steady sliding motion exists at resonance; see bounded_input"
-        )
+        raise ValueError("without damping no steady sliding motion exists at resonance")
     half = np.pi / r
     w = np.sqrt(1 - damping**2)
 
@@ -181,8 +167,7 @@ def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
     """Return the rms of relative displacement [m] and of acceleration [m/s^2] of an oscillator under random base motion.
 
     With u = f/f_0 both are integrals of 1/((1 - u^2)^2 + (2 zeta u)^2), that of the acceleration with 1 + (2 zeta u)^2
-    above it, whose antiderivatives are logarithms of the poles u = +-(1 - zeta^2)^(1/2) +- i zeta. Source: Crandall and
-    Mark, Random Vibration in Mechanical Systems, ch. 2.
+    above it. Source: Crandall and Mark, Random Vibration in Mechanical Systems, ch. 2.
 
     Parameters
     ----------
@@ -193,20 +178,20 @@ def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
     level : float
         One-sided spectral density of the base acceleration [m^2/s^3].
     band : tuple of float
-        Lower and upper frequency [Hz]; 0 and infinity for white noise.
+        Lower and upper frequency [Hz], with the natural frequency between them.
     """
-    pole = np.sqrt(1 - zeta * zeta) + 1j * zeta
-    poles = np.array([pole, -pole, np.conj(pole), -np.conj(pole)])
-    slopes = 4 * poles**3 + 2 * (4 * zeta * zeta - 2) * poles
-    ends = np.array(band, float) * 2 * np.pi / omega
-    # logarithms of (end - pole) along a path that no pole crosses, its branch cut turned away; at infinity they cancel
-    turn = np.where(poles.imag > 0, 1j, -1j)
-    logs = np.array(
-        [np.log((end - poles) * turn) if np.isfinite(end) else np.log(turn) for end in ends]
-    )
-    found = [
-        float(np.real(np.sum((1 + above * (2 * zeta * poles) ** 2) / slopes * (logs[1] - logs[0]))))
-        for above in (0.0, 1.0)
+
+    def displacement(ratio):
+        return 1 / ((1 - ratio**2) ** 2 + (2 * zeta * ratio) ** 2)
+
+    def acceleration(ratio):
+        return displacement(ratio) * (1 + (2 * zeta * ratio) ** 2)
+
+    frequency = omega / (2 * np.pi)
+    low, high = (end / frequency for end in band)
+    squares = [
+        quad(density, low, high, points=[1.0], limit=400, epsabs=0, epsrel=1e-11)[0]
+        for density in (displacement, acceleration)
     ]
-    f = omega / (2 * np.pi)
-    return float(np.sqrt(level * f * found[0]) / omega**2), float(np.sqrt(level * f * found[1]))
+    rms = np.sqrt(level * frequency * np.array(squares))
+    return float(rms[0] / omega**2), float(rms[1])

@@ -102,11 +102,11 @@ def growing(amplitude: float, print_steps: int) -> list:
     return _rows("on", amplitude, rows, stretch) + slow_path(amplitude)
 
 
-def slow_path(amplitude: float, times: float = 20.0) -> list:
+def slow_path(amplitude: float) -> list:
     """Return rows of LuGre against the stretch law if the bond length follows over a path of l_k = eps_0, at equal v_c."""
     slow = GROWTH | {
-        "slip_growth": times * GROWTH["slip_growth"],
-        "rest_growth": GROWTH["rest_growth"] / times,
+        "slip_growth": 20 * GROWTH["slip_growth"],
+        "rest_growth": GROWTH["rest_growth"] / 20,
     }
     stretch = last_cycle(points(bonds(**slow)), amplitude)
     lugre = last_cycle(points(at_once()), amplitude)

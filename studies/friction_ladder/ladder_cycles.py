@@ -43,9 +43,9 @@ class Cycle(NamedTuple):
         return Cycle(dq, (self.force * self.dq).reshape(-1, every).sum(axis=1) / dq)
 
 
-def _harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.ndarray:
-    """Return the slide (k,) [bond lengths] of whole cycles, the last one after a path of at least `path` bond lengths."""
-    cycles = 1 + int(np.ceil(path / (4 * amplitude)))
+def _harmonic(amplitude: float, steps: int = STEPS) -> np.ndarray:
+    """Return the slide (k,) [bond lengths] of whole cycles, the last one after a path of at least 20 bond lengths."""
+    cycles = 1 + int(np.ceil(20 / (4 * amplitude)))
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
 
 

@@ -22,46 +22,38 @@ def iwan_elements(count: int, scale: float = 1.0) -> tuple:
     return stiffness / scale, scale * (force[:-1] - force[1:]) / stiffness
 
 
-def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
+def bouc_wen(path, power: float) -> np.ndarray:
     """Integrate z of the Bouc-Wen law at the points of a path (k, ...).
 
-    dz/dq = 1 - |z|^n (beta sgn(v z) + 1 - beta) with n = power. It is exact for n = 1; other powers take Runge-Kutta
+    dz/dq = 1 - |z|^n (1 + sgn(v z))/2 with n = power. It is exact for n = 1; other powers take Runge-Kutta
     steps of order 4 that are at most 0.05 long.
 
     Parameters
     ----------
     path : (k, ...) array
     power : float
-    beta : float
     """
     z = np.zeros_like(path)
     step = _exact if power == 1 else _runge_kutta
     for i, dq in enumerate(np.diff(path, axis=0)):
-        z[i + 1] = step(z[i], dq, power, beta)
+        z[i + 1] = step(z[i], dq, power)
     return z
 
 
-def _exact(z, dq, _, beta):
-    """Integrate along the direction of motion in closed form.
-
-    da = 1 + c a below zero with c = 1 - 2 beta, and da = 1 - a above zero.
-    """
+def _exact(z, dq, _):
+    """Integrate along the direction of motion in closed form: da = 1 below zero and da = 1 - a above it."""
     way = np.sign(dq)
     left = np.abs(dq)
-    c = 1 - 2 * beta
     young = np.minimum(way * z, 0.0)
     old = np.maximum(way * z, 0.0)
-    reach = -np.log1p(c * young) / c if c else -young
-    first = np.minimum(left, reach)
-    below = young * np.exp(c * first) + (np.expm1(c * first) / c if c else first)
-    return np.where(
-        dq == 0, z, way * np.where(first < reach, below, 1 - (1 - old) * np.exp(first - left))
-    )
+    first = np.minimum(left, -young)
+    above = 1 - (1 - old) * np.exp(first - left)
+    return np.where(dq == 0, z, way * np.where(left < -young, young + left, above))
 
 
-def _runge_kutta(z, dq, power, beta):
+def _runge_kutta(z, dq, power):
     def slope(y):
-        return 1 - np.abs(y) ** power * (beta * np.sign(way * y) + 1 - beta)
+        return 1 - np.abs(y) ** power * (np.sign(way * y) + 1) / 2
 
     way = np.sign(dq)
     pieces = max(1, int(np.ceil(np.abs(dq).max() / 0.05)))

@@ -94,16 +94,16 @@ def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
     )
 
 
-def peak_errors(speed: float, by_force: bool, steps=STEPS) -> list:
+def peak_errors(speed: float, by_force: bool) -> list:
     """Return relative errors of the peak of the stick-slip block by Newmark's method with a stick speed.
 
-    There is one error for each number of steps per cycle.
+    There is one error for each number of STEPS per cycle.
     """
     times = np.linspace(CYCLES - 1, CYCLES, 2001) * SDOF_DRIVE.period
     peak = np.abs(exact("sdof", times).slide).max()
     law = coulomb(SDOF_LIMIT, speed)
     runs = (
         solve_newmark(SDOF, SDOF_DRIVE, law, (CYCLES * SDOF_DRIVE.period, n), needs_force=by_force)
-        for n in steps
+        for n in STEPS
     )
-    return [float(np.abs(found.z[-n:]).max() / peak - 1) for n, found in zip(steps, runs)]
+    return [float(np.abs(found.z[-n:]).max() / peak - 1) for n, found in zip(STEPS, runs)]

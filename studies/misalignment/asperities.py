@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import contact_forms as exact
-from halfspace import press_periodic, wave_numbers
+from halfspace import press_periodic
 
 from patchfem.contact import (
     HertzAsperities,
@@ -63,7 +63,7 @@ def closing_of_waves(k, coat: tuple = CARBIDE) -> np.ndarray:
 
 
 @cache
-def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.ndarray:
+def between_ridges(count: int, coat: tuple) -> np.ndarray:
     """Return the closing (count,) at each ridge per force on the first [m2/N], less the mean effect of equal forces.
 
     Parameters
@@ -72,17 +72,15 @@ def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.n
         Number of ridges.
     coat : tuple
         Young's modulus [Pa] and Poisson's ratio of the coating.
-    shells : int
-        Periods that are summed.
     """
     step = 2 * np.pi / WAVE
-    around = step * np.arange(-shells, shells + 1)
+    around = step * np.arange(-200, 201)  # periods that are summed
     waves = closing_of_waves(np.abs(step * np.fft.fftfreq(count)[:, None] + around), coat)
     return np.fft.ifft((waves - closing_of_waves(np.abs(around), coat)).sum(axis=1)).real / WAVE
 
 
 @cache
-def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndarray:
+def between_peaks(side: int, coat: tuple) -> np.ndarray:
     """Return the closing (side, side) at each peak of a square lattice per unit force on the first peak [m/N].
 
     The Hertzian closing of the first peak itself is left out.
@@ -93,9 +91,8 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
         Peaks along a side.
     coat : tuple
         Young's modulus [Pa] and Poisson's ratio of the coating.
-    shells : int
-        Periods that are summed.
     """
+    shells = 40  # periods that are summed
     step = 2 * np.pi / WAVE
     modulus = exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
@@ -121,7 +118,7 @@ def own_peak(force, modulus: float) -> tuple:
     return closing, 2 / 3 * closing / force
 
 
-def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: float = MEAN) -> tuple:
+def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE) -> tuple:
     """Solve peaks with one force each; return k_n = dp/d(closing) [Pa/m] and the forces (count,).
 
     Parameters
@@ -132,8 +129,6 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
         Round peaks instead of ridges.
     coat : tuple
         Young's modulus [Pa] and Poisson's ratio of the coating.
-    mean : float
-        Pressure [Pa].
     """
     count = depth.size
     modulus = exact.combined_modulus(*coat)
@@ -148,10 +143,10 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
         own = own_ridge
         cell = WAVE
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
-    force = np.full(count, mean * cell)
+    force = np.full(count, MEAN * cell)
     last = 0.0
     layout = StripLayout(number.astype(float), np.ones(count), np.zeros(1))
-    holder = Holder(mean * cell * count)
+    holder = Holder(MEAN * cell * count)
     # secant iteration of the force on each peak; each iteration reduces the error to a third or less
     while np.abs(force - last).max() > 1e-11 * force.max():
         last = force
@@ -163,9 +158,7 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
     return float(np.linalg.solve(tangent, np.ones(live.size)).sum() / (count * cell)), force
 
 
-def explicit(
-    depth, points: int, coat: tuple = CARBIDE, mean: float = MEAN, change: float = 0.02
-) -> float:
+def explicit(depth, points: int) -> float:
     """Return k_n [Pa/m] of ridges at `depth` (count,) that a grid of `points` resolves.
 
     It is computed from two pressures, 2 % below and above the mean pressure.
@@ -176,17 +169,14 @@ def explicit(
         HEIGHT * (1 - np.cos(2 * np.pi * x / WAVE))
         + depth[np.round(x / WAVE).astype(int) % depth.size]
     )
-    waves = closing_of_waves(wave_numbers(points, length), coat)
-    low, high = (
-        press_periodic(waves, gap, length, mean * (1 + by) * length).closing
-        for by in (-change, change)
-    )
-    return 2 * change * mean / (high - low)
+    waves = closing_of_waves(2 * np.pi * np.fft.rfftfreq(points, length / points))
+    low, high = (press_periodic(waves, gap, by * MEAN).closing for by in (0.98, 1.02))
+    return 0.04 * MEAN / (high - low)
 
 
-def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
+def separate(scatter: float, shape: str) -> float:
     """Return k_n [Pa/m] of round peaks that do not interact, with equal, `uniform` or `gaussian` heights."""
-    modulus = exact.combined_modulus(*coat)
+    modulus = exact.combined_modulus(*CARBIDE)
     density = WAVE**-2
     rate = 4 / 3 * modulus * RADIUS**0.5 * density
     if scatter == 0:

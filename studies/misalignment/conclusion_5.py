@@ -54,7 +54,7 @@ ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2
 
 
 @cache
-def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
+def rigid(portion: float, skin: str, halvings: int = 2) -> tuple:
     """Find the tilt [rad] and moment [N m] at which a rigid fixture leaves a portion of the patch rubbed.
 
     Parameters
@@ -63,12 +63,10 @@ def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
     skin : str
     halvings : int
         Refinements of the mesh.
-    **more
-        As in `tilted.case`.
     """
 
     def press(log_tilt: float):
-        return solve_patch_contact(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
+        return solve_patch_contact(tilted.case(10**log_tilt, skin), tilted.pair(halvings))
 
     tilt = brentq(
         lambda log_tilt: tilted.rubbed_portion(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5
@@ -85,27 +83,21 @@ def neutral(portion: float, skin: str, spring: float | None, halvings: int = 2) 
     return tilt + (moment / spring if spring is not None else 0.0)
 
 
-def springs_for(
-    tolerance: float, skin: str, most: float = 0.9, least: float = 0.05, halvings: int = 2
-) -> tuple | None:
-    """Find the smallest and largest stiffness [N m/rad] of a holder that keeps the rubbed portion in a range.
+def springs_for(tolerance: float, skin: str) -> tuple[float, float] | None:
+    """Find the smallest and largest stiffness [N m/rad] of a holder that leaves between 5 and 90 % rubbed.
 
     Parameters
     ----------
     tolerance : float
         Misalignment [rad].
     skin : str
-    most, least : float
-        Ends of the range of the rubbed portion.
-    halvings : int
-        Refinements of the mesh.
 
     Returns
     -------
     tuple or None
         The largest stiffness may be infinite; None if no holder does.
     """
-    (first, gives), (last, holds) = rigid(most, skin, halvings), rigid(least, skin, halvings)
+    (first, gives), (last, holds) = rigid(0.9, skin), rigid(0.05, skin)
     if tolerance <= first:
         return None
     return gives / (tolerance - first), holds / (tolerance - last) if tolerance > last else np.inf

@@ -20,10 +20,9 @@ Run: python studies/misalignment/fixtures.py
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
+from scipy.optimize import bisect
 
 sys.path.insert(0, str(Path(__file__).parent))
 import tilted
@@ -77,17 +76,13 @@ def case(angle: float, spring: float | None) -> dict:
     return compute_static_values(solve_patch_contact(held_pieces(angle, spring), tilted.pair(1)))
 
 
-def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
-    """Return the tilt [rad] at which the contact fraction has fallen to `fraction`, by bisection of its logarithm."""
-    low = 1e-7
-    high = 1e-1
-    for _ in range(steps):
-        middle = float(np.sqrt(low * high))
-        if case(middle, spring)["contact_fraction"] > fraction:
-            low = middle
-        else:
-            high = middle
-    return float(np.sqrt(low * high))
+def tilt_for(fraction: float, spring: float | None) -> float:
+    """Return the tilt [rad] at which the contact fraction has fallen to `fraction`."""
+
+    def excess(log_tilt: float) -> float:
+        return case(10**log_tilt, spring)["contact_fraction"] - fraction
+
+    return 10 ** bisect(excess, -7, -1, xtol=1e-8)
 
 
 def line(found: dict) -> str:
@@ -100,14 +95,12 @@ def line(found: dict) -> str:
     return "  ".join(out)
 
 
-def table(
-    title: str, named: str, cases: dict, measured: Callable = tilted.compute_measures
-) -> dict:
+def table(title: str, named: str, cases: dict) -> dict:
     """Print the measures of several pieces while they are computed, and return {key: measures}."""
     print(title)
     out: dict[float, dict[str, Measure]] = {}
     for key, found in cases.items():
-        out[key] = measured(found)
+        out[key] = tilted.compute_measures(found)
         print(f"  {named} {key:8.3g}  {line(out[key])}", flush=True)
     return out
 

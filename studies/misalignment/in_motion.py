@@ -90,12 +90,12 @@ def onsets(load: float, tilts=TILTS):
     return tuple(found[name].values.ravel() / G for name in ("onset_level", "onset_level_error"))
 
 
-def _yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
-    """Return the amplitudes (t,) [m] of the yaw mode in the last cycles."""
+def _yaws(tilts=TILTS) -> np.ndarray:
+    """Return the amplitudes (t,) [m] of the yaw mode in the last cycles at 26 lbf and 5 g."""
     found = sweep_measures(
         tilts,
-        (load,),
-        (level,),
+        (26.0,),
+        (5.0,),
         **{"structure.mode.yaw.output": 1.0, "structure.mode.axial.output": 0.0},
     )
     return found["relative_displacement_amplitude"].values.ravel()

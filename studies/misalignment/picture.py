@@ -28,12 +28,12 @@ SKINS = {
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
 
 
-def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
+def portions(spring, skin: str, tilts=TILTS) -> np.ndarray:
     """Return the rubbed portion at each misalignment [rad] of a holder."""
     return np.array(
         [
             tilted.rubbed_portion(
-                solve_patch_contact(fixtures.held_pieces(tilt, spring, skin), tilted.pair(halvings))
+                solve_patch_contact(fixtures.held_pieces(tilt, spring, skin), tilted.pair(1))
             )
             for tilt in tilts
         ]

@@ -51,9 +51,9 @@ SHAPES = ("uniform", "gaussian")
 STIFFNESSES = (1e15, 4.5e14, 1e14, 2.7e13, 1e13, 1e12, 5e11)
 
 
-def opening(stiffness: float | None, halvings: int = 2) -> float:
+def opening(stiffness: float | None) -> float:
     """Return the tilt [rad] at which the rig's pieces begin to open with a linear layer [Pa/m], or None without a layer."""
-    pieces = tilted.pair(halvings).compliance
+    pieces = tilted.pair(2).compliance
     x = pieces.interface.x
     layer = None if stiffness is None else LinearAsperities(stiffness)
     layout = StripLayout(x, pieces.interface.weight, np.zeros(1))

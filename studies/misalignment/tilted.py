@@ -74,20 +74,19 @@ def patches(asked: PatchModel) -> tuple:
 
 
 def compute_measures(asked: PatchModel) -> dict:
-    """Return {name: Measure} of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
+    """Return {name: Measure} of a model of `case`, with `rubbed`, the portion that rubs, as a value."""
     three = patches(asked)
     return estimate_static_measures(*three) | {"rubbed": rubbed_portion(three[0])}
 
 
-def rubbed_portion(patch: Patch, share: float = RUBBED_FRACTION) -> float:
-    """Return the portion of the length that carries at least `share` of the mean pressure.
+def rubbed_portion(patch: Patch) -> float:
+    """Return the portion of the length that carries at least RUBBED_FRACTION of the mean pressure.
 
     Its ends are interpolated between nodes.
     """
     x = patch.x
-    sigma = (
-        patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum()
-    )
+    mean = patch.pressure.load / patch.pieces.interface.weight.sum()
+    sigma = patch.pressure.sigma_n - RUBBED_FRACTION * mean
     low = np.minimum(sigma[:-1], sigma[1:])
     high = np.maximum(sigma[:-1], sigma[1:])
     part = np.clip(high / np.maximum(high - low, 1e-300), 0.0, 1.0)

@@ -132,9 +132,9 @@ tolerance = 1e-2
 """
 
 
-def random_turn(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int = 1) -> Turned:
-    """Return the response of a mode in a random test of several seconds, with H1 from windows of one second."""
-    done = run_random_test(rig(mode, touch), seconds, level, seed)
+def random_turn(mode: str, touch: str, level: float, seed: int = 1) -> Turned:
+    """Return the response of a mode in a random test of 8 seconds, with H1 from windows of one second."""
+    done = run_random_test(rig(mode, touch), 8.0, level, seed)
     how = {"fs": RATE, "nperseg": int(RATE)}
     f, power = signal.welch(done.base, **how)
     moved = (
@@ -149,16 +149,14 @@ def random_turn(mode: str, touch: str, level: float, seconds: float = 8.0, seed:
     )
 
 
-def fit_damping(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tuple:
-    """Fit one mode to H1 from 60 to 260 Hz; return its frequency [Hz], damping ratio and the estimate.
+def fit_damping(model: str, level: float, seed: int = 1) -> tuple:
+    """Fit one mode to H1 of 20 seconds from 60 to 260 Hz; return its frequency [Hz], damping ratio and the estimate.
 
     Parameters
     ----------
     model : str
     level : float
         [g rms]
-    seconds : float
-        Duration of the test.
     seed : int
     """
     text = scene({SPRING: "rigid block", DAMPER: "second path"}.get(model, model))
@@ -177,7 +175,7 @@ def fit_damping(model: str, level: float, seconds: float = 20.0, seed: int = 1) 
         text = text.replace("3.48925e6 N/m", f"{spring!r} N/m").replace(
             "1374.2 N s/m", f"{damper!r} N s/m"
         )
-    seen = h1(run_random_test(text, seconds, level, seed), 1.0).between(60, 260)
+    seen = h1(run_random_test(text, 20.0, level, seed), 1.0).between(60, 260)
     return *fit_mode(seen)[:2], seen
 
 

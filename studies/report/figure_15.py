@@ -85,12 +85,12 @@ def solve(omega: float, ratio: float) -> Row:
     )
 
 
-def run_report_steps(step: float = 0.05) -> tuple:
-    """Integrate the first interpretation of the figure with the steps of the report.
+def run_report_steps() -> tuple:
+    """Integrate the first interpretation of the figure with the steps of the report, 0.05.
 
     Return time, x and the fraction of failed steps.
     """
-    drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
+    drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 0.0, 1.0),), 50.0, False)
     found = solve_duhamel(
         UNDAMPED_MASS,
         drive,

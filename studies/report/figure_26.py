@@ -69,10 +69,10 @@ def curve() -> Free:
     return Free(f, h, (float(f[k]), float(np.abs(h[k]))))
 
 
-def random_test(seconds: float = SECONDS, window: float = WINDOW) -> Estimate:
+def random_test() -> Estimate:
     """Return H1 of a random test from 60 to 210 Hz."""
     text = SCENE.read_text("utf-8").replace('method = "harmonic"', 'method = "exact"')
-    return h1(run_random_test(text, seconds, RMS), window).between(60, 210)
+    return h1(run_random_test(text, SECONDS, RMS), WINDOW).between(60, 210)
 
 
 def _picture(free: Free, seen: Estimate, path: Path) -> Path:

@@ -91,24 +91,25 @@ def steady(onset: float, level: float) -> Row:
     )
 
 
-def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
-    """Return a cycle of the exact motion, `after` cycles from rest."""
-    times = 2 * np.pi * (after + 0.5 + np.linspace(0, 1, CURVE))
-    r = sample_motion(SDOF, SDOF_DRIVE, make_coulomb(onset / level), after + 2.0, times)
+def exact_cycle(onset: float) -> Cycle:
+    """Return a cycle of the exact motion at 5 g, 40 cycles from rest."""
+    times = 2 * np.pi * (40.5 + np.linspace(0, 1, CURVE))
+    r = sample_motion(SDOF, SDOF_DRIVE, make_coulomb(onset / 5), 42.0, times)
     return Cycle(
         r.output, r.output_rate, r.force, r.acceleration - r.base_acceleration, r.acceleration
     )
 
 
-def newmark_run(
-    stick_speed: float, onset: float = 4.0, level: float = 5.0, cycles: int = 60
-) -> Cycle:
-    """Return the last cycle of Newmark's method, which stops the block below `stick_speed`."""
+def newmark_run(stick_speed: float) -> Cycle:
+    """Return the last of 60 cycles at 5 g by Newmark's method, which stops the block below `stick_speed`.
+
+    The block begins to slip at 4 g.
+    """
     found = solve_newmark(
         SDOF,
         SDOF_DRIVE,
-        coulomb(onset / level, stick_speed),
-        ((cycles + 0.5) * SDOF_DRIVE.period, CURVE - 1),
+        coulomb(4 / 5, stick_speed),
+        (60.5 * SDOF_DRIVE.period, CURVE - 1),
         needs_force=True,
     )
     last = slice(-CURVE, None)

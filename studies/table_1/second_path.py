@@ -17,69 +17,27 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from derived import FitRequest
 from null_models import fit_null_model
+from rungs import PREDICTED_ROWS, STUCK_READING, Rung
 
 from patchfem.campaigns.fits.problem import FitOptions
-from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores
 from patchfem.campaigns.rows.fit import fit_rows
-from patchfem.campaigns.rows.model_readings import ModelReadings
-from patchfem.scene import BOUNDS, load, loads, read_assignments
 
-FOLDER = Path(__file__).parent
-TABLE = FOLDER.parent / "rig" / "table1.csv"
-PREDICTED_ROWS = "frequency=135 Hz,150 Hz,155 Hz"
 FREE = (
     "friction.static=0.2..0.8",
     "structure.bonded.stiffness=1e6 N/m..1e7 N/m",
     "structure.bonded.damping=0 N s/m..5000 N s/m",
     "structure.mode.yaw.slide=0..0.3",
 )
-POINT = (
-    '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
-)
-
-
-def question(point: bool = False) -> FitRequest:
-    """Return the scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
-    path = FOLDER / "second_path.toml"
-    text = path.read_text("utf-8")
-    if point:
-        text = POINT + text[text.index("static =") :]
-    return FitRequest(
-        loads(text, path) if point else load(path), read_assignments(FREE, BOUNDS)[0], TABLE
-    )
-
-
-def as_it_stands(point: bool = False) -> dict:
-    """Return the scores of the scene's own numbers, and the seconds of its 27 readings when they are computed again."""
-    cells = read_response_table(TABLE)
-    asked = question(point)
-    held = cells.select_readings(PREDICTED_ROWS)
-    computed = ModelReadings(asked.make_condition_models(cells.conditions))
-    own = asked.scene
-    values = [
-        own.friction.static,
-        own.structure.bonded.stiffness,
-        own.structure.bonded.damping,
-        own.structure.mode[1].slide,
-    ]
-    for _ in range(2):
-        computed.reset_motions()
-        begin = time.process_time()
-        found = computed(values, range(len(cells.conditions)))
-        seconds = time.process_time() - begin
-    logs = cells.compute_log_ratios(*found)
-    return {
-        "fitted": compute_rms_scores(cells, logs, ~held),
-        "held_out": compute_rms_scores(cells, logs, held),
-        "seconds": seconds,
-    }
 
 
 def fit_path(point: bool = False, starts: int = 8):
-    """Return the numbers fitted to 143 Hz from random starts, as FittedRows."""
-    asked = question(point)
+    """Return the numbers fitted to 143 Hz from random starts, as FittedRows.
+
+    `point` takes one elastic-plastic point in the place of the patch.
+    """
+    asked = Rung("second_path.toml", FREE, point=point).question(STUCK_READING)
     options = FitOptions(hold=(PREDICTED_ROWS,), starts=starts)
     return fit_rows(asked.scene, asked.measured, asked.ranges, options)
 

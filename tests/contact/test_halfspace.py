@@ -19,8 +19,8 @@ MODULUS = exact.combined_modulus(*CARBIDE)
 
 def coated_compliance(n_points, length):
     """Return the compliance C(k) of the coated pair with half-planes below the coatings, zero for k = 0."""
-    k = halfspace.wave_numbers(n_points, length)
-    return np.concatenate([[0.0], 2 * exact.layered_compliance(k[1:], CARBIDE, TITANIUM, COATING)])
+    k = 2 * np.pi * np.fft.rfftfreq(n_points, length / n_points)
+    return np.append(0.0, 2 * exact.layered_compliance(k[1:], CARBIDE, TITANIUM, COATING))
 
 
 def make_points(n_points, length):
@@ -65,12 +65,10 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
     substrate_half_width = exact.hertz_half_width(load, radius, exact.combined_modulus(*TITANIUM))
     spacing = exact.hertz_half_width(load, radius, MODULUS) / 16
     n_points = 8 * round(LENGTH / spacing / 2)
-    x = make_points(n_points, n_points * spacing / 4)
+    length = n_points / 4 * spacing
+    x = make_points(n_points, length)
     reference = halfspace.press_periodic(
-        coated_compliance(n_points, n_points * spacing / 4),
-        crown(x, radius),
-        n_points * spacing / 4,
-        load,
+        coated_compliance(n_points, length), crown(x, radius), load / length
     )
     peak = reference.pressure.max()
     assert min_ratio <= peak / exact.hertz_peak(load, radius, MODULUS) <= max_ratio

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from study_module import assert_contains, load_study
-from vibration_forms import bounded_input, decay_rest, sliding_amplitude
+from vibration_forms import decay_rest, sliding_amplitude
 
 
 def test_figures_2_and_3_amplitudes_of_one_block(capsys):
@@ -39,7 +39,7 @@ def test_figures_2_and_3_amplitudes_of_one_block(capsys):
         f"{five.acceleration:.2f} g for 6.0",
         f"q is {loose:.3f}",
         f"0.21 q is {tight:.3f}",
-        f"the onset, {4.14 * bounded_input(1.0):.2f} g",
+        f"the onset, {4.14 * 4 / np.pi:.2f} g",
         f"acceleration {np.abs(stopped[figure.STICK_SPEED].absolute).max():.2f}; below",
     )
     assert figure.ANSWER in capsys.readouterr().out

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic import (
-    report_area,
-    report_density,
-    report_trace,
-    self_affine,
-)
+from synthetic import report_area, report_density, self_affine
 
 LENGTH = 12.7e-3
 STEP, POINTS = 3.2e-6, 320  # a square raster with sides of 1.02 mm
@@ -37,10 +32,7 @@ def test_exact_rms_and_spectrum_of_self_affine_trace(seed, hurst, count):
 
 
 def test_exact_spectrum_of_report_surface():
-    """The spectrum of a surface agrees with the density of the report.
-
-    That of a trace agrees with the mean over the rows of a surface.
-    """
+    """The spectrum of a surface agrees with the density of the report."""
     x, y, z = report_area((200, 300), STEP, 0)
     assert (x.size, y.size, z.shape) == (300, 200, (200, 300)) and x[1] == y[1] == STEP
     power = np.abs(np.fft.fft2(z)) ** 2
@@ -48,12 +40,3 @@ def test_exact_spectrum_of_report_surface():
     assert power / power.sum() == pytest.approx(
         report_density(q) / report_density(q).sum(), rel=1e-9, abs=1e-15
     )
-    trace = report_trace(2e-3, 700, 1).z[:-1]
-    trace_power = np.abs(np.fft.rfft(trace)) ** 2
-    surface_heights = report_area((700, 700), 2e-3 / 700, 1)[2]
-    rows = (np.abs(np.fft.rfft(surface_heights, axis=1)) ** 2).mean(axis=0)
-    assert trace_power[1:] / trace_power[1:].sum() == pytest.approx(
-        rows[1:] / rows[1:].sum(), rel=2e-3, abs=1e-5
-    )
-    # wavelength with the largest power per octave
-    assert 2e-3 / (np.arange(351) * trace_power).argmax() == pytest.approx(85e-6, abs=2e-6)
