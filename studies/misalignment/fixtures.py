@@ -4,11 +4,11 @@ The fixture decides. With a rigid one the rig's smooth pieces lose full contact 
 patch at 2.9e-5 rad, that is 0.37 um over its 12.7 mm, on a fifth at 1.1e-4 rad:
 
   tilt      in contact  mean/peak       peak MPa       centre mm        K_n N/um    K_t N/um
-  1e-6      1           0.699 ± 0.01    1.025 ± 0.01   -0.2075±0.0003   1850 ± 2    404 ± 1
-  1e-5      0.9352      0.3729±0.0004   1.923 ±0.002   -2.072 ± 0.003   1826        404 ± 1
-  1e-4      0.2193      0.08615         8.324          -5.324           535.2       229.1±0.3
-  1e-3      0.02391     0.01178         60.87          -6.241           169.9       119.7
-  1e-2      0.001675    0.000904        792.9 ± 0.8    -6.342           96.22       84.08
+  1e-6      1           0.699 ± 0.01    1.025 ± 0.01   -0.2075±0.0004   1850 ± 2    404 ± 1
+  1e-5      0.935±0.001 0.3728±0.0006   1.923 ±0.003   -2.0725±0.004    1826 ± 2    404 ± 1
+  1e-4      0.2193      0.08615±0.0001  8.324 ± 0.01   -5.324           535.2       229.1±0.3
+  1e-3      0.02391     0.01178±0.00001 60.88 ± 0.07   -6.241           170.0       119.75±0.13
+  1e-2      0.001675    0.000904±0.000002 793.3 ± 1.4  -6.342           96.23       84.09±0.09
 
 (an error stands where it is above a thousandth). A holder's spring gives way until its moment is that of the pressure,
 so every row is met later: half contact at 3.4e-5 rad with 1e5 N m/rad, 7.5e-5 with 1e4, 4.9e-4 with 1e3 and 4.6e-3 rad
