@@ -21,12 +21,10 @@ from .variables import make_variables, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
 CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace, from 5 to 95 %
-MAX_SIZE_RATIO = (
-    1.001  # of lengths or steps of several files, above which their means mix quantities
-)
-MAX_FACTOR = (
-    2.0  # largest ratio of the end of an interval of a mean to the mean that says something
-)
+# Ratio of lengths or steps of several files, above which their means mix quantities.
+MAX_SIZE_RATIO = 1.001
+# Largest ratio of the end of an interval of a mean to the mean that says something.
+MAX_INTERVAL_FACTOR = 2.0
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
@@ -135,7 +133,7 @@ def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
         if not name.endswith("sk") and mean > 0:
             factor = np.exp(error / mean)
             ends = (mean / factor, mean * factor)
-            if factor > MAX_FACTOR:
+            if factor > MAX_INTERVAL_FACTOR:
                 ends = (None, None)
                 reason = "few_files"
         averaged = quantity._replace(value=mean, low=ends[0], high=ends[1], reason=reason)
