@@ -46,6 +46,16 @@ def test_exact_quasi_static_iwan_curve_agrees_with_segalman():
     assert backbone.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
 
 
+def test_exact_joint_without_friction_is_linear():
+    """Without a friction limit all amplitudes have the frequency and the damping of the mode, and a note says why."""
+    scene = pf.load(make_shaken_block(PLASTIC))
+    backbone = pf.backbone(scene, amplitudes=[1e-5, 1e-3], **{"friction.static": 0.0})
+    for method in ("balance", "quasi_static"):
+        assert backbone[f"{method}_frequency"].values == pytest.approx([100.0, 100.0], rel=1e-12)
+        assert backbone[f"{method}_damping"].values == pytest.approx([0.002, 0.002], rel=1e-9)
+    assert any("No friction acts" in note for note in backbone.notes)
+
+
 def test_exact_balanced_motion_repeats_after_a_cycle():
     """A motion with the damping of the balance returns to its amplitude after a cycle within 1e-9.
 

@@ -12,6 +12,7 @@ from patchfem.points.contacts import make_contact
 from patchfem.points.time_march import march
 from patchfem.scene import loads
 from patchfem.structure.drives import SweepDrive, make_levels, make_step
+from patchfem.structure.tones import make_tones
 
 OMEGA = 2 * np.pi * 143
 
@@ -51,6 +52,18 @@ def test_exact_level_change_preserves_phase():
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
     amplitude = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
     assert drive.values(t) == pytest.approx(amplitude * np.sin(OMEGA * t), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "frequencies, cycles",
+    [((40.0, 60.0), 2), ((60.0, 90.0, 150.0), 2), ((100.0, 101.0), 100), ((2.5, 1.0), 5)],
+)
+def test_exact_tones_repeat_after_their_beat(frequencies, cycles):
+    """Several tones repeat after the least common multiple of their periods, and after no fewer cycles of the first."""
+    signal = make_tones(frequencies, np.ones(len(frequencies)), np.zeros(len(frequencies)), 1.0)
+    counts = np.arange(1, cycles + 1)[:, None] * np.array(frequencies) / frequencies[0]
+    are_whole = np.all(np.abs(counts - np.round(counts)) < 1e-9, axis=1)
+    assert signal.beat == cycles == counts[are_whole][0, 0]
 
 
 # ---- the march

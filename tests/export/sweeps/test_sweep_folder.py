@@ -115,6 +115,14 @@ def test_exact_shards_give_same_files(swept, scene_file, tmp_path):
     assert_same_tables(tmp_path / "shards", swept)
 
 
+def test_exact_interrupted_sweep_that_is_run_anew_is_named(scene_file, tmp_path):
+    """A sweep without --resume says how many cases of an interrupted one it computes again; a whole one has no note."""
+    words = ("sweep", scene_file, "--over", "friction.static=0.2,0.3,0.4", "-o", tmp_path / "out")
+    assert run_cli(*words, "--shard", "1/3").code == 0
+    assert "note: 1 of 3 cases already have an answer" in run_cli(*words).err
+    assert "already have an answer" not in run_cli(*words).err
+
+
 def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
     """`--keep` stores nothing, a summary or a results folder of each case, and a failed case has a summary."""
     over = ("--over", "friction.static=-1,0.1")
