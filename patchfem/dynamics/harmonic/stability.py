@@ -7,7 +7,7 @@ the slide is at rest there, so the shift has no effect to first order. Elements 
 that never slips is a spring, whose offset (multiplier 1) is left out. A law with one state has one state per row.
 
 In each cell between two nodes of the cycle the coefficients are constant and the motion is a matrix exponential: order 2
-in the width of the cells.
+in the width of the cells. Successive cells of equal coefficients become one.
 """
 
 from dataclasses import replace
@@ -102,6 +102,17 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
                     if stiffness.any():
                         memories.append(_Memory(i, still, still, stiffness, node))
 
+    # Elements that stick or slip have few different coefficients, but up to 65536 nodes where they stick for a short time.
+    # Successive equal cells become one, and a cell begins at each reversal.
+    table = np.vstack([slope, damping, *[np.stack(memory[1:4]) for memory in memories]])
+    begins = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
+    begins[[memory.node for memory in memories if memory.node >= 0]] = True
+    first = np.flatnonzero(begins)
+    widths = np.add.reduceat(widths, first)
+    table = table[:, first]
+    slope, damping = table[: 2 * len(rows)].reshape(2, len(rows), -1)
+    parts = table[2 * len(rows) :].reshape(-1, 3, first.size)
+
     # Matrices of the linear equations of a perturbation (z, dz/dtheta, u), with theta = omega t, the modal coordinates z,
     # the memories u, the slides q = R z and a force stiffness u of each memory:
     #   d2z/dtheta2 = -(omega_j/omega)^2 z - C/omega dz/dtheta - R^T (slope q + omega damping dq/dtheta + force)/(m omega^2)
@@ -114,10 +125,10 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     rates[:, n : 2 * n, :n] -= (to_rate * slope.T[:, None]) @ rows
     rates[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega
     rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[:, None]) @ rows
-    for k, memory in enumerate(memories, 2 * n):
-        rates[:, n : 2 * n, k] = -np.outer(memory.stiffness, to_rate[:, memory.row])
-        rates[:, k, n : 2 * n] = np.outer(memory.gain, rows[memory.row])
-        rates[:, k, k] = -memory.loss
+    for k, (memory, (gain, loss, stiffness)) in enumerate(zip(memories, parts), 2 * n):
+        rates[:, n : 2 * n, k] = -np.outer(stiffness, to_rate[:, memory.row])
+        rates[:, k, n : 2 * n] = np.outer(gain, rows[memory.row])
+        rates[:, k, k] = -loss
 
     # Transition matrices of the cells. Velocities divided by a scale balance the entries of stiff modes and contacts.
     scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
@@ -129,7 +140,8 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     # A reversal ends a cell; its memory is the slide there.
     for k, memory in enumerate(memories, 2 * n):
         if memory.node >= 0:
-            steps[memory.node - 1, k] = rows[memory.row] @ steps[memory.node - 1, :n]
+            last = np.searchsorted(first, memory.node) - 1
+            steps[last, k] = rows[memory.row] @ steps[last, :n]
 
     # Product of the matrices by pairs, the first one rightmost.
     while len(steps) > 1:
