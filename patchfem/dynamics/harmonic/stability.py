@@ -50,8 +50,8 @@ class _Memory(NamedTuple):
     """State of a law in the cells of a cycle.
 
     - row: number of the interface row
-    - gain, loss (M,): the state obeys u' = gain q' - loss u [1], [1/rad]
-    - stiffness (M,): force per state [N/m]
+    - gain, loss (c,): the state obeys u' = gain q' - loss u [1], [1/rad]
+    - stiffness (c,): force per state [N/m]
     - node: node at which the state becomes the slide; -1 for a state that changes in all cells
     """
 
@@ -60,6 +60,22 @@ class _Memory(NamedTuple):
     loss: np.ndarray
     stiffness: np.ndarray
     node: int = -1
+
+
+class _Cells(NamedTuple):
+    """Coefficients of the linear equations of a perturbation, constant in each of c cells of a cycle.
+
+    - first (c,): nodes at which the cells begin
+    - widths (c,): widths of the cells [rad]
+    - slope, damping (r, c): derivatives of the forces on the interface rows by slide [N/m] and velocity [N s/m]
+    - memories: states of the laws
+    """
+
+    first: np.ndarray
+    widths: np.ndarray
+    slope: np.ndarray
+    damping: np.ndarray
+    memories: list[_Memory]
 
 
 def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
@@ -80,11 +96,54 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     n = modes.omega.size
     rows = motion.group.rows
     omega = motion.omega
+    first, widths, slope, damping, memories = _make_cells(motion)
+
+    # Matrices of the linear equations of a perturbation (z, dz/dtheta, u), with theta = omega t, the modal coordinates z,
+    # the memories u, the slides q = R z and a force stiffness u of each memory:
+    #   d2z/dtheta2 = -(omega_j/omega)^2 z - C/omega dz/dtheta - R^T (slope q + omega damping dq/dtheta + force)/(m omega^2)
+    #   du/dtheta = gain dq/dtheta - loss u
+    size = 2 * n + len(memories)
+    to_rate = rows.T / (modes.mass * omega**2)
+    rates = np.zeros((widths.size, size, size))
+    rates[:, :n, n : 2 * n] = np.eye(n)
+    rates[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2
+    rates[:, n : 2 * n, :n] -= (to_rate * slope.T[:, None]) @ rows
+    rates[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega
+    rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[:, None]) @ rows
+    for k, memory in enumerate(memories, 2 * n):
+        rates[:, n : 2 * n, k] = -np.outer(memory.stiffness, to_rate[:, memory.row])
+        rates[:, k, n : 2 * n] = np.outer(memory.gain, rows[memory.row])
+        rates[:, k, k] = -memory.loss
+
+    # Transition matrices of the cells. Velocities divided by a scale balance the entries of stiff modes and contacts.
+    scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
+    sizes = np.ones(size)
+    sizes[n : 2 * n] = scale
+    balanced = rates * (sizes / sizes[:, None])
+    steps = find_exponentials(balanced * widths[:, None, None]) * (sizes[:, None] / sizes)
+
+    # A reversal ends a cell; its memory is the slide there.
+    for k, memory in enumerate(memories, 2 * n):
+        if memory.node >= 0:
+            last = np.searchsorted(first, memory.node) - 1
+            steps[last, k] = rows[memory.row] @ steps[last, :n]
+
+    # Product of the matrices by pairs, the first one rightmost.
+    while len(steps) > 1:
+        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
+        pairs = steps[: len(steps) - len(unpaired)]
+        steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
+    return steps[0]
+
+
+def _make_cells(motion: SteadyMotion) -> _Cells:
+    """Return the cells of a cycle, of which successive ones of equal coefficients are one."""
     slides = motion.sample(max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
     widths = slides.widths
+    n_rows = len(motion.group.rows)
 
     # Coefficients of each cell: of the accelerations by the slides and their rates, and those of the memories.
-    slope, damping = np.zeros((2, len(rows), widths.size))
+    slope, damping = np.zeros((2, n_rows, widths.size))
     memories = []
     for i, forces in enumerate(motion.group.evaluate(slides)):
         for force in forces:
@@ -110,45 +169,10 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     first = np.flatnonzero(begins)
     widths = np.add.reduceat(widths, first)
     table = table[:, first]
-    slope, damping = table[: 2 * len(rows)].reshape(2, len(rows), -1)
-    parts = table[2 * len(rows) :].reshape(-1, 3, first.size)
-
-    # Matrices of the linear equations of a perturbation (z, dz/dtheta, u), with theta = omega t, the modal coordinates z,
-    # the memories u, the slides q = R z and a force stiffness u of each memory:
-    #   d2z/dtheta2 = -(omega_j/omega)^2 z - C/omega dz/dtheta - R^T (slope q + omega damping dq/dtheta + force)/(m omega^2)
-    #   du/dtheta = gain dq/dtheta - loss u
-    size = 2 * n + len(memories)
-    to_rate = rows.T / (modes.mass * omega**2)
-    rates = np.zeros((widths.size, size, size))
-    rates[:, :n, n : 2 * n] = np.eye(n)
-    rates[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2
-    rates[:, n : 2 * n, :n] -= (to_rate * slope.T[:, None]) @ rows
-    rates[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega
-    rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[:, None]) @ rows
-    for k, (memory, (gain, loss, stiffness)) in enumerate(zip(memories, parts), 2 * n):
-        rates[:, n : 2 * n, k] = -np.outer(stiffness, to_rate[:, memory.row])
-        rates[:, k, n : 2 * n] = np.outer(gain, rows[memory.row])
-        rates[:, k, k] = -loss
-
-    # Transition matrices of the cells. Velocities divided by a scale balance the entries of stiff modes and contacts.
-    scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
-    sizes = np.ones(size)
-    sizes[n : 2 * n] = scale
-    balanced = rates * (sizes / sizes[:, None])
-    steps = find_exponentials(balanced * widths[:, None, None]) * (sizes[:, None] / sizes)
-
-    # A reversal ends a cell; its memory is the slide there.
-    for k, memory in enumerate(memories, 2 * n):
-        if memory.node >= 0:
-            last = np.searchsorted(first, memory.node) - 1
-            steps[last, k] = rows[memory.row] @ steps[last, :n]
-
-    # Product of the matrices by pairs, the first one rightmost.
-    while len(steps) > 1:
-        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
-        pairs = steps[: len(steps) - len(unpaired)]
-        steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
-    return steps[0]
+    slope, damping = table[: 2 * n_rows].reshape(2, n_rows, -1)
+    parts = table[2 * n_rows :].reshape(-1, 3, first.size)
+    memories = [_Memory(memory.row, *part, memory.node) for memory, part in zip(memories, parts)]
+    return _Cells(first, widths, slope, damping, memories)
 
 
 def _average(values, weight=0.5):
