@@ -121,8 +121,6 @@ def begin_scales(rig, state):
 def add_energies(rig, state, before):
     """Update the exchanged energy and the largest energy of the modes after a step.
 
-    `before`: work of the drive before it [J].
-
     Parameters
     ----------
     rig : Rig

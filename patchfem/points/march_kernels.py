@@ -167,8 +167,6 @@ def rests(points, memory, j):
 def move_freely(system, level, drive, row, fraction):
     """Write the motion at the end of a step without interface forces, and that of the ports.
 
-    `row` and `fraction` are the time at the start in whole steps.
-
     Parameters
     ----------
     system : march_rows.System

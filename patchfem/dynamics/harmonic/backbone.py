@@ -97,7 +97,9 @@ class FreeBalance:
         # Matrices of each harmonic: E, and the spring and damper of the coordinate, which are as stiff as the mode.
         eye = np.eye(modes.omega.size)
         is_first = (np.arange(harmonics + 1) == 1)[:, None, None]
-        self.excitation = is_first * excitation if excitation is not None else (is_first >= 0) * eye
+        self.excitation = np.repeat(eye[None], harmonics + 1, axis=0)
+        if excitation is not None:
+            self.excitation = is_first * excitation
         self.holding = is_first * self.omega**2 * (1 + 1j) * np.outer(eye[mode], eye[mode])
 
     def start(self, omega: float, shape, amplitude: float) -> np.ndarray:

@@ -7,7 +7,7 @@ the slide is at rest there, so the shift has no effect to first order. Elements 
 that never slips is a spring, whose offset (multiplier 1) is left out. A law with one state has one state per row.
 
 In each cell between two nodes of the cycle the coefficients are constant and the motion is a matrix exponential: order 2
-in the width of the cells.
+in the width of the cells. Successive cells of equal coefficients become one.
 """
 
 from dataclasses import replace
@@ -50,8 +50,8 @@ class _Memory(NamedTuple):
     """State of a law in the cells of a cycle.
 
     - row: number of the interface row
-    - gain, loss (M,): the state obeys u' = gain q' - loss u [1], [1/rad]
-    - stiffness (M,): force per state [N/m]
+    - gain, loss (c,): the state obeys u' = gain q' - loss u [1], [1/rad]
+    - stiffness (c,): force per state [N/m]
     - node: node at which the state becomes the slide; -1 for a state that changes in all cells
     """
 
@@ -60,6 +60,22 @@ class _Memory(NamedTuple):
     loss: np.ndarray
     stiffness: np.ndarray
     node: int = -1
+
+
+class _Cells(NamedTuple):
+    """Coefficients of the linear equations of a perturbation, constant in each of c cells of a cycle.
+
+    - first (c,): nodes at which the cells begin
+    - widths (c,): widths of the cells [rad]
+    - slope, damping (r, c): derivatives of the forces on the interface rows by slide [N/m] and velocity [N s/m]
+    - memories: states of the laws
+    """
+
+    first: np.ndarray
+    widths: np.ndarray
+    slope: np.ndarray
+    damping: np.ndarray
+    memories: list[_Memory]
 
 
 def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
@@ -80,27 +96,7 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     n = modes.omega.size
     rows = motion.group.rows
     omega = motion.omega
-    slides = motion.sample(max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
-    widths = slides.widths
-
-    # Coefficients of each cell: of the accelerations by the slides and their rates, and those of the memories.
-    slope, damping = np.zeros((2, len(rows), widths.size))
-    memories = []
-    for i, forces in enumerate(motion.group.evaluate(slides)):
-        for force in forces:
-            if force.states is not None:
-                memories.append(_Memory(i, *_find_fading(force.states, widths)))
-                damping[i] += _average(force.states.slopes[1])
-                continue
-            weight = _weigh_ends(slides.q[i], force)
-            slope[i] += _average(force.slope, weight)
-            damping[i] += _average(force.by_velocity)
-            if np.ndim(force.holds):
-                held = _average(force.holds - force.holds.max(axis=1, keepdims=True), weight)
-                still = np.zeros(widths.size)
-                for node, stiffness in zip(slides.reversals[i], held):
-                    if stiffness.any():
-                        memories.append(_Memory(i, still, still, stiffness, node))
+    first, widths, slope, damping, memories = _make_cells(motion)
 
     # Matrices of the linear equations of a perturbation (z, dz/dtheta, u), with theta = omega t, the modal coordinates z,
     # the memories u, the slides q = R z and a force stiffness u of each memory:
@@ -129,7 +125,8 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
     # A reversal ends a cell; its memory is the slide there.
     for k, memory in enumerate(memories, 2 * n):
         if memory.node >= 0:
-            steps[memory.node - 1, k] = rows[memory.row] @ steps[memory.node - 1, :n]
+            last = np.searchsorted(first, memory.node) - 1
+            steps[last, k] = rows[memory.row] @ steps[last, :n]
 
     # Product of the matrices by pairs, the first one rightmost.
     while len(steps) > 1:
@@ -137,6 +134,45 @@ def find_monodromy(motion: SteadyMotion, modes) -> np.ndarray:
         pairs = steps[: len(steps) - len(unpaired)]
         steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
     return steps[0]
+
+
+def _make_cells(motion: SteadyMotion) -> _Cells:
+    """Return the cells of a cycle, of which successive ones of equal coefficients are one."""
+    slides = motion.sample(max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
+    widths = slides.widths
+    n_rows = len(motion.group.rows)
+
+    # Coefficients of each cell: of the accelerations by the slides and their rates, and those of the memories.
+    slope, damping = np.zeros((2, n_rows, widths.size))
+    memories = []
+    for i, forces in enumerate(motion.group.evaluate(slides)):
+        for force in forces:
+            if force.states is not None:
+                memories.append(_Memory(i, *_find_fading(force.states, widths)))
+                damping[i] += _average(force.states.slopes[1])
+                continue
+            weight = _weigh_ends(slides.q[i], force)
+            slope[i] += _average(force.slope, weight)
+            damping[i] += _average(force.by_velocity)
+            if np.ndim(force.holds):
+                held = _average(force.holds - force.holds.max(axis=1, keepdims=True), weight)
+                still = np.zeros(widths.size)
+                for node, stiffness in zip(slides.reversals[i], held):
+                    if stiffness.any():
+                        memories.append(_Memory(i, still, still, stiffness, node))
+
+    # Elements that stick or slip have few different coefficients, but up to 65536 nodes where they stick for a short time.
+    # Successive equal cells become one, and a cell begins at each reversal.
+    table = np.vstack([slope, damping, *[np.stack(memory[1:4]) for memory in memories]])
+    begins = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
+    begins[[memory.node for memory in memories if memory.node >= 0]] = True
+    first = np.flatnonzero(begins)
+    widths = np.add.reduceat(widths, first)
+    table = table[:, first]
+    slope, damping = table[: 2 * n_rows].reshape(2, n_rows, -1)
+    parts = table[2 * n_rows :].reshape(-1, 3, first.size)
+    memories = [_Memory(memory.row, *part, memory.node) for memory, part in zip(memories, parts)]
+    return _Cells(first, widths, slope, damping, memories)
 
 
 def _average(values, weight=0.5):

@@ -1,6 +1,7 @@
 """Continuation, stability and backbones of the harmonic balance against closed forms and time
 integration."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -217,6 +218,20 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
     )  # the matrix uses rates per radian and the stretch u length
     monodromy = find_monodromy(replace(p, samples=4096), modes) * scale[:, None] / scale
     assert monodromy == pytest.approx(columns, abs=2e-5)
+
+
+def test_always_many_samples_of_two_stiffnesses_need_little_memory():
+    """An element that sticks for a short time needs thousands of samples, but few matrices; perturbations decay by the
+    damping of the mode within 1 %."""
+    modes = make_sdof(0.05)
+    p = find_steady_motion(modes, SineDrive(1.0, 1.0), Jenkins([1.0], [0.02]))
+    tracemalloc.start()
+    multipliers = np.linalg.eigvals(find_monodromy(p, modes))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.abs(multipliers).max() == pytest.approx(np.exp(-0.05 * 2 * np.pi), rel=0.01)
+    # Matrices of all cells would take 180 numbers of 8 bytes per sample.
+    assert p.samples >= 4096 and peak < 60 * 8 * p.samples
 
 
 # ---- backbones

@@ -3,7 +3,7 @@
 import friction_forms
 import numpy as np
 import pytest
-from scene_texts import GROWING, POINT, TRIANGLE
+from scene_texts import GROWING, NONLOCAL, POINT, TRIANGLE
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
@@ -88,3 +88,16 @@ def test_refuses_scene_with_growth_rates_out_of_range():
         r"rest_growth would be about 1e-",
     ):
         plan(scene)
+
+
+@pytest.mark.parametrize("has_growth", [True, False])
+def test_exact_temperature_table_without_effect_is_reported(has_growth):
+    """A temperature table without activation temperatures, or beside bonds that do not grow, gives a remark and is
+    dropped."""
+    law = GROWING if has_growth else NONLOCAL
+    table = WARM.split("rest_act")[0] if has_growth else WARM
+    scene = loads(POINT + law + table + CONSTANT_SPEED)
+    reason = "activation temperatures" if has_growth else "growth of the bonds"
+    [remark] = [remark for remark in scene.remarks if remark.startswith("friction.temperature")]
+    assert "has no effect without" in remark and reason in remark
+    assert scene.friction.temperature is None
