@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from patchfem import plan, run
 from patchfem.core import PatchfemError
+from patchfem.model.load import PointLoad
 from patchfem.scene import load
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
@@ -100,3 +101,23 @@ def test_exact_coulomb_bench_breaks_away_at_static_friction():
     assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3)
     assert result.measures["friction_ratio_end"].value == 0.2
     assert result.measures["friction_work"].value == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
+
+
+def test_exact_friction_limits_under_changing_load_need_few_evaluations(monkeypatch):
+    """A bench of 100 cycles evaluates its changing load for blocks of samples, not sample by sample."""
+    sizes = []
+    evaluate = PointLoad.evaluate
+
+    def count_and_evaluate(load, time):
+        sizes.append(np.size(time))
+        return evaluate(load, time)
+
+    monkeypatch.setattr(PointLoad, "evaluate", count_and_evaluate)
+    load = POINT + 'amplitude = "20 N"\nfrequency = "33 Hz"\n'
+    slide = '[slide]\nkind = "sine"\namplitude = "50 um"\nfrequency = "10 Hz"\ncycles = 100\n'
+    response = run(load + COULOMB + slide).response
+    assert sum(sizes) >= response.time.size > 100 * len(sizes)
+    moves = np.diff(response.slide)
+    assert np.count_nonzero(moves) > 1000
+    expected = 0.3 * (response.load[1:] * np.sign(moves))[moves != 0]
+    assert response.force[1:][moves != 0] == pytest.approx(expected, rel=1e-13)
