@@ -64,15 +64,15 @@ def collect_law_facts(run, settings: Settings) -> LawFacts:
     if limit > 0 and not model.rig.friction.load_varies:
         force_ratio = float(np.abs(solution.response.force).max()) / limit
     return LawFacts(
-        model,
-        run.patch,
-        run.measures,
-        run.outcome,
-        float(np.abs(solution.window.slide_rate).max()),
-        force_ratio,
-        solution.book.get("created", 0.0),
-        solution.book.get("passed", 0.0),
-        settings,
+        model=model,
+        patch=run.patch,
+        measures=run.measures,
+        outcome=run.outcome,
+        speed=float(np.abs(solution.window.slide_rate).max()),
+        force_ratio=force_ratio,
+        created=solution.book.get("created", 0.0),
+        exchanged=solution.book.get("passed", 0.0),
+        settings=settings,
     )
 
 
