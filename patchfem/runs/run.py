@@ -78,7 +78,7 @@ def run(
     runnable : Plan, Scene or Model
         What to run.
     say : callable, optional
-        Callback for a line of text when code has to be compiled.
+        Callback for a line of text when code has to be compiled, or when the run is repeated with a finer resolution.
     progress : callable, optional
         Callback for the completed fraction: of all passes of a rig, or of the main pass of a bench.
     estimate : bool
