@@ -159,6 +159,7 @@ def _make_result(run: CoupledRun) -> Result:
     if model.has_interface_patches:
         snapshots = [one for one in solution.snapshots if isinstance(one, ElementSnapshot)]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
+
     return Result(
         plan=inputs.plan,
         outcome=_find_final_outcome(run),
