@@ -1214,6 +1214,8 @@ def compare(
     )
     files = [_require_path(file, "compare") for file in files]
     _require_string(piece, "compare: piece")
+
+    # A table of pairs or two results folders are compared alone.
     if pairs is not None:
         if files or predicted is not None:
             raise PatchfemError(
@@ -1228,6 +1230,7 @@ def compare(
                 "compare: give two results folders alone, without settings of traces"
             )
         return worn.answer_runs(*files).details
+
     folder = None if predicted is None else _require_path(predicted, "compare: predicted")
     return compared.answer_files(*files, options, folder, piece).details
 

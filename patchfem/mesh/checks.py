@@ -139,6 +139,8 @@ def _check_tags(mesh: TaggedMesh) -> None:
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
             f"file: {', '.join(sorted(found)[:MAX_LISTED_TAGS]) or 'none'})"
         )
+
+    # Cells without a known tag have no material. Other elements, such as edges, may have any tag.
     unknown = set()
     for block in mesh.blocks:
         if block.kind in ELEMENTS:

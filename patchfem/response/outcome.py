@@ -81,77 +81,122 @@ def judge_outcome(
     steady : dict
         The measure relative_displacement_amplitude_steady [m] by its name; {} if it is not reported.
     """
-    if (
-        solution.outcome is Outcome.STUCK
-        and not hasattr(drive, "band")
-        and is_still_loading(solution.window, drive.period, tolerance)
-    ):
+    limits = (tolerance, min_decay_rate)
+    is_random = hasattr(drive, "band")
+    is_stuck = solution.outcome is Outcome.STUCK and not is_random
+    if is_stuck and is_still_loading(solution.window, drive.period, tolerance):
         return Outcome.TRANSIENT, {}
 
-    limits = (tolerance, min_decay_rate)
+    # An outcome that the engine knows is final, unless the rig still vibrates above its stuck interfaces.
     is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
     if solution.outcome is not None and not is_ringing:
         return solution.outcome, {}
 
-    if hasattr(drive, "band"):
+    # These drives have no cycles that could be compared.
+    if is_random:
         is_stationary = stationary.is_stationary(solution.window, drive)
         return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, {}
 
-    # for several tones, each window contains whole beats
-    floor = (
-        AMPLITUDE_ROUND_OFF
-        * drive_sizes.find_max_acceleration(drive)
-        / drive_sizes.find_drive_omega(drive) ** 2
-    )
-    if not drive.segments and not drive_sizes.is_periodic(drive):
+    # For several tones, each window contains whole beats.
+    scale = drive_sizes.find_max_acceleration(drive) / drive_sizes.find_drive_omega(drive) ** 2
+    floor = AMPLITUDE_ROUND_OFF * scale
+    is_periodic = drive_sizes.is_periodic(drive)
+    if not drive.segments and not is_periodic:
         return classify(solution.amplitudes, tolerance, floor), {}
 
-    amplitudes = solution.amplitudes
-    extremes = solution.extremes
-    window = _count_window_cycles(solution, drive)
-
     # The levels before the last one have other amplitudes.
+    window = _count_window_cycles(solution, drive)
     if level_cycles:
-        amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
-        extremes = None if extremes is None else extremes[-int(level_cycles) :]
-
-    if not drive_sizes.is_periodic(drive):
-        outcome = Outcome.STEADY
-        if amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
-            outcome = classify(amplitudes, tolerance, floor)
-            drift = _midpoint_drift(extremes, window)
-            outcome = _reject_drifting(outcome, measures, tolerance, drift)
-        if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
-            outcome = Outcome.TRANSIENT
+        extremes = solution.extremes
+        solution = replace(
+            solution,
+            amplitudes=solution.amplitudes[-max(1, int(level_cycles / window)) :],
+            extremes=None if extremes is None else extremes[-int(level_cycles) :],
+        )
+    if not is_periodic:
+        return _judge_release(solution, measures, drive, limits, floor), {}
+    outcome, steady = _judge_periodic(solution, measures, drive, limits, floor)
+    if is_ringing:
+        outcome = Outcome.TRANSIENT
+    if outcome is Outcome.GROWS or np.isnan(steady.value):
         return outcome, {}
 
+    # The steady estimate is reported only where the amplitude will still change.
+    base = measures[AMPLITUDE]
+    estimate = (steady.value, steady.error, base.value)
+    if outcome is not Outcome.TRANSIENT and not is_still_changing(*estimate, tolerance):
+        return outcome, {}
+    total = steady_estimate_error(*estimate, base.error or 0.0)
+    return outcome, {STEADY_AMPLITUDE: replace(steady, error=float(total))}
+
+
+def _judge_release(
+    solution, measures: Measures, drive, limits: tuple[float, float], floor: float
+) -> Outcome:
+    """Classify a motion after a release or a step.
+
+    Parameters
+    ----------
+    solution : Solution
+        Amplitudes and extremes of the cycles.
+    measures : dict
+        Measures by name.
+    drive
+        Drive with segments.
+    limits : tuple of float
+        Relative tolerance, and smallest decay rate of a mode [1/s].
+    floor : float
+        Round-off of the amplitude [m].
+    """
+    tolerance, min_decay_rate = limits
+    if not solution.amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
+        return Outcome.STEADY
+
+    drift = _midpoint_drift(solution.extremes, _count_window_cycles(solution, drive))
+    outcome = classify(solution.amplitudes, tolerance, floor)
+    outcome = _reject_drifting(outcome, measures, tolerance, drift)
+    # Under a step or if a mode gains energy, the motion may grow.
+    if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
+        return Outcome.TRANSIENT
+    return outcome
+
+
+def _judge_periodic(
+    solution, measures: Measures, drive, limits: tuple[float, float], floor: float
+) -> tuple[Outcome, Measure]:
+    """Classify a motion under a periodic drive; return also the steady estimate of its amplitude, NaN if there is none.
+
+    Parameters
+    ----------
+    solution : Solution
+        Amplitudes and extremes of the cycles, and steady estimate with its error.
+    measures : dict
+        Measures by name.
+    drive
+        Periodic drive.
+    limits : tuple of float
+        Relative tolerance, and smallest decay rate of a mode [1/s].
+    floor : float
+        Round-off of the amplitude [m].
+    """
+    tolerance, min_decay_rate = limits
+    window = _count_window_cycles(solution, drive)
+    extremes = solution.extremes
+    # The criteria are vectorized over cases, of which there is one.
     number, steady, error = (
         one[0]
         for one in classify_periodic(
-            np.asarray(amplitudes, float)[None],
+            np.asarray(solution.amplitudes, float)[None],
             None if extremes is None else np.asarray(extremes)[None],
             window,
             [np.array([np.nan if one is None else one]) for one in solution.steady],
             (tolerance, floor, max(min_decay_rate, 0.0) * window * drive.period),
         )
     )
-
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
-    if is_ringing:
-        outcome = Outcome.TRANSIENT
-    if outcome is Outcome.GROWS or np.isnan(steady):
-        return outcome, {}
-
-    base = measures[AMPLITUDE]
-    if outcome is not Outcome.TRANSIENT and not is_still_changing(
-        steady, error, base.value, tolerance
-    ):
-        return outcome, {}
-    total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
-    measure = Measure(float(steady), "m", float(total), base.floor)
-    return outcome, {STEADY_AMPLITUDE: measure}
+    return outcome, Measure(float(steady), "m", float(error), measures[AMPLITUDE].floor)
 
 
 def _count_window_cycles(solution, drive) -> int:

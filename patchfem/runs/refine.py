@@ -223,7 +223,7 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
         error = earlier.error / ERROR_RATIO
         if error > measure.error and np.isfinite(error):
             causes = measure.causes
-            if earlier.causes is not None:
+            if causes is not None and earlier.causes is not None:
                 parts = {axis: one / ERROR_RATIO for axis, one in earlier.causes.parts.items()}
                 causes = causes._replace(parts=parts)
             bounded[name] = replace(measure, error=error, causes=causes)

@@ -78,7 +78,7 @@ def run(
     runnable : Plan, Scene or Model
         What to run.
     say : callable, optional
-        Callback for a line of text when code has to be compiled.
+        Callback for a line of text when code has to be compiled, or when the run is repeated with a finer resolution.
     progress : callable, optional
         Callback for the completed fraction: of all passes of a rig, or of the main pass of a bench.
     estimate : bool
@@ -205,15 +205,15 @@ class _Passes:
             notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
         notes += model.describe_removed_joint()
         inputs = RunInputs(
-            run_plan,
-            pressed,
-            seconds,
-            warnings,
-            notes,
-            self.say,
-            self.progress,
-            self.estimate,
-            stiffer,
+            plan=run_plan,
+            faces=pressed,
+            seconds=seconds,
+            warnings=warnings,
+            notes=notes,
+            say=self.say,
+            progress=self.progress,
+            estimate=self.estimate,
+            stiffer=stiffer,
         )
 
         if _is_open(inputs.patch) and model.kind != "patch":
@@ -336,12 +336,12 @@ def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
 def _make_result_without_load(inputs: RunInputs) -> Result:
     """Return the Result of a rig whose interfaces carry no load."""
     return Result(
-        inputs.plan,
-        Outcome.NO_CONTACT,
-        {"normal_load": Measure(0.0, "N", 0.0)},
-        inputs.seconds,
-        [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
-        inputs.notes,
+        plan=inputs.plan,
+        outcome=Outcome.NO_CONTACT,
+        measures={"normal_load": Measure(0.0, "N", 0.0)},
+        seconds=inputs.seconds,
+        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
+        notes=inputs.notes,
     )
 
 

@@ -72,6 +72,17 @@ def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
     assert np.all(np.diff(result.response.time) >= 0)
 
 
+def test_always_progress_counts_levels_and_coarser_runs():
+    """The completed fraction grows from level to level to 1; with errors, the coarser run is a part of it."""
+    scene = loads(RIG.format(levels='["1 g", "2 g", "4 g", "5 g"]'))
+    alone, all_runs = [], []
+    run(scene, progress=alone.append, estimate=False)
+    run(scene, progress=all_runs.append)
+    assert alone == pytest.approx([0.25, 0.5, 0.75, 1.0])
+    assert all_runs[:4] == pytest.approx([0.125, 0.25, 0.375, 0.5])
+    assert all_runs == sorted(all_runs) and 0.5 < all_runs[-1] <= 1.0
+
+
 def run_single_level(level: str):
     """Return a run at one drive level [g] from rest."""
     text = (

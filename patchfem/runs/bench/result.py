@@ -63,15 +63,15 @@ def run_prescribed(inputs: RunInputs) -> Result:
 
     # What the law shows in this motion decides on its warnings and notes.
     facts = LawFacts(
-        model,
-        patch,
-        measures,
-        Outcome.DONE,
-        model.speed_scale,
-        peak_ratio,
-        fine.values["energy_created"],
-        float(np.abs(np.diff(fine.ledger[0])).sum()),
-        settings,
+        model=model,
+        patch=patch,
+        measures=measures,
+        outcome=Outcome.DONE,
+        speed=model.speed_scale,
+        force_ratio=peak_ratio,
+        created=fine.values["energy_created"],
+        exchanged=float(np.abs(np.diff(fine.ledger[0])).sum()),
+        settings=settings,
     )
     warnings = [
         *inputs.warnings,
@@ -96,18 +96,18 @@ def run_prescribed(inputs: RunInputs) -> Result:
     if not (inputs.estimate and inputs.has_error_meshes):
         measures = remove_errors(measures)
     return Result(
-        inputs.plan,
-        check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide),
-        set_final_floors(measures, model.accuracy.tolerance),
-        inputs.seconds,
-        warnings,
-        [*inputs.notes, *list_law_notes(facts)],
-        patch,
-        fields,
-        fine,
-        fine,
-        settings,
-        MotionData(step_runs=tuple(error_estimates.step_runs)),
+        plan=inputs.plan,
+        outcome=check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide),
+        measures=set_final_floors(measures, model.accuracy.tolerance),
+        seconds=inputs.seconds,
+        warnings=warnings,
+        notes=[*inputs.notes, *list_law_notes(facts)],
+        patch=patch,
+        fields=fields,
+        response=fine,
+        window=fine,
+        settings=settings,
+        motion=MotionData(step_runs=tuple(error_estimates.step_runs)),
     )
 
 

@@ -113,7 +113,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     shear = None
     if model.partial_slip:
         # An unstable patch could jump without a change of the drive, so it is rejected as under a constant load.
-        length = _find_length(law)
+        length = _find_yield_length(law)
         weakening = _find_weakening(law)
         if weakening != 1:
             _choose_modes(patch, law.static * force, length, 1, 1.0, weakening)
@@ -135,7 +135,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     )
 
 
-def _find_length(law) -> float:
+def _find_yield_length(law) -> float:
     """Return the length [m] over which a law reaches its friction limit; 0 for rigid friction."""
     return getattr(law, "length", None) or law.bond_length or 0.0
 
@@ -225,7 +225,7 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
 
     # Coulomb's law yields at once; a length far below the slide at gross slip, sum(limit) / k_t,
     # replaces the jump.
-    length = _find_length(law)
+    length = _find_yield_length(law)
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)

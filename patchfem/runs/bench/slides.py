@@ -164,13 +164,12 @@ def _find_limit_fraction(model, moves, durations) -> np.ndarray:
 
 def _find_limit_tractions(task: SlideTask, sample: int, direction: float) -> np.ndarray:
     """Return the largest tractions (m,) [Pa] against a motion to +x (`direction` 1) or to -x (-1)."""
-    friction = task.model.friction
     sigma = task.evaluate_pressure([sample])[0]
-    if task.patch is not None and law_has_trait(friction.law, "averaged"):
+    if _averages_pressure(task):
         offset = task.slide[sample] if task.model.side == "lower" else 0.0
         average = averaged_law.average_behind(task.model, task.patch, direction, offset)
         sigma = np.where(sigma > 0, average, 0.0)
-    return sigma * (friction.static if friction.kinetic is None else friction.kinetic)
+    return sigma * _find_coefficient(task)
 
 
 def _find_limits(task: SlideTask, direction: float) -> np.ndarray:
@@ -178,8 +177,22 @@ def _find_limits(task: SlideTask, direction: float) -> np.ndarray:
     if not has_changing_pressure(task.model):
         limit = float(_find_limit_tractions(task, 0, direction) @ task.weight)
         return np.full(task.slide.size, limit)
+    # Only an averaged pressure depends on more than the load.
+    if not _averages_pressure(task):
+        return _find_coefficient(task) * task.compute_loads()
     samples = range(task.slide.size)
     return np.array([_find_limit_tractions(task, k, direction) @ task.weight for k in samples])
+
+
+def _averages_pressure(task: SlideTask) -> bool:
+    """Return whether the law averages the pressure of a patch over the surface that a node has passed."""
+    return task.patch is not None and law_has_trait(task.model.friction.law, "averaged")
+
+
+def _find_coefficient(task: SlideTask) -> float:
+    """Return the coefficient of friction [1] of a law without memory in motion."""
+    friction = task.model.friction
+    return friction.static if friction.kinetic is None else friction.kinetic
 
 
 def find_rest_ends(model, slide) -> dict[int, float]:

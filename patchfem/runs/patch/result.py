@@ -88,14 +88,14 @@ def make_static_result(inputs: RunInputs) -> Result:
     if pressure.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     return Result(
-        inputs.plan,
-        pressure.outcome,
-        static_measures(inputs.plan.model, patch, inputs.coarse),
-        inputs.seconds,
-        warnings,
-        inputs.notes,
-        patch,
-        collect_rest_frame(patch),
+        plan=inputs.plan,
+        outcome=pressure.outcome,
+        measures=static_measures(inputs.plan.model, patch, inputs.coarse),
+        seconds=inputs.seconds,
+        warnings=warnings,
+        notes=inputs.notes,
+        patch=patch,
+        fields=collect_rest_frame(patch),
     )
 
 

@@ -79,7 +79,7 @@ def _warn_of_infinite_traction(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
-    """Warn of bonds that slide by a part of their length while they form."""
+    """Warn of the printed law if bonds slide by more than MAX_FORMING_RATIO of their length while they form."""
     law = find_bonds(facts.model)
     if law is None or law.reading != "report":
         return
@@ -111,7 +111,7 @@ def _warn_of_creep(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_created_energy(facts: LawFacts) -> Iterator[str]:
-    """Warn if the law of the 1985 report has created energy."""
+    """Warn if the printed law of the 1985 report has created more than MAX_CREATED_FRACTION of the work exchanged."""
     friction = facts.model.friction
     if friction is None or friction.reading != "report":
         return
@@ -163,7 +163,7 @@ def _warn_of_work_check(facts: LawFacts) -> Iterator[str]:
 
 
 def _note_on_growth(facts: LawFacts) -> Iterator[str]:
-    """Note the effects of growing bonds."""
+    """Note what growing bonds do: initial bonds of the printed law do not grow; others may exceed the friction limit."""
     law = find_bonds(facts.model)
     if law is None or not law.has_growth:
         return
@@ -193,10 +193,9 @@ def _note_on_growth(facts: LawFacts) -> Iterator[str]:
 
 
 def _note_on_groove_slope(facts: LawFacts) -> Iterator[str]:
-    """Note on grooves under pieces that are compliant in shear.
+    """Note that the slope of grooves is the same for all points of pieces that deform in shear.
 
-    All points take the slope of the grooves at the displacement of the holders. The note reports
-    how far a point may be from this displacement.
+    It is taken at the displacement of the holders. The note states how far a point may be from this displacement.
     """
     model = facts.model
     if model.grooves is None or not model.partial_slip:

@@ -219,10 +219,10 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     )
 
 
-def _spread_elements(stiffness, slide) -> tuple[np.ndarray, np.ndarray]:
-    """Spread friction elements at mesh nodes over the yield displacements between the nodes."""
-    order = np.argsort(slide, kind="stable")
-    return spread_elements(stiffness[order], slide[order])
+def _spread_elements(stiffness, yield_displacement) -> tuple[np.ndarray, np.ndarray]:
+    """Spread friction elements at mesh nodes, in any order, over the yield displacements between the nodes."""
+    order = np.argsort(yield_displacement, kind="stable")
+    return spread_elements(stiffness[order], yield_displacement[order])
 
 
 class DecayMeshErrors(NamedTuple):

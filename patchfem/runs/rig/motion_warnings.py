@@ -64,20 +64,20 @@ def collect_law_facts(run, settings: Settings) -> LawFacts:
     if limit > 0 and not model.rig.friction.load_varies:
         force_ratio = float(np.abs(solution.response.force).max()) / limit
     return LawFacts(
-        model,
-        run.patch,
-        run.measures,
-        run.outcome,
-        float(np.abs(solution.window.slide_rate).max()),
-        force_ratio,
-        solution.book.get("created", 0.0),
-        solution.book.get("passed", 0.0),
-        settings,
+        model=model,
+        patch=run.patch,
+        measures=run.measures,
+        outcome=run.outcome,
+        speed=float(np.abs(solution.window.slide_rate).max()),
+        force_ratio=force_ratio,
+        created=solution.book.get("created", 0.0),
+        exchanged=solution.book.get("passed", 0.0),
+        settings=settings,
     )
 
 
 def _warn_of_single_points(run) -> list[str]:
-    """Warn of patches that move exactly like single points."""
+    """Warn of patches whose shape has no effect, because they move exactly like single points."""
     return merge_sentences(
         run.model,
         run.inputs.faces,
@@ -95,7 +95,7 @@ def _is_single_point(run, face: Face) -> bool:
 
 
 def _warn_of_shear_modes(run) -> Iterator[str]:
-    """Tell how many shear modes replace the nodes of a patch whose load varies, or on grooves."""
+    """Warn of a patch whose nodes are replaced by shear modes, because its load changes or it slides over grooves."""
     model = run.model
     contact = run.solution.contact
     reduction = getattr(contact, "reduction", None)
@@ -115,7 +115,10 @@ def _warn_of_shear_modes(run) -> Iterator[str]:
 
 
 def _warn_of_engine(run) -> Iterator[str]:
-    """Pass on what outcome and engine say of the motion; an end at the grooves is no defect of the run."""
+    """Warn of what the engine reports: an unfinished change of the drive, its own messages, and remaining vibration.
+
+    An end at the grooves is no defect of the run, so that it is a note (`_note_on_end`).
+    """
     solution = run.solution
     yield from note_on_changing_drive(run.outcome, run.drive)
     yield from solution.notes
@@ -138,8 +141,8 @@ def _warn_of_ringing(run) -> Iterator[str]:
         yield describe_ringing(ratio, limits, run.numerics.cycles)
 
 
-def _warn_of_peak_at_sweep_end(run) -> Iterator[str]:
-    """Warn if the largest response is at an end of the sweep."""
+def _warn_of_peak_at_end_frequency(run) -> Iterator[str]:
+    """Warn if the largest response of a sweep lies at its lowest or highest frequency."""
     peak = run.measures.get("peak_frequency")
     if peak is None or not peak.value or not run.measures[AMPLITUDE].value > 0:
         return
@@ -156,7 +159,7 @@ def _warn_of_peak_at_sweep_end(run) -> Iterator[str]:
 
 
 def _warn_of_large_slides(run) -> list[str]:
-    """Warn of slides that are large compared with the contact."""
+    """Warn of interfaces that slide by a large part of their contact, at which the computation keeps the pressure."""
     return merge_sentences(
         run.model,
         run.inputs.faces,
@@ -165,13 +168,13 @@ def _warn_of_large_slides(run) -> list[str]:
 
 
 def _note_on_fields_of_strips(run) -> Iterator[str]:
-    """Note that strips that slip part by part have no fields of the motion."""
+    """Note that the fields lack slip and shear stress if strips slip part by part."""
     if run.patch is not None and run.patch.strips is not None and run.model.partial_slip:
         yield "strips that slip part by part have no common shear stress, so the fields contain only the pressure"
 
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:
-    """Note on a steady motion in which some elements never slip."""
+    """Note that a steady motion is not unique if some elements of the joint never slip in it."""
     is_steady = run.solution.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
     is_found = ENGINES[run.numerics.engine].finds_periodic_motion
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
@@ -190,8 +193,8 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
             return
 
 
-def _note_on_onset(run) -> Iterator[str]:
-    """Note on the slip that counts as the onset of drive levels."""
+def _note_on_smallest_slip_of_onset(run) -> Iterator[str]:
+    """Note the smallest slip that counts as the onset, in a run of drive levels whose interface is elastic in stick."""
     solution = run.solution
     is_by_slip = run.model.rig.drive.levels.onset[0] == "slip"
     if solution.levels and is_by_slip and solution.stick_tolerance > 0:
@@ -223,13 +226,13 @@ WARNINGS = (
     _warn_of_single_points,
     _warn_of_shear_modes,
     _warn_of_engine,
-    _warn_of_peak_at_sweep_end,
+    _warn_of_peak_at_end_frequency,
     _warn_of_large_slides,
 )
 NOTES = (
     _note_on_fields_of_strips,
     _note_on_elements_without_slip,
-    _note_on_onset,
+    _note_on_smallest_slip_of_onset,
     lambda run: note_on_creep(run.model.friction),
     _note_on_end,
 )

@@ -32,7 +32,6 @@ class Numerics:
     - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
-    - per_point: whether every node has its own bonds.
     - pinned: names of settings that the scene fixes.
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window; coarse runs may omit them.
@@ -48,7 +47,6 @@ class Numerics:
     cycles: float
     window: int
     shear_modes: int | None
-    per_point: bool
     pinned: frozenset
     choice: object = None
     whole: bool = True
@@ -107,15 +105,7 @@ def choose_numerics(model: Model) -> Numerics:
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
     pinned = frozenset(key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None)
-    numerics = Numerics(
-        engine.name,
-        steps,
-        cycles,
-        window,
-        accuracy.shear_modes,
-        model.side == "lower",
-        pinned,
-    )
+    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes, pinned)
 
     if engine is HYBRID:
         # A linear rig needs few steps.

@@ -123,9 +123,8 @@ def run_rig(inputs: RunInputs) -> Result:
     run = run_refined(inputs, numerics)
 
     # The reasons of missing values depend on the outcome, so that they come after it.
-    tolerance = model.accuracy.tolerance
     if run.solution.levels and run.has_friction:
-        onset = levels.measure_onset_level(rig, run.solution, tolerance)
+        onset = levels.measure_onset_level(rig, run.solution, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
     if rig.drive.kind == "free" and run.has_errors:
@@ -133,40 +132,47 @@ def run_rig(inputs: RunInputs) -> Result:
     if run.has_friction and find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
+    return _make_result(run)
+
+
+def _make_result(run: CoupledRun) -> Result:
+    """Return the Result of a run whose measures are complete."""
+    inputs = run.inputs
+    model = run.model
+    solution = run.solution
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
     settings = _collect_settings(run)
     warnings, notes = collect_remarks(run, settings)
     notes = [*inputs.notes, *notes, *run.notes]
-    measures = set_final_floors(run.measures, tolerance)
+    measures = set_final_floors(run.measures, model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
-    if rig.drive.waveform.is_random:
-        notes += stationary.warn_if_short(measures, run.solution.window)
+    if model.rig.drive.waveform.is_random:
+        notes += stationary.warn_if_short(measures, solution.window)
 
-    solution = run.solution
+    # Interfaces with patches of their own have fields of their own.
     fields = {}
     if inputs.patch is not None:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
-
-    # Interfaces with patches of their own have fields of their own.
     moved = ()
     if model.has_interface_patches:
         snapshots = [one for one in solution.snapshots if isinstance(one, ElementSnapshot)]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
+
     return Result(
-        inputs.plan,
-        _find_final_outcome(run),
-        measures,
-        inputs.seconds,
-        [*inputs.warnings, *warnings],
-        notes,
-        inputs.patch,
-        fields,
-        solution.response,
-        solution.window,
-        settings,
-        _collect_motion(run),
+        plan=inputs.plan,
+        outcome=_find_final_outcome(run),
+        measures=measures,
+        seconds=inputs.seconds,
+        warnings=[*inputs.warnings, *warnings],
+        notes=notes,
+        patch=inputs.patch,
+        fields=fields,
+        response=solution.response,
+        window=solution.window,
+        settings=settings,
+        motion=_collect_motion(run),
         faces=moved,
     )
 
@@ -451,12 +457,12 @@ def _collect_motion(run: CoupledRun) -> MotionData:
     if drive.waveform.is_random:
         spectra = stationary.compute_spectra(solution.window, drive.signal)
     return MotionData(
-        run.drive.period,
-        solution.book,
-        run.step_runs,
-        levels.convert_to_scene_units(run.model.rig, solution.levels),
-        solution.log,
-        run.decay,
-        spectra,
-        solution.periodic,
+        period=run.drive.period,
+        energies=solution.book,
+        step_runs=run.step_runs,
+        levels=levels.convert_to_scene_units(run.model.rig, solution.levels),
+        events=solution.log,
+        decay=run.decay,
+        spectra=spectra,
+        steady=solution.periodic,
     )

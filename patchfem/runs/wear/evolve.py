@@ -30,7 +30,6 @@ from ..patch.press import (
     solve_patch_contact,
 )
 from ..patch.values import compute_static_values
-from ..rig import numerics
 from .slip import (
     CycleSlip,
     choose_frame_count,
@@ -120,9 +119,7 @@ class _SlipPathFunction:
             model.grooves is None
             and model.wear.friction is None
             and not strips_slide_independently(model)
-            and slips_uniformly(
-                model, model.rig is not None and numerics.choose_numerics(model).per_point
-            )
+            and slips_uniformly(model)
         )
         self.last: CycleSlip | None = None
 

@@ -137,16 +137,9 @@ def choose_frame_count(tolerance: float) -> int:
     return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_CYCLE_FRAMES))
 
 
-def slips_uniformly(model, per_point: bool = False) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip by equal distances.
-
-    per_point: whether the engine of a rig follows each node by itself.
-    """
-    return (
-        not model.partial_slip
-        and model.side == "upper"
-        and (model.patch.interface.strips is not None or not per_point)
-    )
+def slips_uniformly(model) -> bool:
+    """Return whether all points of a patch, or of each of its strips, slip by equal distances."""
+    return not model.partial_slip and model.side == "upper"
 
 
 def strips_slide_independently(model) -> bool:
@@ -247,7 +240,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
         Number of frames in the last cycle, if the nodes do not slip alike.
     """
     settings = numerics.choose_numerics(model)
-    is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
+    is_uniform = slips_uniformly(model)
     solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
 
     # A motion without bound has no slip path (the caller stops the wear).

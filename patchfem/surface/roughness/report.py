@@ -242,6 +242,7 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
         raise PatchfemError(
             f"{surface.source}: a window needs a first and a last position along {' and along '.join(names)}"
         )
+
     axes = {}
     parts = []
     for name, first, last in zip(names, ends[::2], ends[1::2]):
@@ -252,6 +253,8 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
                 f"{surface.source}: the window runs from {format_length(first)} to {format_length(last)}, but the "
                 f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
             )
+
+        # A position that differs from a sample by round-off counts as this sample.
         low, high = np.maximum(np.searchsorted(axis, np.add((first, last), near), "right") - 1, 0)
         if low == high:
             raise PatchfemError(
@@ -259,6 +262,8 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
             )
         parts.append(slice(low, high + 1))
         axes[name] = axis[parts[-1]]
+
+    # Rows of the heights are along y.
     return replace(surface, **axes, z=surface.z[tuple(reversed(parts))])
 
 
