@@ -101,7 +101,7 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence
         Further words.
     """
     name = Path(path).name
-    if name.startswith("<") and name.endswith(">"):
+    if name.startswith("<"):  # such as "<text>"
         return ""
     words = ["patchfem", verb, name]
     for assignment in sets:
