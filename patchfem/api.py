@@ -479,8 +479,8 @@ def backbone(
 ) -> Dataset:
     """Compute frequency and damping ratio of a mode, and the force of its phase resonance, against its amplitude.
 
-    Every value has a numerical error estimate. The band of the recommended curve is its error and the difference of the
-    methods.
+    Every value has an estimate of its numerical error. The recommended curve has a band, which holds this error and the
+    difference between both methods.
 
     Parameters
     ----------
@@ -506,12 +506,16 @@ def backbone(
     Returns
     -------
     xarray.Dataset
-        Variables and amplitudes of each method. Attributes are `free_frequency` and `stuck_frequency` [Hz], the exponents
-        `exponent_micro` and `exponent_gross` of the energy dissipated per cycle, and `flutter_amplitude` [m], where they
-        are known. The attribute `notes` is a list of sentences (xarray reads a list with one sentence from a netCDF file as
-        a string); `missing` gives the reason if a method has no curve. The variables with the prefix "band"
-        are limits of the curve of the recommended method, whose name is the attribute `method`; `advice` describes where
-        each method is valid.
+        Variables and amplitudes of each method; those with the prefix "band" are limits of the recommended curve. The
+        attributes, where they are known, are:
+
+        - `free_frequency`, `stuck_frequency`: frequency without the contact and with a sticking contact [Hz].
+        - `exponent_micro`, `exponent_gross`: exponents of the energy dissipated per cycle in micro-slip and gross slip.
+        - `flutter_amplitude`: amplitude above which the mode gains energy [m].
+        - `method`: name of the recommended method.
+        - `advice`: text on where each method is valid.
+        - `missing`: reason why a method has no curve.
+        - `notes`: list of sentences; xarray reads a list with one sentence from a netCDF file as a string.
 
     Raises
     ------
@@ -537,13 +541,17 @@ def backbone(
         loaded = _load_and_prepare(scene, tables, values)
         return build_model(remember_written(loaded, _count_written(scene), tables))
 
+    # `build_with` has its own `sets`, those of a value of `over`
     changes = sets
     if not isinstance(modes, str) and isinstance(modes, Iterable):
+        # an iterator can be read only once, but each value of `over` has the same modes
         modes = list(modes)
     if isinstance(scene, Model) and (modes or over):
         raise PatchfemError(
             f"backbone: {'modes' if modes else 'over'} cannot be given with a Model; give the scene"
         )
+
+    # values become texts as on the command line, with the unit of a key of the same kind
     texts = []
     for values, kind in ((amplitudes, "length"), (forces, "force")):
         key = assignments.POSITIVE_KEYS[kind][0]
@@ -552,6 +560,7 @@ def backbone(
             raise PatchfemError("backbone: the list of amplitudes or forces is empty")
     if len(over or {}) > 1:
         raise PatchfemError("backbone: `over` must have one key with its values")
+
     request = backbone_requests.BackboneRequest(
         _require_string(mode, "backbone: mode"),
         *texts,
@@ -626,16 +635,20 @@ def sweep(
             f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}"
         )
     values_by_key = over or {}
-    if mistakes := find_oversized_lengths(values_by_key):
-        raise SceneError(mistakes)
+    mistakes = find_oversized_lengths(values_by_key)
     for key, values in values_by_key.items():
         if hasattr(values, "__len__") and not len(values):
-            raise SceneError([f"{key}: the sweep has no value for this key"])
+            mistakes.append(f"{key}: the sweep has no value for this key")
+    if mistakes:
+        raise SceneError(mistakes)
+
+    # the cases are those of the command line, whose words the answer names
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed)
     command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets, request.list_options())
     cases = replace(parse_request.read_cases(sweep_scene, request), command=command)
+
     pool = executors.make_executor(executor, jobs)
     if out is None:
         answer = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)

@@ -58,6 +58,25 @@ def test_exact_page_names_command(tmp_path):
     assert command in (tmp_path / "drawn" / "report.html").read_text("utf-8")
 
 
+def test_exact_page_of_scene_without_file_names_no_command(tmp_path):
+    """A scene that is given as a text has no file that a command could name, in a sweep and in a run."""
+    pf.sweep(BENCH, {"friction.static": [0.1, 0.3]}, out=tmp_path / "swept")
+    pf.run(BENCH).save(tmp_path / "run")
+    for name in ("swept", "run"):
+        assert not store.read(tmp_path / name).origin["command"]
+        assert "To repeat it" not in (tmp_path / name / "report.html").read_text("utf-8")
+
+
+def test_refuses_all_keys_without_values():
+    """Each key with an empty list of values is named."""
+    with pytest.raises(pf.SceneError) as caught:
+        pf.sweep(BENCH, {"friction.static": [], "normal.load": ""})
+    assert all(
+        f"{key}: the sweep has no value" in str(caught.value)
+        for key in ("friction.static", "normal.load")
+    )
+
+
 def test_refuses_invalid_sweep():
     """A sweep without axes, with an unknown unit or with a negative seed is refused."""
     with pytest.raises(pf.SceneError, match="no key to sweep is given"):

@@ -122,11 +122,10 @@ def _make_quantities(backbone: Backbone) -> Quantities:
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
 
     # a missing frequency is shown with its reason, other missing values are left out
-    no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
     out |= {
         "free_frequency": Quantity(frequencies.free, "Hz", frequencies.free_error or None),
         "stuck_frequency": Quantity(
-            frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
+            frequencies.stuck, "Hz", frequencies.stuck_error, reason=frequencies.reason
         ),
         "exponent_micro": Quantity(backbone.exponents.micro),
         "exponent_gross": Quantity(backbone.exponents.gross),

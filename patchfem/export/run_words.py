@@ -34,13 +34,11 @@ AREA_ROUND_OFF = 1e-12
 # deviation from the final position, relative to this position, at which a released output is at rest
 REST_FRACTION = 5e-3
 ZERO_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
-MIN_DECAY_AMPLITUDES = (
-    5  # smallest number of amplitudes of a decay for which its damping is printed
-)
+# Smallest number of amplitudes of a decay for which its damping is printed.
+MIN_DECAY_AMPLITUDES = 5
 SCATTER = "_scatter"  # end of the name of a measure that states the scatter between random records
-SAME_INPUT_FRACTION = (
-    0.01  # largest relative difference of the measured input from the drive of the run
-)
+# Largest relative difference of the measured input from the drive of the run.
+SAME_INPUT_FRACTION = 0.01
 CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
 
 # parts of a headline: (measure, text); a run shows the first MAX_PARTS that it has

@@ -87,7 +87,7 @@ def make_origin(source, verb: str) -> JsonObject:
 
 
 def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence[str] = ()) -> str:
-    """Return the command line that repeats a verb.
+    """Return the command line that repeats a verb; "" for a scene without a file, which Python gave as text or dict.
 
     Parameters
     ----------
@@ -100,7 +100,10 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence
     options : sequence of str, optional
         Further words.
     """
-    words = ["patchfem", verb, Path(path).name]
+    name = Path(path).name
+    if name.startswith("<"):  # such as "<text>"
+        return ""
+    words = ["patchfem", verb, name]
     for assignment in sets:
         key, _, value = assignment.partition("=")
         words += ["--set", f"{key}={Path(value).name if value.startswith('/') else value}"]

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import compute_backbone
+from patchfem.export import backbones
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -54,6 +55,23 @@ def test_exact_joint_without_friction_is_linear():
         assert backbone[f"{method}_frequency"].values == pytest.approx([100.0, 100.0], rel=1e-12)
         assert backbone[f"{method}_damping"].values == pytest.approx([0.002, 0.002], rel=1e-9)
     assert any("No friction acts" in note for note in backbone.notes)
+
+
+@pytest.mark.parametrize(
+    "law, static, reason",
+    [
+        (PLASTIC, 0.0, "no friction acts"),
+        ('law = "coulomb"', 0.3, "a rigid contact leaves no motion"),
+    ],
+)
+def test_missing_stuck_frequency_has_its_reason(law, static, reason):
+    """Without friction nothing sticks, and a rigid contact holds the only mode: both give the reason."""
+    scene = pf.load(make_shaken_block(law), **{"friction.static": static})
+    model = pf.build(scene)
+    backbone = compute_backbone(model, "", [1e-5], ("quasi-static",))
+    answer = backbones.make_answer(backbone, model.source)
+    assert answer.quantities["stuck_frequency"].value is None
+    assert answer.quantities["stuck_frequency"].reason == reason
 
 
 def test_exact_balanced_motion_repeats_after_a_cycle():

@@ -215,6 +215,7 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
         ({"forces": ["1 N"], "amplitudes": ["1 um"]}, "give only one of them"),
         ({"over": {"friction.statik": [0.1, 0.2]}}, "statik"),
         ({"over": {"friction.static": [0.1], "normal.load": ["1 N"]}}, "one key"),
+        ({"over": {"structure.mode[1].damping": [0.3, -7]}}, "^--over: .*damping: must be"),
     ],
 )
 def test_refuses_invalid_forces_and_keys(options, message):

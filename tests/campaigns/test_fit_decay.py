@@ -154,6 +154,21 @@ def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
     )
 
 
+class CurveWithGap(curves.CurveModel):
+    """Curve of a model that has no value at the largest amplitude."""
+
+    def _compute(self, values, method):
+        """Return constant frequency and damping with a gap."""
+        return np.array([[100.0, np.nan], [0.01, np.nan]])
+
+
+def test_exact_curve_with_a_gap_is_refused_with_its_place():
+    """A method without a value at a measured amplitude is refused with this amplitude, which is named once."""
+    model = CurveWithGap(pf.load(IWAN), parse_ranges(["friction.chi=-0.9..-0.05"]), AMPLITUDES)
+    with pytest.raises(PatchfemError, match="not oscillate at 1 of 2 amplitudes, at 20 um; leave"):
+        model.compute([-0.5], "balance")
+
+
 def test_refuses_fewer_values_than_parameters(tmp_path):
     """Two amplitudes are refused for four parameters.
 

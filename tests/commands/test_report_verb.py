@@ -1,5 +1,7 @@
 """`patchfem report`: pages made again from their folders, and several folders on one page."""
 
+import re
+
 import pytest
 from command_line import run_cli
 from page_data import read_charts, read_measures
@@ -32,6 +34,15 @@ def test_exact_two_runs_share_charts_and_measures(folders):
     for name, static in SETS.items():
         assert max(names[name]["y"]) == pytest.approx(float(static) * 115.6543, rel=1e-4)
     assert "friction_force_peak" in read_measures(text)
+
+
+def test_exact_page_of_a_case_lists_its_effects_without_time(folders):
+    """The summary of a case of a sweep has effects without a CPU time; its page once ended as a fault."""
+    folder = next((folders / "sweep" / "cases").iterdir())
+    assert run_cli("report", folder).code == 0
+    text = (folder / "report.html").read_text("utf-8")
+    rows = re.findall(r"<tr><td>(.*?)</td><td>.*?</td><td class=\"v\">(.*?)</td></tr>", text)
+    assert {("normal", ""), ("slide.kind=triangle", "")} <= set(rows)
 
 
 def test_refuses_folders_that_cannot_be_shown_together(folders, tmp_path):

@@ -62,6 +62,19 @@ def test_intervals_cover_frequency_and_damping(make_decay):
     assert len(is_covered) > 30 and is_covered.mean() > 0.9
 
 
+@pytest.mark.parametrize("name, power", [("displacement", 0), ("velocity", 1), ("acceleration", 2)])
+def test_exact_any_record_gives_displacement_amplitude(name, power):
+    """A displacement, velocity or acceleration record gives the same amplitude of displacement and damping."""
+    zeta = 0.02
+    w = 500.0
+    t = np.arange(2000) / 10000
+    pole = w * complex(-zeta, np.sqrt(1 - zeta**2))
+    curve, _ = compute_decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
+    assert curve.damping == pytest.approx(zeta, rel=2e-3)
+    expected = 1e-3 * np.exp(-zeta * w * curve.time)
+    assert curve.amplitude == pytest.approx(expected, rel=2e-3)
+
+
 @pytest.mark.parametrize("name", ["displacement", "velocity", "acceleration"])
 def test_damping_is_that_of_the_displacement_where_the_frequency_changes(name):
     """Where the frequency rises in a decay, each kind of record has the damping of the displacement within its interval.

@@ -1,5 +1,7 @@
 """Bounded least squares compared with linear algebra, closed-form profiles and known solutions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import t as student
@@ -222,6 +224,31 @@ def make_failing_residual(error):
         raise error
 
     return residual
+
+
+def test_exact_counts_contain_every_evaluation():
+    """The counts of a search contain its last descent and its failures, and those of an earlier search if asked.
+
+    Once the evaluations of the last descent, and those of the search by the quasi-static curve, were lost.
+    """
+    calls = []
+
+    def residual(values):
+        calls.append(values)
+        if values[0] > 4:
+            raise PatchfemError("too large")
+        return DESIGN @ values - NOISY
+
+    problem = Problem(residual, [-5, -5, -5], [5, 5, 5])
+    fit = problem.search(Search(3, seed=1))
+    assert fit.counts.evaluations == len(calls)
+    first = problem.solve(4, "")
+    second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
+    assert fit.counts.evaluations + second.counts.evaluations == len(calls)
+    assert second.n_best == first.n_best == 4
+    failures = fit.counts.failures + second.counts.failures
+    assert failures == sum(values[0] > 4 for values in calls) > 0
+    assert second.counts.reason == "too large"
 
 
 def test_exact_descent_begins_at_bound_beside_failures():

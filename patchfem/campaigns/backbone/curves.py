@@ -269,7 +269,8 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     if model.rig.springs.interlock is not None:
         free = find(modes.interfaces[:1], model.rig.springs.interlock[0])
     if joint.stuck_mode.omega is None:
-        return ModeFrequencies(free, None)
+        reason = "no friction acts" if joint.is_linear else "a rigid contact leaves no motion"
+        return ModeFrequencies(free, None, reason=reason)
     stiffness = find_stuck_patch_stiffness(model, (joint.patch, *joint.coarser))
     # Modes that were measured with the joint include the stiffness of the joint.
     has_joint = len(modes.interfaces) > 1 or model.rig.structure.bolted is not None

@@ -111,15 +111,17 @@ class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a sticking contact.
 
     - free: frequency without the contact.
-    - stuck: frequency with a sticking contact; None if the contact does not move in the mode.
+    - stuck: frequency with a sticking contact; None without a motion or without friction.
     - stuck_error: error of `stuck`; None if it is not known.
     - free_error: error of `free` due to a joint that was subtracted from the modes.
+    - reason: why there is no `stuck`; "" if there is one.
     """
 
     free: float
     stuck: float | None
     stuck_error: float | None = None
     free_error: float = 0.0
+    reason: str = ""
 
 
 class LossExponents(NamedTuple):

@@ -25,6 +25,7 @@ from ...response.errors import convergence_error
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
+from ..backbone.words import describe_span
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
@@ -43,9 +44,8 @@ SAME_ERROR = 0.1  # relative change of an error at which it is known
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
-SAME_AMPLITUDE = (
-    1e-6  # largest relative difference of a measured amplitude and that of its computed point
-)
+# Largest relative difference of a measured amplitude and that of its computed point.
+SAME_AMPLITUDE = 1e-6
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
@@ -216,10 +216,9 @@ class CurveModel(FreeKeys):
         curve = self._compute_once(tuple(map(float, values)), method)
         missing = self.amplitude[np.isnan(curve[0])]
         if missing.size:
-            low, high = (format_length(missing[k], 3) for k in (0, -1))
             raise PatchfemError(
-                f"the mode of the model does not oscillate at {missing.size} of {self.amplitude.size} amplitudes, from "
-                f"{low} to {high}; leave out these rows, or narrow the ranges of --free"
+                f"the mode of the model does not oscillate at {missing.size} of {self.amplitude.size} amplitudes, "
+                f"{describe_span(missing)}; leave out these rows, or narrow the ranges of --free"
             )
         return curve
 

@@ -36,9 +36,8 @@ SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
 N_FOLDS = 3  # parts of the cases, each of which checks a surface through the others
 MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
 MIN_EXPLAINED = 0.5  # fraction of the variance of the other half that a usable surface explains
-MIN_KNOWN_FRACTION = (
-    0.9  # smallest fraction of cases with a value; the others may be no random sample
-)
+# Smallest fraction of cases with a value; the others may be no random sample.
+MIN_KNOWN_FRACTION = 0.9
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
 SPREAD_ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only

@@ -17,9 +17,8 @@ from . import sentences
 from .patches import read_patch, worn_depths
 from .variables import band, make_variables
 
-MIN_DEPARTURE = (
-    0.01  # smallest relative difference of the proportional coefficient that is reported
-)
+# Smallest relative difference of the proportional coefficient that is reported.
+MIN_DEPARTURE = 0.01
 COEFFICIENT_MARGIN = 1.2  # ratio of the coefficient that a note proposes to the fitted one
 
 

@@ -32,9 +32,8 @@ MEASURES = (
     "friction_force_peak",
 )
 N_IN_VERDICT = 3
-MIN_HIDDEN_RATIO = (
-    0.01  # hidden wear relative to the mean depth from which on the verdict states it
-)
+# Hidden wear relative to the mean depth from which on the verdict states it.
+MIN_HIDDEN_RATIO = 0.01
 NOTE = "Depths, areas and volumes are those of both pieces together; their intervals are the numerical errors of the runs."
 
 

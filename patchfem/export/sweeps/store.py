@@ -97,13 +97,14 @@ class Chunks:
     def iterate_results(self) -> Iterator[tuple[np.ndarray, CaseResults]]:
         """Yield the numbers of the requested cases that a file contains, and their results.
 
-        Of two results of a case the newer one comes later.
+        Of two results of a case the newer one comes later. Files of other sweeps are left out.
         """
         for path in self.list_files():
             names, results = read_chunk(path)
             rows = self._find_rows(names)
             numbers = np.flatnonzero(rows >= 0)
-            yield numbers, results.select(rows[numbers])
+            if numbers.size:
+                yield numbers, results.select(rows[numbers])
 
     def _find_rows(self, names: np.ndarray) -> np.ndarray:
         """Return the row (n,) of each requested case among the names (m,) of a file; -1 without one."""

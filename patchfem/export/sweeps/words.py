@@ -173,5 +173,5 @@ def _describe_unsettled(table: SweepTable) -> str:
     unsettled = values[~table.has_settled & np.isfinite(values)]
     if not unsettled.size or unsettled.max() <= np.nanmax(values[table.has_settled], initial=0.0):
         return ""
-    text = format_value(float(unsettled.max()), table.measures[name].unit)
+    text = format_value(unsettled.max(), table.measures[name].unit)
     return f" (their {_label(name)} is up to {text} at the end)"

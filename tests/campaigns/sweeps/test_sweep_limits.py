@@ -81,3 +81,22 @@ def test_values_that_miss_the_tolerance_count_with_their_errors():
     assert find_range(table, "loop_area")[0][1:3] == (2, 0)
     (limit,) = find_limits(table)
     assert limit.low == 2.0 and limit.high == 3.0
+
+
+def test_grid_whose_first_line_fails_has_the_limits_of_the_other_lines():
+    """Lines without a first case are left out; without any, the sweep says so; a driving key leaves its place to another.
+
+    Once a grid had no limits as soon as one of its lines had none, and no reason was given.
+    """
+    tilt = np.linspace(0.05, 0.45, 5)
+    values = np.outer(1 + 0.25 * (tilt - 0.05), np.ones(2))
+    values[0, 1] = np.nan
+    keys = {KEY: tilt, "normal.load": [1.0, 2.0]}
+    (limit,) = find_limits(make_table(keys, {"loop_area": values}))
+    assert limit.value == pytest.approx(0.25)
+    values[0] = np.nan
+    table = make_table(keys, {"loop_area": values})
+    assert find_limits(table) == []
+
+    driven = make_table({KEY: tilt[:2], "drive.frequency": TILT}, {"loop_area": np.ones((2, 5))})
+    assert [limit.key for limit in find_limits(driven)] == [KEY]

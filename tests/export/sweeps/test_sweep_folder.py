@@ -176,3 +176,14 @@ def test_exact_faults_of_batches_are_read_from_chunks(tmp_path):
     for _ in range(2):
         table.insert([0, 1], store_chunks.read_chunk(path)[1])
     assert list(table.faults) == results.faults
+
+
+@pytest.mark.parametrize("names, is_kept", [([1, 5], True), ([5, 6], False)])
+def test_exact_faults_of_another_sweep_are_left_out(tmp_path, names, is_kept):
+    """A chunk without a requested case, which an earlier sweep left in the folder, adds no fault and no result."""
+    results = CaseResults.blank(2)
+    results.outcome[:] = "done"
+    results.faults.append("2 cases are run one by one, because of a fault")
+    store_chunks.write_chunk(tmp_path, np.arange(2), results)
+    stored = list(store_chunks.Chunks(tmp_path, np.array(names)).iterate_results())
+    assert [part.faults for _, part in stored] == [results.faults] * is_kept
