@@ -89,13 +89,17 @@ class StripCompliance:
             If a block is not positive definite.
         """
         blocks = []
+        # Strips with the same active nodes and the same added terms share a factor.
+        factors: dict[tuple[bytes, bytes], np.ndarray] = {}
         start = 0
         for strip, is_active in enumerate(active.reshape(-1, len(self.common))):
             nodes = is_active.nonzero()[0]
             if not nodes.size:
                 continue
-            factor = factorise(self.block(strip, nodes))
-            blocks.append((slice(start, start + nodes.size), factor))
+            key = (is_active.tobytes(), b"" if self.added is None else self.added[strip].tobytes())
+            if key not in factors:
+                factors[key] = factorise(self.block(strip, nodes))
+            blocks.append((slice(start, start + nodes.size), factors[key]))
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:

@@ -242,7 +242,7 @@ def _read_matlab(path: Path, matrix_name: str) -> Matrix:
         for name, array in matlab.read_variables(path).items()
         if array.dtype.kind in matlab.NUMBER_KINDS
     }
-    return Matrix(sparse.csr_array(arrays[_find_matrix_name(path, arrays, matrix_name)]))
+    return _make_matrix(path, arrays[_find_matrix_name(path, arrays, matrix_name)])
 
 
 def _read_numpy(path: Path, matrix_name: str) -> Matrix:
@@ -251,8 +251,19 @@ def _read_numpy(path: Path, matrix_name: str) -> Matrix:
     refuse_large_content(path, count_zip_bytes(path), "save the matrices as sparse ones")
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
-            return Matrix(sparse.csr_array(sparse.load_npz(path)))
-        return Matrix(sparse.csr_array(file[_find_matrix_name(path, file.files, matrix_name)]))
+            return _make_matrix(path, sparse.load_npz(path))
+        return _make_matrix(path, file[_find_matrix_name(path, file.files, matrix_name)])
+
+
+def _make_matrix(path: Path, values) -> Matrix:
+    """Return the matrix of an array or of a sparse array; raise PatchfemError if it has too many rows."""
+    # A small file may state any number of rows, for each of which a sparse matrix needs memory.
+    if max(values.shape, default=0) > MAX_ROWS:
+        raise PatchfemError(f"{path}: a matrix of {MAX_ROWS} rows and columns at most can be read")
+    # SciPy checks the indices of these formats only on demand; wrong ones end the process.
+    if sparse.issparse(values) and values.format in ("csr", "csc", "bsr"):
+        values.check_format(full_check=True)
+    return Matrix(sparse.csr_array(values))
 
 
 # Reader of each file extension.

@@ -19,7 +19,7 @@ MAX_ROUNDED_SLOPE = 0.1
 # Tags of a file in the message on a missing tag
 MAX_LISTED_TAGS = 12
 # Largest distances of the node of an edge of second order from the middle of the edge, as fractions of its length: along
-# the edge, where it moves the stresses, and across, where the edge may be the arc of a rounded end
+# the edge, where it moves the stresses, and across, where the edge may be an arc of a rounded end of up to 45 degrees
 MAX_MIDDLE_SHIFT = 0.01
 MAX_MIDDLE_BULGE = 0.1
 # Names of the tags of the cells of both pieces, with their numbers in mesh files
@@ -272,7 +272,8 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
         raise PatchfemError(
             f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
             f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
-            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle"
+            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle; "
+            f"{MAX_MIDDLE_SHIFT:.0%} along the edge and {MAX_MIDDLE_BULGE:.0%} across are permitted"
         )
 
 

@@ -5,6 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from scipy import sparse
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
@@ -53,3 +54,25 @@ def test_refuses_large_content_of_small_file(tmp_path, write, name):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 16 * MIB
+
+
+@pytest.mark.parametrize("kind", ["coo", "csr", "csc", "dia"])
+def test_refuses_sparse_matrix_of_too_many_rows(tmp_path, kind):
+    """A small file with a sparse matrix of more rows than can be read is refused."""
+    matrix = sparse.dia_array(([[1.0]], [0]), shape=(2 * 10**6 + 1,) * 2).asformat(kind)
+    sparse.save_npz(tmp_path / "a.npz", matrix)
+    with pytest.raises(
+        PatchfemError, match=r"a\.npz: a matrix of 2000000 rows and columns at most"
+    ):
+        read_matrix(tmp_path / "a.npz", "stiffness")
+
+
+@pytest.mark.parametrize("kind", ["csr", "csc"])
+@pytest.mark.parametrize("index", [2, 10**6, -(10**7)])
+def test_refuses_sparse_matrix_with_indices_beyond_its_shape(tmp_path, kind, index):
+    """A sparse matrix whose indices do not fit its shape, with which SciPy would end the process, is refused."""
+    matrix = sparse.eye_array(2, format=kind)
+    matrix.indices[1] = index
+    sparse.save_npz(tmp_path / "a.npz", matrix)
+    with pytest.raises(PatchfemError, match=r"a\.npz cannot be read \(.*indices must be"):
+        read_matrix(tmp_path / "a.npz", "stiffness")

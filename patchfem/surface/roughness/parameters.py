@@ -62,7 +62,7 @@ def compute_moments(z) -> dict[str, float | None]:
 
 
 def _compute_element_length(z, step: float, rough: float, section: float) -> float | None:
-    """Compute Sm, the mean length of the profile elements [m]; None if there are not enough elements.
+    """Compute Sm, the mean length of the profile elements [m]; None if the trace contains no whole element.
 
     An element reaches from a rise through the mean line to the next rise, or from a fall to the next
     fall. Hills and dales that are too low or too narrow are left out, and neighbours of one sign between which
