@@ -119,9 +119,10 @@ def _solve_group(
         except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
+            # without a number, so that the same fault of many groups is one warning of a sweep
             faults.append(
-                f"{len(models)} cases are run one by one, because running them together failed with an internal "
-                f"fault, please report it: {type(error).__name__}: {error}"
+                "cases are run one by one, because running them together failed with an internal fault, please report "
+                f"it: {type(error).__name__}: {error}"
             )
             if report is not None:
                 report(faults[0])

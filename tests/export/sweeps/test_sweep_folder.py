@@ -170,7 +170,7 @@ def test_exact_faults_of_batches_are_read_from_chunks(tmp_path):
     """The sentences on faults after which cases ran one by one are kept in the chunks, once for the whole sweep."""
     results = CaseResults.blank(2)
     results.outcome[:] = "done"
-    results.faults.append("2 cases are run one by one, because of a fault")
+    results.faults.append("cases are run one by one, because of a fault")
     path = store_chunks.write_chunk(tmp_path, np.arange(2), results)
     table = make_table({"normal.load": [1.0, 2.0]}, {})
     for _ in range(2):
@@ -183,7 +183,7 @@ def test_exact_faults_of_another_sweep_are_left_out(tmp_path, names, is_kept):
     """A chunk without a requested case, which an earlier sweep left in the folder, adds no fault and no result."""
     results = CaseResults.blank(2)
     results.outcome[:] = "done"
-    results.faults.append("2 cases are run one by one, because of a fault")
+    results.faults.append("cases are run one by one, because of a fault")
     store_chunks.write_chunk(tmp_path, np.arange(2), results)
     stored = list(store_chunks.Chunks(tmp_path, np.array(names)).iterate_results())
     assert [part.faults for _, part in stored] == [results.faults] * is_kept
