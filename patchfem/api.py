@@ -80,6 +80,7 @@ from .surface.compare import compare as surface_comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from pandas import DataFrame
     from xarray import Dataset
 
     from .runs.batch.case_results import CaseResults
@@ -1519,22 +1520,20 @@ class Result(run_result.Result):
         """Plots of the run: pressure(), stress(), loop(), history(), levels(), accuracy()."""
         return Plots(self)
 
-    def table(self) -> Any:
+    def table(self) -> DataFrame:
         """Return the measures of the run as a table of name, value, error and unit, in SI units.
 
         Returns
         -------
-        pandas.DataFrame or list of dict
-            A DataFrame if pandas is installed, otherwise a list with a dict for each measure.
+        pandas.DataFrame
+            A row for each measure.
         """
+        from pandas import DataFrame
+
         rows = []
         for name, measure in self.measures.items():
             numbers = {"value": measure.value, "error": measure.error, "unit": measure.unit}
             rows.append({"measure": name} | numbers)
-        try:
-            from pandas import DataFrame
-        except ImportError:
-            return rows
         return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:

@@ -223,6 +223,34 @@ def test_refuses_without_command_line_terms(ask, said):
 # ---- looking at it
 
 
+def test_exact_result_is_a_table_on_screen_and_in_a_notebook(results):
+    """The printed measures, the table and the HTML text of a notebook have the measures with their values and units."""
+    result = results["bench"]
+    measures = result.measures
+    table = result.table()
+    html = result._repr_html_()
+    printed = repr(measures)
+
+    assert list(table.index) == list(measures)
+    for name in ("loop_area", "friction_ratio_peak"):
+        measure = measures[name]
+        assert tuple(table.loc[name]) == (measure.value, measure.error, measure.unit)
+    lines = dict(line.split(maxsplit=1) for line in printed.splitlines())
+    assert list(lines) == list(measures)
+    for name, text in lines.items():
+        assert f"<td>{name}</td><td style='text-align:right'>{text}</td>" in html
+
+
+def test_exact_stress_is_drawn_for_pieces_only(results):
+    """The picture of the stress in the pieces needs [contact], as does a grid for ParaView."""
+    picture = results["patch"].plot.stress()
+    assert picture.figure.axes and picture.collections
+    with pytest.raises(pf.PatchfemError, match=r"plot\.stress: .*no \[contact\]"):
+        results["bench"].plot.stress()
+    with pytest.raises(pf.PatchfemError, match=r"no \[contact\]"):
+        results["bench"].to_pyvista()
+
+
 def test_exact_measures_are_read_only_mapping(results):
     """Measures form a read-only mapping with attribute access, and a misspelt name gets a suggestion."""
     measures = results["bench"].measures
