@@ -13,7 +13,7 @@ from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press, press_to_approach
 
 from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
-from patchfem.contact.active_set import solve_primal_dual
+from patchfem.contact.active_set import solve_primal, solve_primal_dual
 from patchfem.contact.conjugate_gradients import project_forces
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
@@ -217,6 +217,26 @@ def test_exact_gradients_agree_with_enumeration(moment, spring):
     expected = solve_by_enumeration(c, x, gap, 5.0, moment, spring)[0]
     assert force == pytest.approx(expected, abs=5e-5)
     assert n_iterations < 300 and 2 < np.count_nonzero(expected) < 7
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_primal_sets_agree_with_enumeration(seed):
+    """The last method, which exchanges one node at a time, finds the forces from a start with wrong nodes."""
+    rng = np.random.default_rng(seed)
+    n_nodes = 7
+    factor = rng.normal(size=(n_nodes, n_nodes))
+    c = factor @ factor.T + 0.05 * np.eye(n_nodes)
+    x = np.linspace(-1, 1, n_nodes)
+    gap = 100 * rng.normal(size=n_nodes)
+    moment = [None, 30.0][seed % 2]
+    problem = patch_problem(x, gap, 100.0, moment)
+
+    # the nodes of the largest gaps carry the start
+    start = project_forces(gap, problem.motions[:, : problem.target.size], problem.target)
+    solution, n_sets = solve_primal(StripCompliance(c), problem, start)
+    expected = solve_by_enumeration(c, x, gap, 100.0, moment)[0]
+    assert solution.force == pytest.approx(expected, abs=1e-9 * 100.0)
+    assert 1 < n_sets < 20 * n_nodes and ((start > 0) != (expected > 0)).any()
 
 
 # ---- random gaps on random compliances
