@@ -212,7 +212,7 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
 
 
 def relative_violation(solution: SetSolution) -> float:
-    """Return the largest relative violation of the contact conditions [1].
+    """Return the largest relative violation of the contact conditions [1] by a `SetSolution`.
 
     Openings in contact and overlaps are relative to the terms of the opening, tensile forces to the load.
     """
@@ -227,6 +227,8 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
 
     An empty set gets the nodes of the smallest gap. Where a set does not reach to both sides of the load line of a free
     rotation, the node of the smallest gap on each side is added.
+
+    `problem` gives the gap and the load lines; the array `active` (n,) of bool itself is not changed.
     """
     if not problem.free_rotations:
         return problem.gap <= problem.gap.min()
@@ -403,9 +405,11 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) at which a rigid piece is in equilibrium under load and moments.
+    """Return the motion q (r,) of a contact problem at which a rigid piece is in equilibrium.
 
     The rotations are found about one axis after the other.
+
+    The motion is the approach [m], then the rotations [rad] that the problem leaves free.
     """
     motion = np.zeros(problem.target.size)
     gap = problem.gap
@@ -427,10 +431,13 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes in contact from the gap between rigid pieces in equilibrium.
+    """Guess the nodes in contact (n,) of a problem from the gap between rigid pieces in equilibrium.
 
     The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
     Under a prescribed approach these are the nodes that overlap.
+
+    `compliance` [m/N] is that of the n nodes: a `StripCompliance`, or an object with its `product` and
+    `node_compliance`.
     """
     gap = problem.gap
     if not problem.target.size:

@@ -36,7 +36,19 @@ class _QuadraticProgram(NamedTuple):
 def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram:
     """Formulate the contact problem as a quadratic program.
 
-    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
+    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node; the
+    program then has n + 2 forces.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the n nodes.
+    problem : ContactProblem
+        Gap [m], motions, loads and springs; at most one spring is not 0.
+
+    Returns
+    -------
+    _QuadraticProgram
     """
     # Rotations about the middle, scaled to a largest closing of 1: the columns are then comparable
     rigid = problem.motions.astype(float)
@@ -107,9 +119,21 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> float:
-    """Find the step t > 0 at which change . max(0, start + t change) has a given value.
+    """Find the step t > 0 at which change . max(0, start + t change) has the value `target_value`.
 
-    The left-hand side is piecewise linear in t.
+    The left-hand side is piecewise linear in t; all entries have the unit that the caller gives them.
+
+    Parameters
+    ----------
+    start, change : (k,) ndarray
+        Values at t = 0, and their change per unit of t.
+    target_value : float
+        Prescribed value of the sum.
+
+    Returns
+    -------
+    float
+        Step t; 0 if the sum stays below the value.
     """
     # Terms that are positive just after t = 0, and the steps at which a term appears or vanishes
     is_positive = (start > 0) | ((start == 0) & (change > 0))
@@ -234,7 +258,11 @@ def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bo
 
 
 def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
-    """Return the gradient (n,) [m] of the energy, from which the least-squares rigid motion is subtracted."""
+    """Return the gradient (n,) [m] of the energy, from which the least-squares rigid motion is subtracted.
+
+    `displacement` (n,) [m] is C f under the present forces. The rigid motion is fitted to the gradient at the nodes
+    `in_contact` (n,), where the gradient of the solution of `program` vanishes.
+    """
     slope = program.gap + displacement
     motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion

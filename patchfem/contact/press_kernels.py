@@ -71,7 +71,8 @@ class PressedState(NamedTuple):
 def pivot(sets, k):
     """Exchange force and gap of node k in the tableau; return False if the pivot is not positive.
 
-    Cost: m^2 multiplications.
+    The tableau of `sets` (SetArrays) is changed in place, and node k enters or leaves the contact set to which it is
+    pivoted. Cost: m^2 multiplications.
     """
     values = sets.tableau.values
     row = sets.tableau.row
@@ -115,7 +116,7 @@ def reset_tableau(sets):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _multiply(line, vector):
-    """Return the product of a row, up to its first m entries, with a vector (m,)."""
+    """Return the product of the first m entries of a row `line` with a vector (m,)."""
     total = 0.0
     for j in range(vector.size):
         total += line[j] * vector[j]
@@ -124,7 +125,7 @@ def _multiply(line, vector):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _refine_column(sets, column):
-    """Improve the column of 1, d or t of the tableau (0, 1 or 2) by a step of iterative refinement.
+    """Improve column 0, 1 or 2 (of 1, d or t) of the tableau of `sets` by a step of iterative refinement.
 
     Returns the residual before the step, relative to the largest term.
     """
@@ -163,7 +164,10 @@ def _refine_column(sets, column):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def refine_columns(sets):
-    """Improve the columns of 1, d and t of the tableau; return the largest relative residual before the step."""
+    """Improve the columns of 1, d and t of the tableau of `sets` by one step of iterative refinement.
+
+    Returns the largest residual before the step, relative to the largest term of its column.
+    """
     residual = 0.0
     for column in range(3):
         residual = max(residual, _refine_column(sets, column))
@@ -200,7 +204,11 @@ def take_slot(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_set(sets, name):
-    """Store the contact set of the tableau with its energy; return its slot."""
+    """Store the contact set of the tableau of `sets` under a 64-bit hash `name`; return its slot.
+
+    Stored are the nodes in contact, the unknowns of all nodes as functions of d and t, and the coefficients of the
+    energy.
+    """
     stored = sets.stored
     values = sets.tableau.values
     n_nodes = sets.x.size

@@ -59,6 +59,20 @@ def _solve_by_fallbacks(
 
     The methods are, in turn: primal-dual from all nodes, primal-dual from the result of conjugate gradients, and primal,
     which always ends. The number of iterations is that of all methods.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the nodes.
+    problem : ContactProblem
+    max_iterations : int
+        Largest number of contact sets that the primal-dual method tries from each start.
+
+    Returns
+    -------
+    solution : SetSolution
+    n_iterations : int
+        Number of contact sets and of gradient steps of all methods.
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)

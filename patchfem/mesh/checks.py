@@ -126,7 +126,7 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
 
 
 def _check_tags(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError if a required tag is missing or a cell has an unknown tag."""
+    """Raise PatchfemError if a tag that the mesh needs is missing or a cell has an unknown tag."""
     missing = [tag for tag in EDGE_TAGS if not mesh.select(None, tag)]
     missing += [
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
@@ -153,7 +153,7 @@ def _check_tags(mesh: TaggedMesh) -> None:
 
 
 def _check_numbers(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError unless the cells refer to existing nodes and all nodes lie in a plane."""
+    """Raise PatchfemError unless the cells of a mesh refer to existing nodes in one plane."""
     n_points = len(mesh.points)
     nodes = np.concatenate([block.cells.ravel() for block in mesh.blocks])
     if nodes.min() < 0 or nodes.max() >= n_points:
@@ -174,7 +174,11 @@ def _check_numbers(mesh: TaggedMesh) -> None:
 
 
 def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
-    """Build a piece from its cells and their nodes, with y converted to depth, and check it."""
+    """Build the piece "lower" or "upper" of a tagged mesh, with y converted to depth, and check it.
+
+    Only the nodes of its cells are kept, and they are numbered anew. Depths are >= 0 from the interface into the
+    piece.
+    """
     tagged = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
     used = np.unique(np.concatenate([block.cells.ravel() for block in tagged]))
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
@@ -226,7 +230,11 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
 
 
 def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
-    """Orient cells counterclockwise; raise PatchfemError if one is degenerate."""
+    """Orient cells counterclockwise; raise PatchfemError if one is degenerate.
+
+    `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their numbers in elements of a `kind` such as
+    "quad8". Returns the cells with the order of the nodes reversed where they turned clockwise.
+    """
     n = ELEMENTS[kind].n_corners
     is_clockwise = signed_areas(points[cells[:, :n]]) < 0
     # In the reversed order the middle of the edge from one corner to the next changes its place, too.
@@ -253,7 +261,11 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
 
 
 def _check_middles(points, edges: CellEdges, side: str) -> None:
-    """Raise PatchfemError unless the nodes between corners lie in the middles of their edges."""
+    """Raise PatchfemError unless the nodes between corners lie in the middles of their edges.
+
+    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`; `side` names
+    the piece in the message.
+    """
     is_quadratic = edges.middles >= 0
     begin, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
     middle = points[edges.middles[is_quadratic]]
@@ -325,7 +337,11 @@ def _check_interface(points, nodes, side: str) -> None:
 
 
 def _check_connections(mesh: PieceMesh, side: str) -> None:
-    """Raise PatchfemError unless the cells of a piece are connected through common edges."""
+    """Raise PatchfemError unless the cells of a piece are connected through common edges.
+
+    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface; `side`
+    ("lower" or "upper") names the piece in a message.
+    """
     edges = mesh.edges
     border = edges.ends[edges.is_border]
     _check_touching_nodes(mesh, border, side)
@@ -362,7 +378,10 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
 
 
 def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
-    """Raise PatchfemError if a boundary node lies on a boundary edge (e, 2) of which it is no end."""
+    """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
+
+    The rows of `border` (e, 2) are the nodes of the boundary edges; `side` names the piece in the message.
+    """
     # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]

@@ -85,7 +85,10 @@ def make_step(acceleration: float, period: float, *, moving: bool = True) -> Pie
 
 
 def make_release(period: float) -> PiecewiseDrive:
-    """Build a drive signal that is zero, for free motion after a release."""
+    """Build a drive signal that is zero, for free motion after a release.
+
+    `period` [s] serves as the length of a cycle, of which such a signal has none of its own.
+    """
     return PiecewiseDrive((DriveSegment(0.0),), period, False)
 
 

@@ -52,7 +52,7 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
 
 
 def _refuse_infinite(omega: float) -> None:
-    """Raise PatchfemError if the response is infinite at a circular frequency [rad/s]."""
+    """Raise PatchfemError that the response is infinite at the circular frequency omega [rad/s]."""
     raise PatchfemError(
         f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
         "neither damping nor stiffness there"

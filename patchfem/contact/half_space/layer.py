@@ -112,6 +112,22 @@ def _layer_states(
     """Return displacements and tractions (n, 4, 4) of the four wave solutions at depth z [m].
 
     A state is k scale u_x, k scale u_z, tension and shear.
+
+    Parameters
+    ----------
+    k : (n,) ndarray
+        Wave numbers [rad/m].
+    z, depth : float
+        Depth in the layer, and thickness of the layer [m].
+    moduli : tuple of float
+        Lame's constants lambda and mu [Pa] of the layer.
+    scale : float
+        Pressure [Pa] by which the displacements are made comparable to the tractions.
+
+    Returns
+    -------
+    (n, 4, 4) ndarray
+        Component of the state in rows, wave solution in columns.
     """
     lam, mu = moduli
     nu = lam / (2 * (lam + mu))

@@ -208,7 +208,10 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list[Conta
 
 
 def _contact_length(active: np.ndarray, edge: ContactEdge) -> int:
-    """Count the points of the contact interval that ends at a given edge."""
+    """Count the points of the contact interval that ends at a given edge.
+
+    `active` (n,) is True at points in contact. At most `MAX_REFERENCE_POINTS` are counted.
+    """
     if edge.side > 0:
         first = max(edge.node - MAX_REFERENCE_POINTS + 1, 0)
         points = active[first : edge.node + 1][::-1]
