@@ -50,7 +50,10 @@ class PatchPiece:
         return self.end.half_contact_length(self.length)
 
     def corner_kind(self, half_length: float) -> str:
-        """Return the kind of corner at a distance [m] from the middle, or "flat" if the face extends beyond it."""
+        """Return the kind of corner at the distance `half_length` [m] from the middle.
+
+        It is that of the end of the piece, or "flat" if the face extends further.
+        """
         if self.half_contact_length > half_length * (1 + LENGTH_TOL):
             return "flat"
         return self.end.kind
@@ -305,7 +308,10 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
     def with_loading(self, **changes) -> "PatchModel":
-        """Return a copy of the patch with changed values of its loading."""
+        """Return a copy of the patch with changed values of its loading.
+
+        The keywords are fields of its `loading`, such as `load` [N].
+        """
         return replace(self, loading=replace(self.loading, **changes))
 
     def with_mesh(self, **changes) -> "PatchModel":
@@ -367,7 +373,10 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]
 
 
 def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
-    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions."""
+    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions.
+
+    `resolve_path` turns a file name in the scene into a path.
+    """
     if contact.mesh is None:
         return None
     return MeshFile(resolve_path(contact.mesh), UNIT_FACTORS["length"][contact.mesh_unit or "m"])
@@ -384,6 +393,16 @@ def build_pieces(contact: Contact) -> PatchPieces:
 
     Keys in the table of a piece take precedence over those in [contact]. The interface is as long
     as the shorter face.
+
+    Parameters
+    ----------
+    contact : Contact
+        Table [contact].
+
+    Returns
+    -------
+    PatchPieces
+        Pieces, and length, width and height [m] of the patch.
     """
     pieces = []
     for own in (contact.lower or OnePiece(), contact.upper or OnePiece()):
@@ -432,7 +451,11 @@ def _build_loading(contact: Contact) -> PatchLoading:
 
 
 def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
-    """Return the lengths over which a profile is averaged."""
+    """Return the lengths over which the profile of a table [contact] is averaged.
+
+    The `pieces` give the length of the interface. A profile with asperities is averaged over a fraction of the
+    cut-off, one on the nodes of a mesh file not at all, and any other over the cells.
+    """
     if contact.asperities is not None:
         cutoff = find_shortest_wavelength(contact, pieces.length)
         average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE

@@ -56,7 +56,10 @@ def name_key(key: str) -> Iterator[None]:
 
 @contextmanager
 def locate_errors(source: Source) -> Iterator[None]:
-    """Add file and line to each PatchfemError that is raised in the block and names a key."""
+    """Add file and line to each PatchfemError that is raised in the block and names a key.
+
+    `source` is the source of the model, which knows the line of each key.
+    """
     try:
         yield
     except PatchfemError as error:
