@@ -68,7 +68,11 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Parse frequency, damping and slide of a mode; raise ValueError if one has the wrong unit."""
+    """Parse frequency, damping ratio and slide of a mode; raise ValueError if one has the wrong unit.
+
+    Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5"; the slide is the participation of the
+    interface.
+    """
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
     slide = None if slide is None else _parse_ratio(slide)
@@ -145,7 +149,7 @@ class BackboneTables:
             raw["drive"] = dict(UNUSED_DRIVE)
 
     def _write_modes(self, raw: TomlTable) -> None:
-        """Write the modes into [structure]."""
+        """Write the modes into the table [structure] of the plain values `raw` of a scene."""
         structure = raw.setdefault("structure", {})
         if not isinstance(structure, dict) or (STRUCTURES - {"mode"}) & structure.keys():
             raise PatchfemError(

@@ -39,7 +39,10 @@ def file_exists(path: Path) -> bool:
 
 
 def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
-    """List the files that a scene names and that do not exist, with a message for each."""
+    """List the files that a scene names and that do not exist, as (dotted key, message).
+
+    `tables` are those of the scene, and `folder` is the folder to which its paths are relative.
+    """
     return [
         (key, f"there is no file {folder / file}; paths are relative to the scene")
         for key, file in list_named_files(tables)

@@ -28,7 +28,10 @@ NEXT_VERBS = {
 
 
 def read_template(kind: str) -> str:
-    """Return a template of TEMPLATE_DESCRIPTIONS; raise PatchfemError for any other word."""
+    """Return the text of the template `kind`, a word of TEMPLATE_DESCRIPTIONS.
+
+    Raises PatchfemError for any other word.
+    """
     if kind not in TEMPLATE_DESCRIPTIONS:
         raise PatchfemError(
             f"{kind}: unknown kind of scene; {advise_on_name(kind, TEMPLATE_DESCRIPTIONS)}"

@@ -133,7 +133,11 @@ class Need(NamedTuple):
 
 @cache
 def parse_needs(words: str) -> tuple[Need, ...]:
-    """Parse the required or optional keys of a selector."""
+    """Parse the keys that a value of a selector needs or may have.
+
+    `words` separates the needs by blanks: "a+b" are keys that are given together, "a|b" are keys of which exactly one
+    is given, and "a/b" keys of which one or several are given.
+    """
     return tuple(
         Need(tuple(tuple(part.split("+")) for part in re.split("[|/]", word)), "/" not in word)
         for word in words.split()
@@ -141,7 +145,7 @@ def parse_needs(words: str) -> tuple[Need, ...]:
 
 
 def split_keys(words: str) -> list[str]:
-    """Return all keys of a text of required or optional keys."""
+    """Return all keys of a text `words` of required or optional keys, such as "a+b c|d"."""
     return re.findall(r"\w+", words)
 
 
@@ -152,7 +156,11 @@ def format_keys(words: str) -> str:
 
 @cache
 def find_selectors(model: type[Table]) -> tuple[Selector, ...]:
-    """Return the selectors of a table, in the order in which they count."""
+    """Return the selectors of a table, in the order in which they count.
+
+    A selector is a key whose value decides which other keys the table needs, such as `law` or `waveform`; `model` is
+    the class of the table.
+    """
     return tuple(selector for selector in SELECTORS if issubclass(model, selector.model))
 
 

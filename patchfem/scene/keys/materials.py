@@ -92,7 +92,10 @@ def is_case_sensitive(spelling: str) -> bool:
 
 
 def advise_on_material(written_name: str) -> str:
-    """Return a hint for an unknown material name: the most similar names and the list of all names."""
+    """Return a hint for an unknown material name: the most similar names and all names.
+
+    `written_name` is the name as the scene has it.
+    """
     spellings = list_spellings()
     written = normalise_material_name(written_name)
     near_spellings = get_close_matches(written, spellings, len(spellings), MIN_SIMILARITY)

@@ -83,7 +83,7 @@ class Joint(TableFacts):
         self.wave = find_waveform(draft.tables.drive)
 
     def find_key_value(self, key: str) -> ViewValue:
-        """Return the value of a key of the scene, or of the patch of the joint if it begins with "patch"."""
+        """Return the value of a dotted key of the scene; "patch" at its beginning stands for the patch of this joint."""
         table, *names = key.split(".")
         return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
 
@@ -293,7 +293,7 @@ FEATURES = {
 
 @cache
 def find_feature(name: str) -> Feature:
-    """Return a feature of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
+    """Return the feature `name` of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
     if name in FEATURES:
         return FEATURES[name]
     key, _, value = name.partition("=")
@@ -326,7 +326,10 @@ SUPPORT = _read_rows()
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
-    """Report combinations of keys that a run of this kind cannot compute yet."""
+    """Report combinations of keys in a draft that a run of this kind cannot compute yet.
+
+    The combinations are the rows of SUPPORT, which are tried on each interface.
+    """
     check_method(draft, kind)
     joints = [Joint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
     for index, interface in enumerate(draft.values.structure.interface if kind == "rig" else ()):
@@ -349,7 +352,10 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
 
 def describe_row(names: str, instead: str) -> str:
-    """Return the message of a row of SUPPORT, with names of properties in braces."""
+    """Return the message of a row of SUPPORT, with names of properties of a `Joint` in braces.
+
+    `names` are the features of the row, and `instead` is what the user can do.
+    """
     first, *others = names.split(", ")
     words = find_feature(first).words
     if beside := " and ".join(filter(None, map(_name_feature, others))):
