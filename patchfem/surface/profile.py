@@ -57,12 +57,12 @@ class Profile:
 
 
 def measure_step(axis: np.ndarray) -> float:
-    """Return the mean distance [m] of neighbouring positions (n,) [m]."""
+    """Return the mean distance [m] of neighbouring positions (n,) [m] along an axis."""
     return float(axis[-1] - axis[0]) / (axis.size - 1)
 
 
 def resample_evenly(profile: Profile) -> Profile:
-    """Resample a trace to a constant sampling interval, with gaps closed, for filters and spectra.
+    """Resample a profile to a constant sampling interval, with gaps closed, for filters and spectra.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
@@ -84,9 +84,11 @@ def resample_evenly(profile: Profile) -> Profile:
 
 
 def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
-    """Replace all but the usable heights by straight lines, and cut off such ends; a note counts missing heights.
+    """Replace all but the usable heights of a profile by straight lines, and cut off such ends.
 
     Raises PatchfemError for fewer than two usable heights, and if a line is longer than `max_gap` [m].
+
+    `usable` (n,) is a mask. A note of the returned profile counts the missing heights.
     """
     places = profile.x[usable]
     if places.size < 2:
@@ -153,6 +155,7 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
     Parameters
     ----------
     z : (n,) array [m]
+        Heights without gaps.
     window : int
         Number of samples of the median; those at an end have the first or the last window.
     floor : float
@@ -177,7 +180,7 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
 
 
 def find_spikes(profile: Profile) -> np.ndarray:
-    """Return a mask (n,) of heights that deviate too much from the median of their neighbours.
+    """Return a mask (n,) of heights of a profile far from the median of their neighbours.
 
     The standard deviation is 1.4826 times the largest of the median absolute deviation in the
     window, its median over all windows, and the smallest step between two heights (coarse digits).
@@ -195,7 +198,7 @@ def find_spikes(profile: Profile) -> np.ndarray:
 
 
 def remove_spikes(profile: Profile) -> Profile:
-    """Mark spikes, dropouts and specks of dust as not measured.
+    """Mark spikes, dropouts and specks of dust of a profile as not measured.
 
     Spikes and dropouts are those of `find_spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A
@@ -234,6 +237,6 @@ def robust_deviation(values) -> float:
 
 
 def find_runs(flags) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of true values."""
+    """Return the first and the last index of each run of true values in `flags` (n,)."""
     changes = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(first, stop - 1) for first, stop in changes.reshape(-1, 2).tolist()]

@@ -71,10 +71,16 @@ def align(
     Parameters
     ----------
     first, second : Raster
+        Heights before and after wear, without spikes.
     shift : float, optional
         Known shift of the second trace [m].
     is_straight : bool
         Whether the datum of traces is known to be straight.
+
+    Returns
+    -------
+    Aligned
+        Model and fit, or the reason why the surfaces cannot be compared.
     """
     place = Place(-np.array([shift]), 0.0) if shift is not None else find_place(first, second)
     model = _make_model(first, second, place)
@@ -100,13 +106,20 @@ def align(
 
 
 def _refuse(first: Raster, second: Raster) -> Aligned:
-    """Return why no place is found: a mirror finish, or surfaces that have none."""
+    """Return why no common place of two surfaces is found: a mirror finish, or none exists.
+
+    `first` and `second` are the surfaces before and after wear.
+    """
     numbers = find_mirror_finish([fill_gaps(surface.z) for surface in (first, second)])
     return Aligned("mirror_finish" if numbers else "elsewhere", numbers)
 
 
 def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
-    """Return the model at a place, on part of the points by default; None if the surfaces hardly overlap."""
+    """Return the model of two surfaces at a place; None if they hardly overlap.
+
+    `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every
+    axis; by default as many as MAX_FIT_POINTS allows.
+    """
     own, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
         stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
@@ -139,7 +152,10 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
 
 
 def _is_same_place(aligned: Aligned) -> bool:
-    """Return whether the surfaces have a place in common: by its significance, or by the heights that agree."""
+    """Return whether aligned surfaces really have a place in common.
+
+    That is shown by the significance of the correlation there, or by the fraction of heights that agree.
+    """
     model = aligned.model
     fit = aligned.fit
     own = model.own.z[model.known]
@@ -163,6 +179,9 @@ def _estimate_chance(first, second, noise: float) -> float:
     """Return the fraction of heights of unrelated surfaces that agree within the noise.
 
     They are those of both surfaces, without their long waves, at other places.
+
+    `first` and `second` are their heights (n,) or (m, n) [m] on the same points, and `noise` is the standard deviation
+    [m] of an unworn depth.
     """
     count = first.shape[-1]
     fractions = []
@@ -199,7 +218,7 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
 
 
 def _is_bent(straight: Fit, bent: Fit) -> bool:
-    """Return whether a parabolic datum explains the depths better than a straight one."""
+    """Return whether a parabolic datum, the fit `bent`, explains the depths better than a straight one."""
     gain = np.median(bent.noise) / np.median(straight.noise)
     if gain < CLEAR_BEND_GAIN:
         return True
@@ -208,7 +227,23 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
-    """Fit the gain of the instrument too, and keep it if it is clear; return the error of the gain as well."""
+    """Fit the gain of the instrument, too, and keep it if it is clear.
+
+    Parameters
+    ----------
+    model : Model
+    fit : Fit
+        Fit with a gain of 1.
+    digit : float
+        Standard deviation [m] due to the printed digits of the heights.
+
+    Returns
+    -------
+    fit : Fit
+        With the gain, if it is clear.
+    error : float
+        Standard deviation of the gain [1].
+    """
     scaled = fit
     for _ in range(N_GAIN_STEPS):
         change, error = _estimate_gain(model, scaled)
@@ -225,9 +260,11 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
 
 
 def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
-    """Estimate a further change of the gain, and its standard deviation, from the short waves of the valleys.
+    """Estimate a further change of the gain of a fit, and its standard deviation [1].
 
     A drift has no short waves, and valleys wear last, so that neither passes for another gain.
+
+    It follows from the short waves of the valleys in the `model`.
     """
     unworn = model.draw(fit.unworn, False)
     columns = (fit.depth, model.compute_jacobian(fit.state)[:, -1])
@@ -253,7 +290,7 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
 
 
 def _find_digit(z) -> float:
-    """Return the smallest difference of two heights [m], at most their range over 100."""
+    """Return the smallest difference of two heights z [m], at most their range over 100."""
     levels = np.unique(z[np.isfinite(z)])
     steps = np.diff(levels)
     return float(min(steps.min(), np.ptp(levels) / 100)) if steps.size else 0.0

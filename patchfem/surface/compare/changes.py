@@ -96,7 +96,10 @@ class Boxes(NamedTuple):
 
 @lru_cache(maxsize=2)
 def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
-    """Return boxes with at least `n_inside` parts, and `n_beside` on each side, free of a polynomial datum."""
+    """Return boxes with at least `n_inside` parts, and `n_beside` on each side of a trace.
+
+    A polynomial datum of the given degree is subtracted from each.
+    """
     datum = make_polynomials(N_PARTS, degree)
     spans = []
     for first in range(n_beside, N_PARTS - n_beside):
@@ -121,7 +124,10 @@ class ShallowTrack(NamedTuple):
 
 
 def find_shallow_track(depth) -> ShallowTrack:
-    """Find a track in the means of 60 parts, by the likelihood ratio of a box beside a cubic datum."""
+    """Find a track in depths (n,) [m] by the means of 60 parts.
+
+    The test is the likelihood ratio of a box beside a cubic datum.
+    """
     if depth.size < 2 * N_PARTS:
         return ShallowTrack(slice(0), MIN_TRACK_HEIGHT * float(depth.std()))
     edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
@@ -143,7 +149,10 @@ def find_shallow_track(depth) -> ShallowTrack:
 
 
 def find_detection_limit(depth, noise) -> float:
-    """Return the mean depth [m] from which on a track of a trace is found, or below which a square of a scan is not."""
+    """Return the smallest mean depth [m] of a track that is found in a trace, or of a square in a scan.
+
+    `depth` and `noise` (n,) or (m, n) [m] are the depths and the standard deviation of an unworn one.
+    """
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
     side = max(side for side in WINDOWS[2] if side <= max(min(depth.shape) / 4, 1))

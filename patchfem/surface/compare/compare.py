@@ -188,6 +188,7 @@ def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: O
 
 
 def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
+    """Return quantities of these names without value, and with the code of the reason."""
     return {name: name_unknown(name, reason) for name in names}
 
 
@@ -196,7 +197,22 @@ def _measure(
     rasters: tuple[Raster, Raster],
     aligned: Aligned,
 ) -> Comparison:
-    """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none."""
+    """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none.
+
+    Parameters
+    ----------
+    surfaces : tuple
+        Traces or scans before and after wear, as they were read.
+    rasters : tuple of Raster
+        The same on even steps and without spikes.
+    aligned : Aligned
+        Common place of both, or the reason why there is none.
+
+    Returns
+    -------
+    Comparison
+        Verdict, quantities by name, tracks and findings.
+    """
     is_trace = rasters[0].z.ndim == 1
     names = NAMES[rasters[0].z.ndim]
     if not aligned.reason:
@@ -282,7 +298,10 @@ def _find_detection_limit(depths: DepthMap) -> float:
 
 
 def _make_placement(aligned: Aligned) -> Placement:
-    """Return shift, rotation and gain of the second surface, with the errors that follow from the unworn heights."""
+    """Return shift, rotation and gain of the second of two aligned surfaces.
+
+    Their errors follow from the unworn heights.
+    """
     state = aligned.fit.state
     errors = aligned.fit.errors
     placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))
@@ -299,7 +318,11 @@ def _make_placement(aligned: Aligned) -> Placement:
 def _collect_findings(
     evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
-    """Return what a reader must know of the place, the datum, the gain and the tracks."""
+    """Return findings that a reader must know: on the place, the datum, the gain and the tracks.
+
+    `evidence` has the aligned depths and how they were placed, and `bend` [m] is the height of the subtracted
+    parabola.
+    """
     placement = evidence.placement
     depths = evidence.curves
     is_placed = placement.basis == "place"
@@ -341,16 +364,23 @@ def _collect_findings(
 
 
 def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool:
-    """Return whether less than a fraction of the heights in a track are worn."""
+    """Return whether less than a fraction of the heights in a track are worn.
+
+    `span` are the first and the last sample of the track in `depths`.
+    """
     return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
 
 
 def _enlarge(part) -> np.ndarray:
+    """Return a mask, `part`, enlarged by a square of MARGIN samples."""
     return ndimage.binary_dilation(part, np.ones((MARGIN,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
-    """Return the mask of worn places with their flanks."""
+    """Return the mask of the worn places in `depths` with their flanks.
+
+    `spans` are first and last sample of each track of a trace.
+    """
     if depths.depth.ndim > 1:
         return _enlarge(depths.worn) & depths.inside & ~depths.grown
     covered = np.zeros(depths.depth.size, bool)
@@ -376,10 +406,18 @@ def _doubt(
     code : str
         Verdict on lost and grown material.
     depths : DepthMap
+        Depths of the aligned surfaces.
     spans, tracks
         Tracks of a trace.
     sizes : tuple of float
         Lost and grown area or volume, and height of the bow.
+
+    Returns
+    -------
+    code : str
+        Verdict: the given one, or one of two possible causes.
+    numbers : dict
+        Heights [m] by name that both causes would have; {} if there is one cause.
     """
     area, grown, bend = sizes
     bow = 2 / 3 * max(bend, 0.0) * depths.size
@@ -404,7 +442,10 @@ def _doubt(
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:
-    """Return whether material grew along an end or a border, which a scar over the rest resembles."""
+    """Return whether material grew along an end or a border of the `depths`.
+
+    A scar over all the rest looks the same.
+    """
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
@@ -432,7 +473,10 @@ def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
 
 
 def _measure_share(depths: DepthMap) -> Quantity:
-    """Return the worn fraction of a scan, known but for a line of points around the worn places."""
+    """Return the worn fraction of the `depths` of a scan.
+
+    Its interval is a line of points around the worn places.
+    """
     cell = depths.cell
     share = float(depths.worn.sum()) * cell / depths.size
     edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
@@ -442,7 +486,11 @@ def _measure_share(depths: DepthMap) -> Quantity:
 def _name_ends(
     track: dict[str, Quantity], placement: Placement, middle: float
 ) -> dict[str, Quantity]:
-    """Return the mean depth within the longest track, and its ends in both traces; middle: of the second one [m]."""
+    """Return the mean depth within the longest track, and its ends in both traces.
+
+    `track` are its quantities, `placement` the place of the second trace, and `middle` [m] the middle of the second
+    trace, about which it is stretched.
+    """
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
     for end in ("from", "to"):
@@ -459,7 +507,11 @@ def _name_ends(
 
 
 def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
-    """Compare the waves along the lines of the common part; without one, the ratios have no value."""
+    """Compare the waves along lines of the common part; return their ratios after/before by name.
+
+    `result` is the comparison, and `direction` "x" or "y" that of the lines. Without a common place the ratios have no
+    value.
+    """
     depths = result.evidence.curves
     if depths is None:
         return _name_unknowns(waves.RATIO_NAMES, result.verdict.code)

@@ -30,10 +30,15 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     Parameters
     ----------
     model : Model
+        Common points of both surfaces, at the place of the fit.
     fit : Fit
         Depths at the known points of the model.
     gain_error : float, optional
         Standard deviation of the gain of the instrument.
+
+    Returns
+    -------
+    DepthMap
     """
     box = find_box(model.common)
     terms = [
@@ -87,9 +92,15 @@ def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
     Parameters
     ----------
     x, depth : (n,) array [m]
+        Places, and depths below the datum.
     sigma : float
         Noise of every depth [m].
     worn, missing : (n,) bool array
+        Worn points, and points that were not measured.
+
+    Returns
+    -------
+    DepthMap
     """
     noise = np.full(depth.size, sigma)
     nothing = np.zeros(depth.size, bool)
@@ -155,6 +166,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
     def compute_variance(part) -> float:
+        """Return the variance [m2] of the sum of the depths in a mask `part`."""
         moments = base[:, part].sum(axis=1)
         white = variance * float(moments @ inverse @ moments + part.sum())
         return white + sum(float(shift[part].sum()) ** 2 for shift in shifts)
@@ -167,6 +179,9 @@ def _bend_datum(depth, unworn, base) -> np.ndarray:
     """Return how far [m] the unworn depths (n,) of a trace bend its datum, if it has two terms more.
 
     Where a drift is slow, this is the error of a datum in a wide track, which the flanks alone do not show.
+
+    `unworn` (n,) is the mask of the unworn depths, and `base` (k, n) are the functions of which the datum is a
+    combination.
     """
     x = np.linspace(-1, 1, depth.size)
     bent = np.vstack((base, x ** len(base), x ** (len(base) + 1)))
@@ -179,6 +194,10 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the
     interval contains every single depth, because a crest may be worn as deep, and both ends what the samples do not
     resolve: the part of the largest depth that every second sample does not show.
+
+    Parameters
+    ----------
+    depths : DepthMap
 
     Returns
     -------

@@ -25,6 +25,16 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
 
     A line with a box is fitted to means of 60 parts. The box is a track if it is deeper than in the first trace from 50
     starts and with 50 random phases (Theiler 1992), and if the flanks are no rougher than this trace.
+
+    Parameters
+    ----------
+    first, second : Raster
+        Traces before and after wear, which share no place.
+
+    Returns
+    -------
+    DepthMap or None
+        Depths of the second trace below the line through its flanks.
     """
     z = fill_gaps(second.z)
     step = float(second.steps[0])

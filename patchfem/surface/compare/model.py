@@ -54,10 +54,19 @@ class Model:
     """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place.
 
     `max_gain_change` is the largest change of the gain that is left, until it is fitted.
+
+    Most methods take a `state`: the place of the second surface, d shifts [m] and a turn (rotation [rad] of scans,
+    stretch of traces), then the k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
+    [1].
+
+    The "own" surface is the one on whose points depths are known: the first of two scans, the second of two traces.
     """
 
     def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
-        """Choose the common points at a place, of each `stride`-th own point."""
+        """Choose the common points at a place, of each `stride`-th own point.
+
+        `own` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
+        """
         every = (..., *(slice(None, None, stride),) * own.z.ndim)
         self.own = Raster(own.z[every], own.origin, own.steps * stride)
         self.n_axes = own.z.ndim
@@ -93,7 +102,10 @@ class Model:
         return np.reshape(values, (-1,) + (1,) * self.n_axes)
 
     def keep_common(self, state) -> None:
-        """Keep the points that both surfaces show; `common` has those near the border of the other one too."""
+        """Keep the points that both surfaces show at a state.
+
+        They are `known`; `common` has those near the border of the other surface, too.
+        """
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
@@ -102,13 +114,13 @@ class Model:
         self.known = self.common & ((pixels >= BORDER_SAMPLES) & (pixels <= last)).all(axis=0)
 
     def _map_pixels(self, state) -> np.ndarray:
-        """Return the place (d, ...) of the points on the other surface, in its samples."""
+        """Return the place (d, ...) of the own points on the other surface at a state, in samples of it."""
         turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
         start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
         return (turned + start) / self._shape(self.other.steps)
 
     def compute_depth(self, state) -> np.ndarray:
-        """Return the depth (n,) [m]."""
+        """Return the depth (n,) [m] below the datum at the known points and a state."""
         pixels = self._map_pixels(state)[:, self.known]
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
@@ -117,13 +129,16 @@ class Model:
         return (depth + state[-1] * self._get_waves(pixels)) / (1 + state[-1])
 
     def _get_waves(self, pixels) -> np.ndarray:
-        """Return the heights (n,) of the first surface about its plane at the known points."""
+        """Return the heights (n,) [m] of the first surface about its plane at the known points.
+
+        `pixels` (d, n) are the places of these points on the other surface.
+        """
         if self.n_axes > 1:
             return self.waves[self.known]
         return ndimage.map_coordinates(self.waves, pixels, prefilter=False, mode="mirror")
 
     def compute_jacobian(self, state) -> np.ndarray:
-        """Return the derivative (n, d + 1 + k) of the depth by the state."""
+        """Return the derivative (n, d + 2 + k) of the depth by the numbers of a state."""
         pixels = self._map_pixels(state)[:, self.known]
         slopes = np.array(
             [
@@ -142,14 +157,20 @@ class Model:
         return np.vstack((place, self.datum[:, self.known], self._get_waves(pixels))).T
 
     def compute_noise_terms(self, state, jacobian) -> np.ndarray:
-        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        """Return terms (n, 3) of the variance of depths: instrument, positions on slopes, kinks.
+
+        Each is multiplied by a factor that is fitted. The `jacobian` is that of the depth at this state.
+        """
         slopes = (jacobian[:, : self.n_axes] ** 2).sum(axis=1)
         pixels = self._map_pixels(state)[:, self.known]
         kinks = ndimage.map_coordinates(self.bend, pixels, order=0, mode="nearest")
         return np.column_stack((np.ones(slopes.size), slopes, kinks**2))
 
     def draw(self, values, fill=np.nan) -> np.ndarray:
-        """Return values (n,) of the known points as a map in the shape of the surface."""
+        """Return values (n,) of the known points as a map in the shape of the surface.
+
+        Other points of it have the value `fill`.
+        """
         image = np.full(self.own.z.shape, fill, dtype=np.asarray(values).dtype)
         image[self.known] = values
         return image
@@ -159,7 +180,10 @@ class Model:
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
 
     def find_worn(self, depth, noise) -> np.ndarray:
-        """Return the worn points (n,) bool, with tops that are narrow or hardly worn."""
+        """Return the worn points (n,) bool, with tops that are narrow or hardly worn.
+
+        `depth` and `noise` (n,) [m] are the depths and the standard deviation of an unworn one.
+        """
         worn = self.find_changed(depth, noise)
         height = (self.own.z[self.known] - self.sign * depth / 2) / np.median(noise)
         relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
@@ -190,7 +214,10 @@ class Model:
         return np.maximum(sizes, MIN_WAVE_SAMPLES) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:
-        """Return values (n,) smoothed and without their long waves."""
+        """Return values (n,) smoothed by a Gaussian and without their long waves.
+
+        `width` is the standard deviation of the Gaussian in samples.
+        """
         image = fill_gaps(self.draw(values))
         return (smooth(image, width) - smooth(image, np.hypot(self.smoothing, width)))[self.known]
 
@@ -258,5 +285,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
 
 def _scale_datums(datums, base, depth) -> np.ndarray:
-    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum."""
+    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum.
+
+    `datums` (k, j) are factors of the functions in the columns of `base` (n, j), and `depth` (n,) [m] are depths
+    without datum.
+    """
     return np.quantile(np.abs(depth + datums @ base.T), 0.2, axis=1)

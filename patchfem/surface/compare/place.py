@@ -40,7 +40,10 @@ class Place(NamedTuple):
 
 
 def make_matrix(turn: float, n_axes: int) -> np.ndarray:
-    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans."""
+    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans.
+
+    `turn` is the stretch [1] or the rotation [rad], and `n_axes` is 1 for traces and 2 for scans.
+    """
     if n_axes == 1:
         return np.array([[1 + turn]])
     cos = np.cos(turn)
@@ -57,6 +60,16 @@ def find_place(first: Raster, second: Raster) -> Place:
     """Find the place of the second surface with the most significant correlation.
 
     The significance is Fisher's z times the root of the number of common points, relative to its scatter over all lags.
+
+    Parameters
+    ----------
+    first, second : Raster
+        Heights before and after wear.
+
+    Returns
+    -------
+    Place
+        Shift [m], turn and mirroring of the second surface.
     """
     n_axes = first.z.ndim
     longest = max(first.lengths.max(), second.lengths.max())
@@ -122,9 +135,12 @@ def _whiten(z) -> np.ndarray:
 
 
 def correlate(first, second) -> np.ndarray:
-    """Return the significance of the correlation of two images at each lag, negative lags at the end.
+    """Return the significance of the correlation of two images at each lag.
 
     It is -inf where the images overlap too little.
+
+    `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. Lags count pixels by which the
+    second image is moved; negative lags stand at the end of each axis.
     """
     size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]

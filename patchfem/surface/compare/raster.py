@@ -48,7 +48,7 @@ class Raster(NamedTuple):
 
 
 def fill_gaps(z) -> np.ndarray:
-    """Fill missing heights: of a trace (n,) by straight lines, of a scan (m, n) by the nearest height."""
+    """Fill missing heights z of a trace (n,) by straight lines, of a scan (m, n) by the nearest one."""
     missing = np.isnan(z)
     if z.ndim > 1 or not missing.any():
         return fill_nearest(z)
@@ -57,7 +57,10 @@ def fill_gaps(z) -> np.ndarray:
 
 
 def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Profile | Areal:
-    """Mark spikes, dust and saturated heights as missing; raise PatchfemError if too few heights are left."""
+    """Mark spikes, dust and saturated heights of a surface as missing.
+
+    With `keep_spikes` they only count. Raises PatchfemError if too few heights are left.
+    """
     if isinstance(surface, Areal):
         if min(surface.z.shape) < MIN_SCAN_SIDE:
             rows, columns = surface.z.shape
@@ -79,7 +82,7 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
 
 
 def _find_saturated(z) -> np.ndarray:
-    """Return the heights, bool, at the end of the range of the instrument, far from all others."""
+    """Return a mask of the heights z at the end of the range of the instrument, far from all others."""
     levels = np.unique(z[~np.isnan(z)])
     is_saturated = np.zeros(z.shape, bool)
     if levels.size < 4:

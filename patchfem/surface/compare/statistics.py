@@ -47,6 +47,7 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     Parameters
     ----------
     depth : (n,) array [m]
+        Depths at the present parameters.
     jacobian : (n, k) array
         Derivative of the depth by each parameter.
     sigma : float
@@ -98,9 +99,11 @@ def compute_threshold(n_tests: float) -> float:
 
 
 def smooth(z, deviations) -> np.ndarray:
-    """Return the Gaussian mean line or surface of heights (n,) or (m, n) without gaps, mirrored at their borders.
+    """Return the Gaussian mean line or surface of heights z (n,) or (m, n) without gaps.
 
     deviations: standard deviation of the weights in samples, one for each axis or for all of them.
+
+    The heights are continued by their mirror image at the borders.
     """
     spectrum = fft.dctn(z)
     for axis, deviation in enumerate(np.broadcast_to(deviations, z.ndim)):
@@ -111,7 +114,10 @@ def smooth(z, deviations) -> np.ndarray:
 
 
 def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
-    """Subtract the Gaussian mean line or surface from heights (n,) or (m, n) without gaps."""
+    """Subtract the Gaussian mean line or surface from heights z (n,) or (m, n) without gaps.
+
+    `part` is the size of the surface over the standard deviation of the Gaussian.
+    """
     return z - smooth(z, np.array(z.shape) / part)
 
 
@@ -127,7 +133,10 @@ def subtract_local_level(values, mask) -> np.ndarray:
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
-    """Return rms height and noise [m] of heights (n,) or (m, n) that are hardly rougher than their white noise, else {}."""
+    """Return rms height and noise [m] of a surface hardly rougher than its white noise, else {}.
+
+    `surfaces` are arrays of heights (n,) or (m, n) [m]; the first such surface counts.
+    """
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
         height = robust_deviation(remove_long_waves(z))

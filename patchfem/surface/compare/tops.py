@@ -59,9 +59,19 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
 
 def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
-    """Return the heights (n,) bool of classes that wear lowered, even slightly, if it lowered most tops of a surface.
+    """Return a mask (n,) of heights in classes that wear lowered, even slightly.
 
-    They are deeper than the valleys by more than another gain explains.
+    Parameters
+    ----------
+    relative, height : (n,) array
+        Depth and height in standard deviations.
+    max_gain_change : float
+        Largest change of the gain that both surfaces may still have.
+
+    Returns
+    -------
+    (n,) bool array
+        Only if wear lowered most classes of tops: they are deeper than the valleys by more than another gain explains.
     """
     is_worn = np.zeros(height.size, bool)
     if height.size < N_CLASSES * MIN_RUN:
@@ -97,7 +107,10 @@ class Tops(NamedTuple):
 
 
 def find_tops(depths: DepthMap) -> Tops:
-    """Find the tops that would be worn in a track: as high as the lowest quarter of the worn heights; not the worn ones."""
+    """Find the unworn tops that would be worn in a track, from the depths of a trace.
+
+    They are higher than the lowest quarter of the worn heights.
+    """
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
     is_deep = depths.worn & (relative > UNWORN_LIMIT)

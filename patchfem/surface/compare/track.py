@@ -57,6 +57,16 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
     floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a
     track may stand above the first surface.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Depths of a trace.
+
+    Returns
+    -------
+    list of tuple
+        (first, last) of each track.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
     tops = find_tops(depths)
@@ -80,12 +90,16 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
 
 
 def get_margin(span: tuple[int, int]) -> int:
-    """Return the number of samples of the flanks beyond the known ends of a track."""
+    """Return the number of samples of the flanks beyond the first and last sample, `span`, of a track."""
     return max(int(FLANK_FRACTION * (span[1] - span[0])), MIN_FLANK_SAMPLES)
 
 
 def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
-    """Find where a track begins and ends; both ends are sought from outside to the middle."""
+    """Find where a track begins and ends, each with its interval.
+
+    `span` are its first and last worn sample in the `depths`. Each end is the change point at which the depth leaves
+    zero, sought from outside to the middle, but not beyond tops that are not worn.
+    """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
@@ -124,7 +138,11 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 
 
 def _has_unworn_valleys(relative, is_high) -> bool:
-    """Return whether depths (n,) inside of an end are those of tops alone, from which heights are high (n,) bool."""
+    """Return whether wear inside an end of a track touched tops alone.
+
+    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops; then the
+    valleys between them are less deep.
+    """
     if is_high.all() or not is_high.any():
         return False
     return bool(relative[~is_high].mean() < MAX_VALLEY_DEPTH * relative[is_high].mean())
@@ -141,6 +159,10 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
         First worn sample.
     depths : DepthMap
         For the correlation of the errors, and the error of the level.
+
+    Returns
+    -------
+    End
     """
     step = float(np.median(np.diff(x)))
     if worn < 3:
@@ -176,7 +198,24 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
 
 
 def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
-    """Fit flanks that begin at each place (m,) to depths (levels, n); return deviances (levels, forms, m)."""
+    """Fit flanks that begin at each place (m,) to depths (levels, n) at x (n,) [m].
+
+    Parameters
+    ----------
+    x : (n,) array
+        Places [m], from outside to the middle of a track.
+    depths : (levels, n) array
+        Depths in standard deviations, for several levels of the unworn surface.
+    places : (m,) array
+        Places [m] at which a flank may begin.
+    correlation : float
+        Number of neighbouring depths that share an error.
+
+    Returns
+    -------
+    (levels, forms, m) array
+        Deviance of the best flank of each form.
+    """
     distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
     is_inside = distance > 0
     deviance = np.empty((len(depths), len(FLANKS), places.size))
@@ -256,6 +295,8 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
 
     The largest of many noisy means is too large: by 1.8 standard deviations of a mean over a flat bottom, and by
     nothing where one place is far deeper than all others.
+
+    The track begins at `start` and has a `width` [m].
     """
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
     count = max(inside.size // N_FIFTHS, 1)
@@ -277,10 +318,11 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
 
 
 def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> tuple[float, float]:
-    """Return the area [m2] above the first surface within one width beside a track, and its standard deviation.
+    """Return the area [m2] of the ridges beside a track, and its standard deviation [m2].
 
-    It reaches from both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing
-    is found as grown, the error is what the noise may hide beside the track.
+    `depths` are those of the trace, and the ridges are sought within one width of the `ends`. The area reaches from
+    both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing is found as
+    grown, the error is what the noise may hide beside the track.
     """
     total = 0.0
     variance = 0.0

@@ -15,10 +15,12 @@ MIN_LOST_DEVIATIONS = (
 
 
 def find_sure_loss(depths: DepthMap) -> float:
-    """Return the number of standard deviations of lost material that drift and noise do not explain.
+    """Return the loss, in its standard deviations, above which drift and noise do not explain it.
 
     The worn places were chosen as the deepest ones out of as many as the common part contains. Drift is known
     from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %.
+
+    `depths` gives the number of places and of independent tiles.
     """
     n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
     freedom = depths.errors.freedom
@@ -27,7 +29,10 @@ def find_sure_loss(depths: DepthMap) -> float:
 
 
 def measure_sharp_loss(depths: DepthMap) -> float:
-    """Return the area [m2] or volume [m3] of tops that lie deeper than the unworn heights beside them, as no drift does."""
+    """Return the area [m2] or volume [m3] lost from tops of the `depths` map that lie deeper than others.
+
+    Unworn heights beside them do not lie as deep; no drift is so sharp.
+    """
     if not depths.worn.any():
         return 0.0
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise

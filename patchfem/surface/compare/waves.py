@@ -81,7 +81,7 @@ def compare_waves(
 
 
 def _subtract_polynomial(z, degree: int) -> np.ndarray:
-    """Subtract the polynomial of least squares from heights (n,), or from each line of heights (k, n)."""
+    """Subtract the polynomial of least squares from heights z (n,), or from each line of z (k, n)."""
     basis = make_polynomials(z.shape[-1], degree)
     return z - z @ basis @ basis.T
 
@@ -185,7 +185,10 @@ def _cut_sections(z, cutoff: float, degree: int) -> list[np.ndarray]:
 
 
 def _measure_sections(sections: list[np.ndarray], step: float) -> dict[str, np.ndarray]:
-    """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
+    """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope.
+
+    `sections` are arrays of heights (n,) [m] with this step [m] between neighbours.
+    """
     return {
         "Ra": np.array([np.abs(part).mean() for part in sections]),
         "Rq": _average_squares(sections),

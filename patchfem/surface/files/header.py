@@ -56,9 +56,25 @@ class Header(NamedTuple):
 
 
 def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterator[tuple[int, str]]]:
-    """Read the lines above the numbers; returns the header, and the lines from the first row of numbers on.
+    """Read the lines above the numbers of a text file.
 
-    Raises PatchfemError if no row of numbers follows.
+    Parameters
+    ----------
+    path
+        File, for messages.
+    lines : iterator of (int, str)
+        Line numbers and lines of the file.
+
+    Returns
+    -------
+    header : Header
+    lines : iterator of (int, str)
+        Lines from the first row of numbers on.
+
+    Raises
+    ------
+    PatchfemError
+        If no row of numbers follows.
     """
     named: dict[int, tuple[int, list[Column]]] = {}  # lines of names by their number of cells
     facts = {}
@@ -103,7 +119,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
 
 
 def _parse_column(cell: str) -> Column:
-    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone.
+    """Parse the cell with the heading of a column, such as `x [um]` or `x in mm`, or a unit alone.
 
     A word without brackets is a unit only behind a known name; `Length 5 mm` is a setting.
     """
@@ -120,7 +136,7 @@ def _parse_column(cell: str) -> Column:
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
-    """Return the number and the unit of a fact such as `4.0 um`; None for what is missing."""
+    """Return number and unit in the text of a fact such as `4.0 um`; None for what is missing."""
     number, _, unit = text.strip().partition(" ")
     if not NUMBER_PATTERN.fullmatch(number):
         return None, text.strip() or None
@@ -128,9 +144,9 @@ def parse_fact(text: str) -> tuple[float | None, str | None]:
 
 
 def split_cells(text: str) -> tuple[list[str], str | None]:
-    """Split a line at the delimiter that leaves only numbers, or at the first delimiter; None: blanks.
+    """Split the text of a line into cells; return these and the delimiter, None for blanks.
 
-    So a decimal comma is not taken for a delimiter.
+    It is the delimiter that leaves only numbers, or else the first one. So a decimal comma is not taken for a delimiter.
     """
     delimiters = (";", ",", "\t", "|", None)
     for delimiter in delimiters:
@@ -152,7 +168,10 @@ def _strip_cells(cells: list[str]) -> list[str]:
 
 
 def is_number(cell: str, delimiter: str | None) -> bool:
-    """Return whether a cell of a text file is a number or a missing height."""
+    """Return whether a cell of a text file is a number or a missing height.
+
+    A decimal comma is possible unless the delimiter is a comma.
+    """
     if NUMBER_PATTERN.fullmatch(cell) or MISSING.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

@@ -30,7 +30,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
-    """Read the columns or the matrix of a text file.
+    """Read the columns or the matrix in the content of a text file.
 
     has_units: whether the user states the units; then columns of unknown names are taken in their order.
     """
@@ -57,7 +57,7 @@ def read_text(content: Content, *, has_units: bool = False) -> Table:
 
 
 def _decode(content: Content) -> str:
-    r"""Decode a text file, with \n at the ends of lines and without quotes."""
+    r"""Decode the content of a text file, with \n at the ends of lines and without quotes."""
     data = content.data
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")
@@ -165,7 +165,7 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether numbers (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
+    """Return whether values (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_STEP_UNEVENNESS * steps[0])
 
@@ -231,7 +231,10 @@ def _read_rows(
 
 
 def _parse_cell(place: str, role: str, cell: str) -> float:
-    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text."""
+    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text.
+
+    `place` is file and line for the message, and `role` is the name of the column.
+    """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
     if role == "index" or (role == "z" and MISSING.fullmatch(cell)):

@@ -53,7 +53,11 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
 
 
 def _compute_area_ratio(along_y, along_x) -> float:
-    """Compute Sdr from squared slopes: cells of four heights are cut into triangles along either diagonal."""
+    """Compute Sdr, the relative area beyond the projected one [1], from squared slopes of a scan (m, n).
+
+    `along_y` (m - 1, n) and `along_x` (m, n - 1) are the squared slopes. Cells of four heights are cut into triangles
+    along either diagonal.
+    """
     total = 0.0
     for left_or_right in (along_y[:, :-1], along_y[:, 1:]):
         for low_or_high in (along_x[:-1], along_x[1:]):
@@ -83,7 +87,10 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
 
 
 def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
-    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf where it does not."""
+    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf if never.
+
+    `rho` is the autocorrelation, with the zero lag in the middle, and `steps` [m] are its steps along y and x.
+    """
     from scipy import ndimage
 
     sizes = (np.array(rho.shape) // 2) * steps

@@ -70,7 +70,7 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace that are shorter than a cut-off [m]; None: of all waves.
+    """Measure the moments of the waves of a trace shorter than `cutoff` [m]; of all if it is None.
 
     Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
     trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
@@ -128,10 +128,12 @@ def rms_moments(trace: Profile) -> Moments:
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:
-    """State that skewness and kurtosis of heights are not Gaussian, or return "".
+    """State that skewness and kurtosis of heights z (n,) [m] are not Gaussian, or return "".
 
     A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
     independent height.
+
+    `moments` are the rms height, slope and curvature of the trace, and `length` [m] is its length.
     """
     unit = (z - z.mean()) / z.std()
     skewness = float(np.mean(unit**3))
