@@ -113,6 +113,18 @@ def write_common_traces(comparison: Comparison, folder: Path) -> list[Path]:
     A scene reads them with heights = "surface": x counts from their middle, and the heights are levelled. Without a common
     part the whole traces are written.
 
+    Parameters
+    ----------
+    comparison : Comparison
+        Comparison of two traces.
+    folder : Path
+        Folder of the files.
+
+    Returns
+    -------
+    list of Path
+        Both files.
+
     Raises
     ------
     PatchfemError

@@ -60,10 +60,12 @@ def find_applicable_settings(model: Model) -> list[str]:
 
 
 def make_setting_values(model: Model, name: str) -> list[Setting]:
-    """Return the values of a numerical setting, or of TOLERANCE, from coarse to fine.
+    """Return the values of a numerical setting of a model, or of its tolerance, from coarse to fine.
 
     The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
     values if the value of the scene is small.
+
+    `name` is that of the setting, such as "element_size", or TOLERANCE.
     """
     words = name.replace("_", " ")
     if name == TOLERANCE:
@@ -87,7 +89,7 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
 
 
 def _change_setting(model: Model, name: str, value: float | None) -> Model:
-    """Return a model with another value of a numerical setting; None if the tolerance sets it."""
+    """Return a model with another value of the numerical setting `name`; None lets the tolerance set it."""
     if name == "element_size":
         return replace(model, patch=model.patch.with_element_size(value))
     if name == "jumps":
@@ -99,7 +101,10 @@ def _change_setting(model: Model, name: str, value: float | None) -> Model:
 
 
 def _find_count(model: Model, name: str) -> int:
-    """Return the count that a run of the model takes; DEFAULT_COUNT if only the run itself finds it."""
+    """Return the number of steps, modes or jumps that a run of the model takes by default.
+
+    `name` is that of the setting. It is DEFAULT_COUNT if only the run itself finds the number.
+    """
     if name == "steps_per_cycle":
         if model.kind == "bench":
             return engine.steps_per_cycle(model)
@@ -108,7 +113,7 @@ def _find_count(model: Model, name: str) -> int:
 
 
 def _scale_count(middle: int, factors: tuple[float, ...], limits: tuple[float, float]) -> list[int]:
-    """Return a count and its multiples within limits, in rising order."""
+    """Return a count, `middle`, and its products with factors that are within limits, in rising order."""
     low, high = limits
     scaled = (max(1, round(middle * factor)) for factor in factors)
     return sorted({middle, *(count for count in scaled if low <= count <= high)})

@@ -34,6 +34,15 @@ def read_pairs(table: Path) -> list[TableLine]:
     Names are relative to the folder of the table. A column direction (x, y or empty) gives the axis along which the
     traces of a pair run; other columns are kept as text.
 
+    Parameters
+    ----------
+    table : Path
+        CSV file.
+
+    Returns
+    -------
+    list of TableLine
+
     Raises
     ------
     Missing

@@ -46,6 +46,14 @@ def read_table(path: Path) -> list[MeasuredRow]:
 
     Every row has frequency and input; other cells may be empty.
 
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    list of MeasuredRow
+
     Raises
     ------
     Missing
@@ -75,7 +83,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
 
 
 def _make_record_error(path: Path) -> PatchfemError:
-    """Return the error for a time record that was given in place of a table of responses."""
+    """Return the error for a time record, `path`, that was given in place of a table of responses."""
     options = ""
     if path.suffix.lower() == ".mat":
         options = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"'
@@ -88,6 +96,11 @@ def _make_record_error(path: Path) -> PatchfemError:
 
 
 def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) -> MeasuredRow:
+    """Parse one row of a table of measured responses.
+
+    `location` is file and line for messages, `cells` are the texts by column, and `factors` the factors to SI by
+    column.
+    """
     flag = cells.get("flag", "")
     if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(
@@ -106,7 +119,7 @@ def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) 
 
 @lru_cache(64)
 def is_readable(path: Path) -> bool:
-    """Return whether a table of measured responses can be read.
+    """Return whether the file `path` is a table of measured responses that can be read.
 
     The answer is kept, because the models of a sweep name the same table.
     """

@@ -45,9 +45,11 @@ def count_zip_bytes(file: Path | io.BytesIO) -> int:
 
 
 def count_matlab_bytes(data: bytes) -> int:
-    """Return the size [bytes] of the compressed variables of a MATLAB file of version 5 to 7, counted up to the limit.
+    """Return the unpacked size [bytes] of the compressed variables of a MATLAB file of version 5 to 7.
 
     Raises zlib.error for damaged variables.
+
+    `data` is the content of the file; the count ends once it exceeds the limit.
     """
     order = VERSION_5_MARKS.get(data[124:128])
     place = HEADER_BYTES if order else len(data)

@@ -38,7 +38,7 @@ _RATE_UNIT_PATTERNS = {
 
 
 def normalize_unit(text: str) -> str:
-    """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
+    """Spell the text of a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = quantities.normalize_unit(text)
     text = _UNIT_SYNONYMS.get(text.lower(), text)
     for ending, pattern in _RATE_UNIT_PATTERNS.items():

@@ -108,7 +108,10 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
 
 
 def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
-    """Return dataset 164, whose `length` and `force` are units of the file per SI unit; None without it."""
+    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit; None without.
+
+    `path` names the file in the message.
+    """
     factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
     if factors is not None and not min(factors["length"], factors["force"]) > 0:
         raise PatchfemError(
@@ -180,6 +183,6 @@ def _make_channel(
 
 
 def _clean_text(value) -> str:
-    """Return the text of a label, or "" for the word NONE, which stands for an empty one."""
+    """Return the text of a label (`value`), or "" for the word NONE, which stands for an empty one."""
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

@@ -192,7 +192,15 @@ def _make_matrix_check(key: str):
     """Return the function that checks the file of one matrix of [structure.reduced], that of a `key`."""
 
     def check_matrix(path: Path, tables, *, is_valid: bool) -> None:
-        """Check the file `path` of the matrix by reading it; `tables` and `is_valid` have no effect."""
+        """Check the file of the matrix by reading it.
+
+        Parameters
+        ----------
+        path : Path
+            File of the matrix.
+        tables, is_valid
+            Tables of the scene, and whether they are free of mistakes; both have no effect.
+        """
         structure_reduced.read_matrix(path, key)
 
     return check_matrix

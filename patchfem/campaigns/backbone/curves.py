@@ -175,7 +175,26 @@ def _merge(amplitudes) -> np.ndarray:
 
 
 def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Backbone:
-    """Compute the backbone of a joint at amplitudes (k,) [m] by given methods."""
+    """Compute the backbone of a joint at amplitudes (k,) [m] by given methods.
+
+    Parameters
+    ----------
+    joint : JointMode
+        Mode with its contact.
+    mode : str
+        Name of the mode.
+    amplitudes : (k,) array
+        Amplitudes at the output [m].
+    methods : iterable of str
+        Keys of CURVES.
+    progress : callable or None
+        Called with the name of each method before it begins.
+
+    Returns
+    -------
+    Backbone
+        A method that fails has its reason in `missing`.
+    """
     model = joint.model
     if amplitudes[-1] > model.rig.springs.travel:
         raise PatchfemError(
@@ -243,7 +262,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
 
 
 def _main_mode_name(joint: JointMode) -> str:
-    """Return the name of the structural mode with the largest component in the coordinate."""
+    """Return the name of the structural mode with the largest component in the mode of a joint."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
         return f"{joint.mode + 1}"
@@ -252,7 +271,7 @@ def _main_mode_name(joint: JointMode) -> str:
 
 
 def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
-    """Return the frequencies [Hz] of a mode without its contact and with a sticking contact.
+    """Return the frequencies [Hz] of the mode of a joint without its contact and with it stuck.
 
     The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
     uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
@@ -262,7 +281,10 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     modes = joint.modes
 
     def find(rows, stiffness: float) -> float:
-        """Return the frequency [Hz] of the mode `joint.mode` if springs [N/m] hold the interfaces of the given rows."""
+        """Return the frequency [Hz] of the mode if springs of a stiffness [N/m] hold given interfaces.
+
+        `rows` (i, n) are their relative displacements per unit of each modal coordinate.
+        """
         return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
 
     free = modes.omega[joint.mode] / (2 * np.pi)
@@ -286,11 +308,13 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
 
 
 def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
-    """Fit the exponents of energy loss over amplitude in micro-slip and in gross slip.
+    """Fit the exponents of energy loss over amplitude of a curve in micro-slip and in gross slip.
 
     In micro-slip it is the slope from the first to the last point, in gross slip that of the last
     two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
     energy.
+
+    `joint` gives the amplitude at which the whole contact slips.
     """
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
         return LossExponents()
@@ -319,7 +343,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:
-    """Find the largest amplitude [m] at which the damping changes from positive to negative.
+    """Find the largest amplitude [m] at which the damping of a joint changes from positive to negative.
 
     A curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
     which is a straight line under Coulomb friction, computes further points of the same curve. It

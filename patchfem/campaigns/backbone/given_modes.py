@@ -81,7 +81,10 @@ def prepare_model(
 
 
 def _find_sticking_stiffness(model: Model) -> float | None:
-    """Return the stiffness [N/m] of the sticking contact of a rig with a single interface; None if it is rigid."""
+    """Return the stiffness [N/m] of the sticking contact of a model with a single interface.
+
+    It is None if the contact is rigid, or if there is not exactly one interface.
+    """
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
         return None
@@ -121,7 +124,11 @@ def _assumed_fraction(n_modes: int) -> float:
 def _note_modes(
     modes: tuple[GivenMode, ...], *, is_assumed: bool, is_stuck: bool
 ) -> tuple[str, ...]:
-    """Return notes on modes that are not given in the scene."""
+    """Return notes on modes that are not given in the scene.
+
+    The modes stand for a scene without mode if `is_assumed`, else they were given beside it; `is_stuck` tells whether
+    their frequencies are those with a stuck contact.
+    """
     names = ", ".join(_describe_mode(mode) for mode in modes)
     place = "with the contact stuck" if is_stuck else "without the contact"
     if not is_assumed:

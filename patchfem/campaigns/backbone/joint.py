@@ -182,7 +182,7 @@ class JointMode(NamedTuple):
         return self.friction_limit / stiffness if stiffness else self.deflection
 
     def output_amplitude(self, slide):
-        """Return the amplitude at the output [m] for a relative displacement amplitude [m]."""
+        """Return the amplitude at the output [m] for a relative displacement amplitude `slide` [m]."""
         return self.reach / (abs(self.face_slide) or 1.0) * slide
 
     @property
@@ -208,7 +208,10 @@ class JointMode(NamedTuple):
             raise PatchfemError(NO_CLOSED_FORM + advice) from None
 
     def require_steady_loops(self, method: str) -> None:
-        """Raise PatchfemError if the free motion does not follow from steady friction loops."""
+        """Raise PatchfemError if the free motion does not follow from steady friction loops.
+
+        `method` names what cannot be computed, in the message.
+        """
         model = self.model
         reason = ""
         if model.grooves is not None:
@@ -314,7 +317,7 @@ def build_joint(model: Model, name: str) -> JointMode:
 
 
 def _check_mode(joint: JointMode) -> None:
-    """Raise PatchfemError if a mode has no backbone."""
+    """Raise PatchfemError if the mode of a joint has no backbone."""
     model = joint.model
     modes = joint.modes
     rig = model.rig
@@ -348,7 +351,7 @@ def _check_mode(joint: JointMode) -> None:
 
 
 def _find_mode(rig, name: str) -> int:
-    """Return the index of the coordinate of a mode; "" is the first mode of the scene."""
+    """Return the index of the coordinate of the mode `name` of a rig; "" is the first mode."""
     modes = rig.modes
     names = list(rig.modes.names)
     count = modes.omega.size

@@ -50,7 +50,7 @@ class Curve(NamedTuple):
 
 
 def make_curve(amplitude, values, errors) -> Curve:
-    """Make a curve from values and errors (4, k) or (5, k).
+    """Make a curve over amplitudes (k,) [m] from values and errors (4, k) or (5, k).
 
     The rows are frequency [Hz], damping ratio, loss [J], force [N] and, if it differs, the frequency of the force [Hz].
     """
@@ -60,7 +60,7 @@ def make_curve(amplitude, values, errors) -> Curve:
 
 
 def match_amplitudes(curve: Curve, other: Curve) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the common amplitudes of two curves, for each of them."""
+    """Return the indices of the common amplitudes of a curve and another one, for each of them."""
     distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
     return np.nonzero(distance < EQUAL_AMPLITUDE_TOL)
 

@@ -140,6 +140,15 @@ def read_damping_curve(path) -> MeasuredCurve:
     """Read a measured curve from a table that `import --decay` or `backbone` wrote.
 
     Raises PatchfemError with all validation errors.
+
+    Parameters
+    ----------
+    path : path-like
+        CSV file.
+
+    Returns
+    -------
+    MeasuredCurve
     """
     # names may have the prefix "decay_"
     units = {}
@@ -204,12 +213,12 @@ class CurveModel(FreeKeys):
         self._compute_once = lru_cache(8)(self._compute)
 
     def _compute(self, values: tuple[float, ...], method: str) -> np.ndarray:
-        """Compute frequency and damping for values (n,) of the keys."""
+        """Compute frequency [Hz] and damping ratio (2, k) for values (n,) of the keys by a method."""
         self.n_computed += 1
         return compute_points(self.build_model(values), self.amplitude, method)
 
     def compute(self, values: Sequence[float], method: str) -> np.ndarray:
-        """Compute frequency and damping (2, k) by one of the methods.
+        """Compute frequency [Hz] and damping ratio (2, k) for values (n,) of the keys by a method.
 
         Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
         """
@@ -242,7 +251,7 @@ class CurveModel(FreeKeys):
         """
 
         def residual(values: np.ndarray) -> np.ndarray:
-            """Return the residual (2k,) of the computed curve, divided by the standard deviations."""
+            """Return the residual (2k,) of the curve for values of the keys, over the standard deviations."""
             return ((self.compute(values, method) - measured.value) / measured.error).ravel()
 
         problem = self.make_problem(residual)
@@ -376,6 +385,16 @@ def extrapolate_curve(
 
     The band is the linear propagation of the intervals and of the correlation of the parameters. Amplitudes at which the
     mode does not oscillate are left out.
+
+    Parameters
+    ----------
+    curves : CurveModel
+        Model of the curve as a function of the free keys.
+    measured : MeasuredCurve
+    fit : Fit
+        Fitted values with their intervals.
+    method : str
+        Method of the curve, one of METHODS.
 
     Returns
     -------

@@ -175,7 +175,7 @@ class FreeKeys:
 
 
 def parse_ranges(texts: Iterable[str]) -> list[Range]:
-    """Parse the ranges of free keys from "table.key=low..high" strings.
+    """Parse the ranges of free keys from "table.key=low..high" texts.
 
     Raises SceneError with all validation errors.
     """
@@ -186,7 +186,10 @@ def parse_ranges(texts: Iterable[str]) -> list[Range]:
 
 
 def warn_of_bolted_joint(scene: Scene, ranges: Iterable[Range]) -> list[str]:
-    """Return a list with a warning if a free key changes a joint that was bolted in the modal test, or []."""
+    """Return a list with a warning if a free key changes a joint that was bolted in the modal test.
+
+    `ranges` are those of the free keys of the scene. The list is empty otherwise.
+    """
     structure = scene.structure
     if structure is None or structure.measured == "free" or structure.measured_joint == "case":
         return []

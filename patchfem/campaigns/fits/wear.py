@@ -84,9 +84,9 @@ class WearCurve(NamedTuple):
 
 
 def read_measured_depth(text: str) -> MeasuredDepth:
-    """Read a measured depth from a string, or from a JSON file written by `compare`.
+    """Read a measured depth from a text, or from a JSON file written by `compare`.
 
-    A string has the form "worn_depth_max=2.5 um..3.5 um", or contains a single value. Raises
+    The text has the form "worn_depth_max=2.5 um..3.5 um", or gives a single value, or is the name of the file. Raises
     PatchfemError for an invalid depth and Missing for a missing file.
     """
     name, equals, value = (part.strip() for part in text.partition("="))
@@ -109,7 +109,7 @@ def read_measured_depth(text: str) -> MeasuredDepth:
 
 
 def _read_depth_file(path: Path) -> MeasuredDepth:
-    """Read a measured depth from a JSON file written by `compare`."""
+    """Read a measured depth from the JSON file `path`, written by `compare`."""
     try:
         content = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
@@ -242,9 +242,10 @@ def fit_wear(
 
 
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
-    """Compute the wear depth over the cycles for a wear coefficient [m2/N].
+    """Compute the wear depth of a model over the cycles for a wear coefficient [m2/N].
 
-    `patch` is the solved contact of the unworn pieces, and `name` one of QUANTITIES.
+    `patch` is the solved contact of the unworn pieces, `name` one of QUANTITIES, and `progress` is called with the
+    progress, or None.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     worn = evolve.compute_wear(model, patch, (None, None), progress)

@@ -84,7 +84,10 @@ class ConditionModels(FreeKeys):
 
 
 def _require_sines_of_base(scene: Scene, ranges: Sequence[Range], measured: Path) -> None:
-    """Raise PatchfemError if a scene or a free key cannot be fitted to a table of responses to a sine of the base."""
+    """Raise PatchfemError unless scene and free keys fit to responses to a sine of the base.
+
+    `ranges` are those of the free keys, and `measured` is the file of the responses.
+    """
     drive = scene.drive
     location = f"{scene.path}: fit --to {measured.name}: "
     if scene.kind not in ("rig", "linear"):

@@ -146,7 +146,7 @@ def fit_rows(
             listener.progress(n_finished / (n_starts * (1 + len(groups))))
 
     def fit(training: np.ndarray, interval_kind: str) -> Fit:
-        """Fit the keys to the readings of a mask (n,), with intervals of a kind of `IntervalKind`.
+        """Fit the keys to the readings of a mask `training` (n,), with intervals of this kind.
 
         The first motions of each descent start from rest, so that its result depends only on its starting point and on
         these readings.

@@ -64,9 +64,12 @@ class KeyLimit(NamedTuple):
 
 
 def find_limits(table: SweepTable) -> list[KeyLimit]:
-    """Find the limits of the numerical key with the most values, as `_choose_axis` chooses it.
+    """Find the limits in a table of the numerical key with the most values.
 
     If other keys are swept too, a limit is the smallest one over the values of these keys whose first case counts.
+
+    A limit is the value of the key above, or below, which a measure changes, such as that at which the contact begins
+    to slip.
     """
     axis = _choose_axis(table)
     if axis is None:
@@ -98,7 +101,10 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
 
 
 def _choose_axis(table: SweepTable) -> int | None:
-    """Return the index of the key with the most values among the numerical ones of a grid that can have a limit."""
+    """Return the index of the numerical key with the most values in a table; None if there is none.
+
+    The cases must be a grid, and the key must be one that can have a limit.
+    """
     if not table.is_grid:
         return None
     axes = []

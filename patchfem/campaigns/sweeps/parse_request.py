@@ -102,6 +102,18 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
 
     If it names no values, those of the table [sweep] are used.
 
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+        Scene of the sweep.
+    request : Request
+        Values, ranges and tables of cases that the user asks for.
+
+    Returns
+    -------
+    Cases
+        With a warning if some of the checked cases are invalid.
+
     Raises
     ------
     SceneError
@@ -169,9 +181,11 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
 
 
 def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
-    """Return a validation error for each swept key that is equivalent to an earlier key.
+    """Return a validation error for each of the swept keys that is equivalent to an earlier one.
 
     Two keys are equivalent if they denote a mode by its name and by its index.
+
+    `sweep_scene` knows the modes by name.
     """
     first_keys: dict[str, str] = {}
     errors = []
@@ -186,6 +200,11 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
 
 def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     """Validate the representative cases of a sweep.
+
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+    cases : Cases
 
     Returns
     -------

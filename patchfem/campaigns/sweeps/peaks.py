@@ -55,7 +55,7 @@ class PeakOnLine(NamedTuple):
 
 
 def find_peaks(table: SweepTable) -> list[PeakOnLine]:
-    """Find the peak over a swept drive frequency for each combination of the other keys.
+    """Find the peak over a swept drive frequency in a table for each combination of other keys.
 
     Combinations without a peak between two cases that count have no entry.
     """
@@ -76,9 +76,10 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
 
 
 def _find_heights(table: SweepTable, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights (n,) of a response with their errors (n,); NaN where a case does not count.
+    """Return the heights (n,) of the measure `name` in a table with their errors (n,).
 
-    For a case that did not settle it is the steady estimate if that is exact enough.
+    They are NaN where a case does not count. For a case that did not settle it is the steady estimate if that is exact
+    enough.
     """
     heights = table.select_trusted(name)
     errors = np.nan_to_num(table.measures[name].errors)

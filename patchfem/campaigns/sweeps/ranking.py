@@ -60,7 +60,9 @@ class SobolIndex(NamedTuple):
 
 
 def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
-    """Compute the Sobol indices of the swept keys for each ranked measure that varies by more than its error.
+    """Compute the Sobol indices of the swept keys for each ranked measure of a table.
+
+    A measure must vary by more than its error.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
 
 
 def _varies(table: SweepTable, name: str) -> bool:
-    """Return whether a measure varies over the cases by more than its errors and round-off."""
+    """Return whether the measure `name` of a table varies by more than its errors and round-off."""
     column = table.measures.get(name)
     if column is None:
         return False
@@ -146,13 +148,17 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
-        """Return the surface through some of the cases."""
+        """Return the response surface through some of the cases; with smoothing it may miss them."""
         return RBFInterpolator(
             coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
         )
 
     def find_unexplained(smoothing: float) -> np.ndarray:
-        """Return the fraction (measures,) of the variance of each fold that a surface through the others leaves."""
+        """Return the fraction (measures,) of the variance that a surface with this smoothing leaves.
+
+        It is the mean over the folds of the deviation from a surface through the cases of the other folds
+        (cross-validation).
+        """
         left = []
         for others, fold in folds:
             deviation = fit(others, smoothing)(coordinates[fold]) - scaled[fold]
@@ -178,7 +184,10 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
 
 
 def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return first-order and total Sobol indices (measures, keys) of a surface over the unit cube."""
+    """Return first-order and total Sobol indices (measures, keys) of a response surface.
+
+    The surface is an interpolator of the measures over the unit cube of the keys.
+    """
     from scipy.stats import sobol_indices, uniform
 
     with warnings.catch_warnings():
@@ -193,7 +202,7 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
-    """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
+    """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure of a table of random cases.
 
     Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
     ones.

@@ -21,6 +21,10 @@ CASE_HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     """Read the cases of a CSV table, and its validation errors.
 
+    Parameters
+    ----------
+    path : Path
+
     Returns
     -------
     tuple
@@ -51,6 +55,15 @@ def _parse_column(
     key: str, unit: str | None, cells: list[str]
 ) -> tuple[Axis | None, list[tuple[int | None, str]]]:
     """Parse the cells of a column.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key in the header of the column.
+    unit : str or None
+        Unit in the header.
+    cells : list of str
+        Values.
 
     Returns
     -------
