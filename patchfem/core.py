@@ -95,7 +95,7 @@ _SENTENCES = {
 
 
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
-    """Return a read-only, C-ordered copy of values."""
+    """Return a read-only, C-ordered copy of values as an array of this dtype."""
     out = np.array(values, dtype=dtype, order="C")
     out.setflags(write=False)
     return out

@@ -130,7 +130,19 @@ _DRIVE_SIZE_KEYS = "acceleration|displacement force"
 def _make_law(
     module: str, equations: str, keys: tuple[str, str], supports: str, traits: str = ""
 ) -> Effect:
-    """Return the effect of a friction law, whose module is in patchfem.friction."""
+    """Return the effect of a friction law.
+
+    Parameters
+    ----------
+    module : str
+        Module inside patchfem.friction.
+    equations : str
+        Equations of the law as text, for the report page.
+    keys : tuple of str
+        Required and optional keys.
+    supports, traits : str
+        Words, separated by blanks, for engines and features that know the law, and for its properties.
+    """
     return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
 
 
@@ -140,7 +152,11 @@ def _make_waveform(
     traits: str = "",
     module: str = "patchfem.structure.drives",
 ) -> Effect:
-    """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`."""
+    """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`.
+
+    `equations` are those of the waveform as text, for the report page, `traits` are words for its properties, and `module`
+    computes it.
+    """
     required, optional = keys
     if "endless" in traits:
         required = f"{required} cycles|duration".strip()
@@ -364,7 +380,7 @@ EFFECTS |= {
 
 
 def import_effect(name: str):
-    """Import and return the module that computes an effect."""
+    """Import and return the module that computes the effect `name`, such as "contact.tilt"."""
     return import_module(EFFECTS[name].module)
 
 
@@ -386,7 +402,10 @@ def list_absent_effects(names) -> list[str]:
 
 
 def list_displayed_absent_effects(names, engine: str | None) -> list[str]:
-    """Return the absent effects without the method that the program selected automatically."""
+    """Return the names of absent effects without the method that the program selected itself.
+
+    `engine` is that method.
+    """
     return [name for name in names if name != f"accuracy.method={engine}"]
 
 

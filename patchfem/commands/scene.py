@@ -103,8 +103,14 @@ def plan(
 def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> None:
     """Print a plan: effects, measured time, sentences, stiffnesses and groups.
 
-    is_solved: whether the stiffness of the pieces is that of a solved patch.
-    verbose: whether to list the effects that the scene does not have.
+    Parameters
+    ----------
+    plan_data : dict
+        Plan as JSON, see `pf.plan`.
+    is_solved : bool
+        Whether the stiffness of the pieces is that of a solved patch.
+    verbose : bool
+        Whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
 

@@ -140,6 +140,8 @@ def get_build_hook():
             """Compile the kernels, add their files to the wheel and tag it for this platform.
 
             `version` is "editable" for an installation that refers to the source folder; it gets no machine code.
+
+            `build_data` is the description of the wheel by the build tool hatchling, which is changed.
             """
             if version == "editable" or os.environ.get("PATCHFEM_MACHINE_CODE", "0") in ("", "0"):
                 return

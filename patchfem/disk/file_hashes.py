@@ -53,7 +53,7 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
 
 
 def _iterate_candidate_names(text: str) -> Iterator[str]:
-    """Iterate over the parts of a string that may be names of files."""
+    """Iterate over the parts of a text that may be names of files."""
     yield text
     yield text.partition("=")[2].strip()
     for double_quoted, single_quoted in _QUOTED_PATTERN.findall(text):

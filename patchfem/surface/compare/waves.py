@@ -81,7 +81,10 @@ def compare_waves(
 
 
 def _subtract_polynomial(z, degree: int) -> np.ndarray:
-    """Subtract the polynomial of least squares from heights z (n,), or from each line of z (k, n)."""
+    """Subtract the polynomial of least squares from heights z (n,), or from each line of z (k, n).
+
+    The polynomial has this degree over the position in the line.
+    """
     basis = make_polynomials(z.shape[-1], degree)
     return z - z @ basis @ basis.T
 
