@@ -128,6 +128,7 @@ VERBS = {verb: row[0] for verbs in VERB_GROUPS.values() for verb, row in verbs.i
 # largest number of characters of an example on the same line as its description
 MAX_EXAMPLE_WIDTH = 45
 
+# Message if the memory is exhausted
 OUT_OF_MEMORY = (
     "out of memory; if a key of the scene sets the size of the largest part of the "
     "memory, `patchfem plan` names this part and the key"

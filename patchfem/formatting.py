@@ -35,7 +35,9 @@ UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for eac
 }
 # keys of UNIT_LADDERS by the name of the unit in a sentence
 SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
+# Pattern of the units that sentences contain
 _UNIT_PATTERN = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
+# Pattern of a number with an exponent, and its unit
 _POWER_PATTERN = re.compile(
     rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNIT_PATTERN})(?![\w/^]))?"
 )

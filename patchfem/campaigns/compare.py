@@ -19,7 +19,9 @@ from ..surface.areal import level
 from ..surface.compare.records import Comparison
 from ..surface.profile import Profile, resample_evenly
 
+# The two surfaces of a comparison, in names of files and results
 SIDES = ("before", "after")
+# Measures of a pressed patch that are compared for both surfaces
 COMPARED_MEASURES = (
     "pressure_peak",
     "contact_fraction",

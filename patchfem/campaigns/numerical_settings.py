@@ -13,9 +13,12 @@ from ..scene.rules.accuracy import has_effect
 
 # Settings that are counts, with their limits, besides the element size.
 COUNT_LIMITS = {"steps_per_cycle": (4, 12800), "shear_modes": (1, inf), "jumps": (1, inf)}
+# Names of all numerical settings that can be varied
 NUMERICAL_SETTINGS = ("element_size", *COUNT_LIMITS)
-COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # counts over that of the scene
-CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)  # cells of uniform meshes over those of the scene
+# Factors by which a count of the scene is varied
+COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+# Factors by which the number of cells of a uniform mesh is varied
+CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
 CELL_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
 DEFAULT_COUNT = 8  # middle value of a count that the scene does not set
 # Name of the accuracy of all settings together, which a curve may vary in place of a single one.

@@ -8,6 +8,7 @@ from ..core import PatchfemError
 from ..inputs.tables import TableFormat, find_factors, read_text
 
 COLUMNS = ("before", "after")  # columns that every table has
+# Possible cells of the column `direction`, "" if it is not known
 DIRECTIONS = ("", "x", "y")
 
 

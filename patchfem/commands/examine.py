@@ -27,6 +27,7 @@ REQUIRED_PACKAGES = (
     "threadpoolctl",
     "contourpy",
 )
+# Optional packages: extra of patchfem that installs each, and what it is for
 OPTIONAL_PACKAGES = {
     "pyuff": ("lab", "universal files"),
     "nbclient": ("notebook", "the notebooks of studies/notebooks"),

@@ -114,6 +114,7 @@ class Output:
 
 
 OutputGroup = Annotated[Output, Parameter(name="*")]
+# Output options for which the user gives none
 DEFAULT_OUTPUT = Output()
 
 

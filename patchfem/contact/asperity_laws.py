@@ -35,6 +35,8 @@ class SmoothAsperities:
     """Base class of pressure laws that are positive and smooth at every separation.
 
     Each law has `log_pressure` and `separation`.
+
+    `needs_load` tells whether a law must be given the mean pressure of a load before it can be evaluated.
     """
 
     __slots__ = ()

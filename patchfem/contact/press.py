@@ -38,10 +38,12 @@ STRIP_RESIDUAL_TOL = 1e-9
 MIN_RELATIVE_FORCE = 1e-12
 # Smallest load [N] or overlap [m] for which the products in the check of the solution do not underflow
 MIN_COMPUTABLE_LOAD = 1e-200
+# Note on what strips neglect
 NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
     "unless their captions name strips; result.nc contains every strip"
 )
+# Message about a roll that the contact does not determine
 LOOSE_ROLL_MESSAGE = (
     "contact.strips: the nodes that touch do not determine the rotation about x; raise "
     "contact.strips.count or prescribe contact.strips.roll"
@@ -183,7 +185,11 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
 
 
 class StripProperties(NamedTuple):
-    """Compliances (m, m) [m/N] and nodal areas (m,) [m2] of one strip."""
+    """Properties of one strip with m nodes.
+
+    - normal, tangential (m, m): normal and shear compliance [m/N].
+    - weight (m,): nodal areas [m2].
+    """
 
     normal: np.ndarray
     tangential: np.ndarray

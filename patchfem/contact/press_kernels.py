@@ -45,6 +45,9 @@ class ContactBounds(NamedTuple):
     """Force [N] and gap [m] below which a node violates its contact condition.
 
     Both are <= 0, to allow for the rounding error of a force and of a gap.
+
+    - min_force: force [N] of a node in contact below which it leaves the set.
+    - min_gap: gap [m] of an open node below which it enters the set.
     """
 
     min_force: float
@@ -52,7 +55,12 @@ class ContactBounds(NamedTuple):
 
 
 class ContactEnergy(NamedTuple):
-    """Energy [J] of a preloaded contact and its derivatives (force [N], moment [N m])."""
+    """Energy of a preloaded contact and its derivatives.
+
+    - value: energy [J].
+    - heave_slope: derivative [N] by the heave, the rigid displacement that opens the contact.
+    - rotation_slope: derivative [N m] by the rotation.
+    """
 
     value: float
     heave_slope: float

@@ -30,6 +30,7 @@ from .strip_compliance import StripCompliance, factorise
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
 RESIDUAL_TOL = 1e-12
+# Message about a compliance that is not positive definite
 INDEFINITE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "

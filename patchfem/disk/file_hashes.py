@@ -9,7 +9,9 @@ from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 
+# Pattern of signs between which names of files may stand
 _SEPARATOR_PATTERN = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
+# Pattern of a text in quotes
 _QUOTED_PATTERN = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 

@@ -26,7 +26,11 @@ MAX_REFINEMENT_CHANGE = 1e-2
 
 
 class CellBlock(NamedTuple):
-    """Cells of one element: node numbers (t, k), and stiffnesses (t, 2 k, 2 k) per unit width [N/m per m]."""
+    """Cells of one element.
+
+    - nodes (t, k): node numbers.
+    - matrices (t, 2 k, 2 k): stiffnesses per unit width [N/m per m].
+    """
 
     nodes: np.ndarray
     matrices: np.ndarray
@@ -143,7 +147,11 @@ class _Part(NamedTuple):
 
 
 class _Stiffness(NamedTuple):
-    """Stiffness (2 k + 2, 2 k + 2) of the nodes (k,) of a part; its last two rows and columns are zero."""
+    """Stiffness of a part of a piece.
+
+    - nodes (k,): nodes of the part.
+    - matrix (2 k + 2, 2 k + 2): stiffness [N/m per m]; its last two rows and columns are zero.
+    """
 
     nodes: np.ndarray
     matrix: np.ndarray

@@ -26,7 +26,11 @@ from .elasticity import InterfaceCompliance
 
 
 class PieceInterface(NamedTuple):
-    """Ascending interface nodes (n,) [m] of a piece, and its compliances (n, n) [m2/N]."""
+    """Interface of a piece.
+
+    - x (n,): ascending interface nodes [m].
+    - compliance: compliances (n, n) [m2/N] of these nodes.
+    """
 
     x: np.ndarray
     compliance: InterfaceCompliance

@@ -8,19 +8,23 @@ from ..exceptions import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
 from .tables import TableFormat, find_factors, parse_number, read_text
 
+# Factors to SI by unit, for each column of numbers in a table of measured responses
 COLUMN_UNITS = {
     "frequency": UNIT_FACTORS["frequency"],
     "input": UNIT_FACTORS["acceleration"],
     "acceleration": UNIT_FACTORS["acceleration"],
     "displacement": UNIT_FACTORS["length"],
 }
+# Columns that a table of measured responses may have
 TABLE_FORMAT = TableFormat(
     COLUMN_UNITS,
     ("frequency", "input"),
     "frequency [Hz],input [g],acceleration [g],displacement [um],flag",
     "a measured table",
 )
+# File name extensions of universal files
 UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
+# Meanings of the letters in the column `flag` of a table of measured responses
 FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 

@@ -11,7 +11,9 @@ from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS
 from .universal import OrdinateType, make_channels, read_datasets
 
+# End of the message if there is no file of a drive signal
 FILE_REMEDY = "; drive.file is relative to the scene"
+# Columns of the table of a spectrum
 SPECTRUM_FORMAT = TableFormat(
     {
         "frequency": UNIT_FACTORS["frequency"],

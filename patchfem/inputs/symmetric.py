@@ -7,6 +7,7 @@ from ..core import PatchfemError
 from .tables import MAX_VALUE
 
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
+# End of the message about a skew-symmetric matrix
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 
 

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
+# Pattern of a number in a table
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
+# Words for the numbers of cells in messages
 _NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 

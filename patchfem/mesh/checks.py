@@ -63,7 +63,10 @@ class TaggedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PairMesh:
-    """Two pieces that share no node and whose interfaces have the same ends."""
+    """Two pieces that share no node and whose interfaces have the same ends.
+
+    `lower` and `upper` are the meshes of the pieces.
+    """
 
     lower: PieceMesh
     upper: PieceMesh

@@ -12,6 +12,7 @@ from ..core import PatchfemError
 from .checks import CELL_TAGS, EDGE_TAGS, TaggedBlock, TaggedMesh
 from .elements import ELEMENTS
 
+# How a deck contains tags, for messages
 TAG_HELP = (
     "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET, of *SURFACE of type ELEMENT or of "
     "*ELSET made of line elements"

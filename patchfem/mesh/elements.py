@@ -10,7 +10,11 @@ import numpy as np
 
 
 class ShapeFunctions(NamedTuple):
-    """Values (g, k) of k shape functions at g points, and their derivatives (g, 2, k) along the local coordinates."""
+    """Shape functions of an element with k nodes at g points.
+
+    - values (g, k): their values.
+    - gradients (g, 2, k): their derivatives along the local coordinates.
+    """
 
     values: np.ndarray
     gradients: np.ndarray

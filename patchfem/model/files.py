@@ -237,6 +237,7 @@ def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
     peaks.read_spectral_moments(path, cutoff)
 
 
+# Function that checks a file, by the key that names it
 FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,

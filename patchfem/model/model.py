@@ -43,6 +43,8 @@ class MeasuredFile(NamedTuple):
     - gains: factors of the acceleration and of the displacement.
     - reading: kind of the values.
     - cutoff: cut-off frequency [Hz] of the instrument.
+
+    `path` is the file.
     """
 
     path: Path
@@ -76,6 +78,8 @@ class Model:
     - absent: effects that the scene does not name.
     - grooves: grooves that the load climbs, or None.
     - motion: features of the scene that decide which engines can compute its motion.
+    - source: scene of the model, with the line of each key.
+    - accuracy: tolerance and numerical settings.
     """
 
     source: Source

@@ -26,6 +26,7 @@ class PatchPiece:
     - coating: material and thickness of the coating, None if the piece is bare.
     - length: length [m] along x.
     - end: shape of both ends.
+    - substrate: elastic material below the coating.
     """
 
     height: float
@@ -69,6 +70,7 @@ class PatchPieces:
     - substrate: substrate of a piece for which the scene gives no other.
     - pairs: number of equal patches that share the load.
     - plane: ``"strain"`` or ``"stress"``.
+    - lower, upper: the pieces.
     """
 
     lower: PatchPiece
@@ -162,6 +164,7 @@ class PatchStrips(NamedTuple):
 
     - roll: angle [rad] about the x axis.
     - offset: lateral position [m] of the load line, None if the piece cannot roll.
+    - count: number of equal strips.
     """
 
     count: int
@@ -175,6 +178,7 @@ class PatchInterface:
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
+    - skin: pressure law of the asperities on the faces, None if the faces are smooth.
     """
 
     skin: Asperities | None

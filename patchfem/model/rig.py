@@ -77,6 +77,8 @@ class RigDrive:
     - frequency: frequency [Hz] of a sine or of levels.
     - cycles: drive cycles of the whole run.
     - force: amplitude [N] of a force drive.
+    - waveform: form of the signal, with what the engines must know of it.
+    - levels: amplitudes of a drive that is raised in levels.
     """
 
     signal: "DriveSignal"

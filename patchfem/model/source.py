@@ -20,6 +20,7 @@ class Source:
     - remarks: sentences about keys without effect.
     - sets: ``key=value`` strings that were given in addition to the text.
     - notes: sentences about what the defaults neglect.
+    - title: title of the scene.
     """
 
     path: Path

@@ -35,10 +35,15 @@ MIN_LOG_RATIO = 10
 # Number of significant digits of a value, so that a tenth of a range is
 # 0.1 and not 0.1000000000000001.
 SIGNIFICANT_DIGITS = 15
+# Pattern of a number
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+# Pattern of a range: first..last, with :count and the spacing log or lin
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+# Pattern of a number with a unit
 _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
+# Pattern of a sign before a tolerance, which is not accepted
 _TOLERANCE_PATTERN = re.compile(r"\+/?-|±")
+# Sign that closes a list, an inline table or a text, by the sign that opens it
 _CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 

@@ -47,7 +47,11 @@ WISHES: dict[str, str] = _ROWS["wishes"]
 
 
 class Choice(NamedTuple):
-    """Friction law chosen for a user: the row of JOINT_LAWS, and both answers as lists of words."""
+    """Friction law that is chosen for a user.
+
+    - row: row of JOINT_LAWS with the law.
+    - known, wanted: words of both answers: what is known of the joint, and what is to be computed.
+    """
 
     row: JointLaw
     known: list[str]

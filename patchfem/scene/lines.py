@@ -10,11 +10,14 @@ from pathlib import Path
 from .keys.types import KeyValue
 from .keys.values import TomlTable, TomlValue
 
+# Pattern of an item with its number from 1, such as mode[1]
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
+# Pattern of an item in a message with its number from 0, such as structure.mode.0
 _ITEM_IN_MESSAGE_PATTERN = re.compile(
     r"\b((?:structure|drive|wear)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
 )
 _BLANK_PATTERN = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
+# Pattern of one word of a dotted key in TOML, bare or in quotes
 _KEY_PART = r"""[A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*'"""
 _KEY = rf"((?:{_KEY_PART})(?:[ \t]*\.[ \t]*(?:{_KEY_PART}))*)[ \t]*"
 _KEY_PART_PATTERN = re.compile(_KEY_PART)

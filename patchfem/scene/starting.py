@@ -5,7 +5,9 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 from .keys.types import advise_on_name
 
+# Folder of the template scenes
 TEMPLATE_FOLDER = Path(__file__).parent / "templates"
+# Description of each template scene, by its kind
 TEMPLATE_DESCRIPTIONS = {
     "patch": "two coated pieces pressed together: contact area, pressure and stiffness",
     "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",

@@ -21,9 +21,10 @@ from .keys.types import (
 from .keys.values import TomlTable, TomlValue
 from .lines import split_key
 
-# Rating of a table of a similar name, of which 1 is that of a table that knows all keys inside.
+# Rating of a table whose name is similar to an unknown key; a table that knows all keys inside has 1
 SIMILAR_NAME_RATING = 0.75
-SAME_NAME_RATING = 2.0  # rating of a table of the same name, above that of all others
+# Rating of a table with the name of an unknown key, above all other ratings
+SAME_NAME_RATING = 2.0
 MIN_RATING = 0.5  # rating above which a table is suggested
 
 

@@ -18,12 +18,16 @@ MAX_BYTES = 4 * 2**20
 MAX_QUOTED_CHARACTERS = 60
 # Key with a value that opens neither quotes nor a bracket.
 _BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
+# Pattern of a number that lacks a digit before or after its point
 _DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
+# Pattern of a number with a decimal comma
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
+# Pattern of a quantity or a word without quotes
 _QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
     r"[a-zA-Z][\w./ -]*"
 )
+# Pattern of the position in an error message of tomllib
 _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 

@@ -9,7 +9,11 @@ from .shear_modes import N_SHEAR_MODES, find_sufficient_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
-    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] at m nodes in f states."""
+    """Fields at m nodes in f states.
+
+    - traction (f, m): shear traction [Pa].
+    - local_slip (f, m): irreversible slip [m].
+    """
 
     traction: np.ndarray
     local_slip: np.ndarray

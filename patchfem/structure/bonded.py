@@ -11,6 +11,7 @@ from .modes import make_basis
 # Smallest squared frequency of an elastic mode relative to the largest one; a mode with a smaller
 # one is rigid
 MIN_ELASTIC_FRACTION = 1e-12
+# Fields of a modal basis that are participations
 PARTICIPATION_FIELDS = (
     "slide",
     "base",

@@ -45,6 +45,7 @@ MIN_STRAIN = 1e-12
 # Smallest reciprocal condition number of the residual flexibility at the boundary that is not
 # round-off
 MIN_RESIDUAL_FLEXIBILITY = 1e-8
+# Name of the method with fixed-interface modes
 CRAIG_BAMPTON = "craig-bampton"
 
 

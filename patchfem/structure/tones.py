@@ -93,4 +93,5 @@ def _build_tones(drive: DriveKeys) -> TonesRecord:
     return make_tones(keys.frequencies, keys.accelerations, phases, duration)
 
 
+# Function that builds the signal of the waveform of this module
 DRIVE_BUILDERS = {"tones": _build_tones}

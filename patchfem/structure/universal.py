@@ -15,7 +15,12 @@ COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
 
 
 class _ModalNumbers(NamedTuple):
-    """Natural frequency [Hz], damping ratio and modal mass, in the units of the file, of a mode."""
+    """Numbers of a mode.
+
+    - frequency: natural frequency [Hz].
+    - zeta: damping ratio.
+    - modal_mass: modal mass in the units of the file.
+    """
 
     frequency: float
     zeta: float

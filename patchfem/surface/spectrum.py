@@ -22,7 +22,11 @@ ELEMENTS_PER_CURVE = (
 
 
 class WaveSpectrum(NamedTuple):
-    """Mean squares (n,) [m2] of the waves (n,) [m] of a trace, longest first; waves[0] is twice its length."""
+    """Spectrum of a trace.
+
+    - waves (n,): wavelengths [m], longest first; the first one is twice the length of the trace.
+    - power (n,): mean square [m2] of each wave.
+    """
 
     waves: np.ndarray
     power: np.ndarray

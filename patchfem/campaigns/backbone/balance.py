@@ -26,7 +26,9 @@ N_LINEAR_STEPS = 200
 # MAX_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
 MIN_MODE_ENERGY = 0.5
 MAX_DEVIATION = 0.6
+# Reason why a mode has no curve
 NO_FREE_MOTION = "no free motion of these amplitudes was found"
+# Reason why an overdamped mode has no curve
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
 

@@ -13,6 +13,7 @@ from ...runs.rig import decays
 FIRST_CYCLES = 3.0
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
 MAX_LOOP_CYCLES = 192.0
+# Measures of a friction loop from which a backbone follows
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 

@@ -54,6 +54,7 @@ class Levels(NamedTuple):
     forces: Sequence[float] = ()
 
 
+# Levels of a backbone for which the user gives neither amplitudes nor forces
 DEFAULT_LEVELS = Levels()
 
 

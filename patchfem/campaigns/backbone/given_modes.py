@@ -15,10 +15,13 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
-MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
+# Largest sum, over all modes, of the fractions of stiffness that a joint is assumed to contribute
+MAX_JOINT_FRACTION = 0.5
+# Note on a table of the scene that a backbone ignores
 IGNORED_TABLE_NOTE = (
     "[{table}] is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
 )
+# Note on modes whose `slide` is not given
 ASSUMED_SIGNS_NOTE = (
     "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
     "move the output in the same direction; the curves of all methods depend on this assumption, so give the signs of "

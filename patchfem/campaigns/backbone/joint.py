@@ -24,7 +24,9 @@ from .bench_loops import compute_steady_loop
 MIN_AMPLITUDE_FACTOR = 1e-2
 # Fraction of the gross-slip amplitude at which there is no slip at all.
 STUCK_FRACTION = 1e-5
+# End of the message where another method has a curve
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
+# Reason why the friction loop of a law has no closed form
 NO_CLOSED_FORM = (
     "the friction loop of bonds has a closed form only with reading = "
     '"stretch", order = 1, a constant bond length and pieces that are rigid in shear'

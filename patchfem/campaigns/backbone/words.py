@@ -10,18 +10,22 @@ from .records import ROUND_OFF_ERROR, Backbone, Curve
 MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 # Smallest shift of the phase resonance by other modes that is reported, in half-widths of the resonance.
 MIN_REPORTED_RATIO = 0.05
+# Beginning of a note on a curve without error of the mesh
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
+# Reason why a curve has no value at some amplitudes, by method
 REASONS_OF_GAPS = {
     "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
     "smaller amplitudes, or the mode may stop oscillating",
     "quasi-static": "the static curve does not reach these amplitudes",
 }
+# What the curve of each method is for
 PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
 }
+# Advice if no method has a curve
 NO_CURVE = (
     "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
     'drive.kind = "free".'

@@ -29,17 +29,20 @@ from ..backbone.words import describe_span
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
+# Factors to SI by unit, for each column of a measured curve
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "frequency": {"Hz": 1.0},
     "damping": RATIO_UNITS,
 }
+# Header of the table of a measured curve, for messages
 HEADER = "amplitude [um],frequency [Hz],damping [%]"
 FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
 # First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
 FIRST_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
-SAME_ERROR = 0.1  # relative change of an error at which it is known
+# Relative change of an assumed error from one fit to the next below which it is known
+SAME_ERROR = 0.1
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
@@ -50,6 +53,7 @@ N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
+# Warning about what the intervals of a fit leave out
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 

@@ -38,7 +38,9 @@ class Listener:
     progress: Callable | None = None
 
 
+# Options of a fit for which the user gives none
 DEFAULT_OPTIONS = FitOptions()
+# Listener that reports nothing
 SILENT = Listener()
 
 

@@ -27,6 +27,7 @@ QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
+# Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
 

@@ -15,6 +15,7 @@ MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
 EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
+# Kind of quantity of each column that belongs to a condition
 CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 

@@ -15,6 +15,7 @@ from ..fits.problem import FreeKeys
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
+# Assignment of the method that computes steady motions, for scenes that set no method
 STEADY_METHOD = "accuracy.method=harmonic"
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from .sweep_table import SweepTable, SweptKey
 
 NEGLIGIBLE_CHANGE = 0.05  # relative change that is commonly called negligible
-DOUBLING = 1.0  # relative change of a measure that doubles
+# Relative change of a measure at twice its value
+DOUBLING = 1.0
+# Measures of a motion whose change has a limit
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -23,6 +25,7 @@ MOTION_MEASURES = (
     "friction_ratio_peak",
     "onset_level",
 )
+# Relative change of each measure up to which a swept key counts as harmless
 CHANGE_AT_LIMIT = {
     **dict.fromkeys(MOTION_MEASURES, NEGLIGIBLE_CHANGE),
     "normal_stiffness": NEGLIGIBLE_CHANGE,

@@ -14,6 +14,7 @@ import numpy as np
 
 from .sweep_table import SweepTable
 
+# Measures for which the swept keys are ranked
 RANKED_MEASURES = (
     "relative_displacement_amplitude",
     "loop_area",

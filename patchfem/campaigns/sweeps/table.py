@@ -15,6 +15,7 @@ from .cases import Cases
 
 # Name of the first result column of a sweep.csv; this and all later columns are ignored.
 OUTCOME_COLUMN = "outcome"
+# Header of a table of cases, for messages
 CASE_HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 

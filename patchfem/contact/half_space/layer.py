@@ -21,7 +21,11 @@ MAX_WAVE_DEPTH = 40.0
 
 
 class WaveCompliance(NamedTuple):
-    """Displacement of the face per traction [m/Pa]: inwards under a pressure, along x under a shear traction."""
+    """Displacement of the face per traction [m/Pa] at n wave numbers.
+
+    - normal (n,): displacement inwards under a pressure.
+    - shear (n,): displacement along x under a shear traction.
+    """
 
     normal: np.ndarray
     shear: np.ndarray

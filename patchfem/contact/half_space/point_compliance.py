@@ -109,7 +109,11 @@ class PointCompliance:
 
 
 class SmoothModes(NamedTuple):
-    """Eigenfunctions (n, r) of a smooth compliance, with their compliances (r,) [m2/N]."""
+    """Eigenfunctions of a smooth compliance.
+
+    - modes (n, r): eigenfunctions in columns.
+    - mode_compliances (r,): compliance [m2/N] of each.
+    """
 
     modes: np.ndarray
     mode_compliances: np.ndarray

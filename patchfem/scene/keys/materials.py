@@ -59,6 +59,7 @@ def _read_materials() -> dict[str, MaterialRecord]:
     return materials
 
 
+# Materials of the package by name
 MATERIALS = _read_materials()
 
 

@@ -15,6 +15,7 @@ from .structure import check_energy_gain, check_structure
 from .together import check_together
 from .wear import check_wear
 
+# Tables that decide the kind of a scene
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
 

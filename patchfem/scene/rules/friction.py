@@ -40,6 +40,7 @@ def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
         )
 
 
+# Remark on a key that has no effect
 CONSTANT_LENGTH = "has no effect while the bond length is constant; add rest_growth and slip_growth"
 
 

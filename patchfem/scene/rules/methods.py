@@ -108,6 +108,7 @@ ENGINE_SUPPORT = {
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
+# Key of the engine that computes the motion
 METHOD_KEY = "accuracy.method"
 
 

@@ -19,6 +19,7 @@ SET_MISTAKE_ORDER = 10**9
 # Length in characters above which a message cuts a word; keys, units and file names are shorter.
 MAX_WORD_CHARACTERS = 200
 N_SHOWN_CHARACTERS = 60  # number of characters of a cut word that a message shows
+# Pattern of a word that is cut in a message
 _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 

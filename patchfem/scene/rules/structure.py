@@ -19,6 +19,7 @@ NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
+# Keys that name places of a universal file
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 
 

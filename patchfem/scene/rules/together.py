@@ -87,7 +87,12 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
 
 
 class _Clause(NamedTuple):
-    """Clause of a condition: its keys, and the values that one of them has, () for any."""
+    """Clause of a condition on the keys of a scene.
+
+    - is_negated: whether the clause must not hold.
+    - keys: dotted keys, of which one must be given.
+    - values: values that this key must have, () for any.
+    """
 
     is_negated: bool
     keys: tuple[str, ...]

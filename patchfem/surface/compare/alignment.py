@@ -19,25 +19,29 @@ from .statistics import (
     subtract_local_level,
 )
 
-MAX_FIT_POINTS = (
-    40_000  # number of points to which the place is fitted; more would hardly improve it
-)
-MIN_COMMON = 0.2  # smallest common part relative to the own surface
-MAX_STRETCH = 0.015  # largest error of length of a place
+# Largest number of points to which the place is fitted; more would hardly improve it
+MAX_FIT_POINTS = 40_000
+# Smallest part of the own surface that both surfaces must show
+MIN_COMMON = 0.2
+# Largest relative difference in length of two traces at the same place
+MAX_STRETCH = 0.015
 N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
 BEND_GAIN = 0.8
-CLEAR_BEND_GAIN = (
-    0.2  # the same where heights above the first trace do not matter: no line fits at all
-)
+# Noise about a parabola relative to that about a line below which the parabola is subtracted even if it leaves heights
+# above the first trace: then no line fits at all
+CLEAR_BEND_GAIN = 0.2
 MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
-SURE_SIGNIFICANCE = (
-    12.0  # the same as MIN_SIGNIFICANCE, of a place among others nearly as significant
-)
-LIKELY_SIGNIFICANCE = 6.0  # significance of a place that suffices if enough heights agree
-MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
-MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated surfaces
-MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
+# Significance of the correlation at a place above which the place is sure without other evidence
+SURE_SIGNIFICANCE = 12.0
+# Significance of the correlation at a place that suffices if enough heights agree, too
+LIKELY_SIGNIFICANCE = 6.0
+# Smallest fraction, of the heights that do not agree by chance, that must agree at a likely place
+MIN_EXCESS = 0.2
+# Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
+MIN_AGREEMENT = 3.0
+# Fraction of heights that must agree in addition to MIN_AGREEMENT times that of unrelated surfaces
+MIN_AGREEING = 0.05
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
@@ -53,6 +57,9 @@ class Aligned:
 
     - numbers: what the sentence on the reason needs.
     - gain_error: standard deviation of the gain, as far as the unworn heights show it.
+    - model: common points of both surfaces.
+    - fit: depths, place and datum that fit the unworn heights.
+    - place: place of the second surface where the search found it.
     """
 
     reason: str = ""

@@ -14,11 +14,14 @@ from .statistics import (
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
-MIN_PART_SIDE = (
-    4  # side of the smallest changed part of scans; a smaller one may be an error of interpolation
-)
-MIN_RUN = 9  # the same of traces, where an error of interpolation at a kink spreads over 7 samples and one on each side
-MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
+# Side in samples of the smallest changed part of scans; a smaller one may be an error of interpolation
+MIN_PART_SIDE = 4
+# Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
+# and one more on each side
+MIN_RUN = 9
+# Side in samples of the smallest group of points whose own depths, not means over windows, show a change; by number of
+# axes
+MIN_SPOT_SIDE = {1: 1, 2: 3}
 MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}

@@ -38,12 +38,15 @@ from .statistics import remove_long_waves
 from .track import find_spans, get_margin, measure_track
 from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
-END_SAMPLES = 7  # number of lines from an end at which growth includes it
-MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
+# Number of lines of points at an end of a surface in which growth counts as growth at this end
+END_SAMPLES = 7
+# Fraction of the points of a line near an end above which the end has grown
+MIN_GROWN_LINE = 0.5
 MARGIN = 7  # side of the square by which worn places of scans are enlarged, so that flanks count
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
 MAX_TRACK_FRACTION = 0.8
-MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
+# Smallest fraction of worn heights in a track as wide as the whole surface; where only tops are worn, it is smaller
+MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW = 3.0
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
@@ -67,6 +70,7 @@ class Names(NamedTuple):
     place: tuple[str, ...]
 
 
+# Names of the quantities by number of axes: 1 for traces, 2 for scans
 NAMES = {
     1: Names(
         lost="worn_area",
@@ -110,6 +114,7 @@ class Options(NamedTuple):
     keep_spikes: bool = False
 
 
+# Options of a comparison for which the user gives none
 DEFAULTS = Options()
 
 

@@ -42,6 +42,7 @@ class DepthMap:
     - y: None for traces.
     - inside, missing: masks of the common part, and of its points without a depth.
     - cell: length [m] or area [m2] of a point.
+    - errors: errors that the unworn heights show.
     """
 
     x: np.ndarray

@@ -14,13 +14,16 @@ from .records import name_quantity
 from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
 
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
-MIN_TILES = 6  # smallest number of tiles that show these errors
+# Smallest number of tiles that show the errors of the datum
+MIN_TILES = 6
 MIN_FREEDOM = (
     3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
 )
-MIN_DATUM_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
+# Smallest number of unworn heights in a tile that shows the errors of the datum
+MIN_DATUM_TILE_HEIGHTS = 5
 MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
-MEDIAN_VARIANCE = 1.57  # variance of a median relative to that of a mean, of normal errors
+# Variance of the median of normal errors relative to that of their mean, pi/2
+MEDIAN_VARIANCE = 1.57
 MAX_DEPTH_NOISE = 4.0  # noise relative to the median above which a depth cannot be the largest
 
 

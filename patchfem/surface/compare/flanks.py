@@ -13,8 +13,9 @@ from .depths import make_section
 from .raster import Raster, fill_gaps
 from .statistics import subtract_plane
 
-N_TRACES = 50  # number of starts, and of random phases, of the first trace that show its roughness
-# Height of a track relative to the largest one in all these traces, above which it is not chance.
+# Number of shifted copies of the first trace, and of copies with random phases, that show what its roughness alone does
+N_TRACES = 50
+# Height of a track relative to the largest one in the copies of the first trace, above which it is not chance
 MIN_CLEARANCE = 1.2
 FLANK_PARTS = 6  # smallest number of parts of each flank
 MIN_PART_SAMPLES = 4  # smallest number of samples of a part

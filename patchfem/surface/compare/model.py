@@ -31,23 +31,29 @@ BORDER_SAMPLES = 3  # distance from the border of a surface from which on its sp
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
-# Side of a surface relative to the deviation of the Gaussian of the long waves, which are not used to refine its place.
+# Side of a surface relative to the standard deviation of a Gaussian; the waves longer than it are not used to refine
+# the place
 PLACE_WAVES = {1: 100, 2: 20}
-MIN_WAVE_SAMPLES = 10.0  # smallest such deviation of traces, in samples
-# Deviations of the Gaussians that smooth both surfaces in turn.
+# Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
+# place
+MIN_WAVE_SAMPLES = 10.0
+# Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
 REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
 N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
-MIN_DETERMINANT = 1e-3  # smallest determinant of the places of tiles that show a datum
-MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
+# Smallest determinant of the mean datum functions of some tiles; below it these tiles do not determine a datum
+MIN_DETERMINANT = 1e-3
+# Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one; datums of larger
+# scale are not compared
+MAX_SCALE = 4.0
 MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
-MAX_AGREEING_DISTANCE = (
-    5.0  # distance from a datum, in its smallest scale, within which heights agree
-)
-MIN_GROWN_DISTANCE = 10.0  # distance, in the same scale, above which they have grown
+# Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
+MAX_AGREEING_DISTANCE = 5.0
+# Distance of a height above a datum, relative to the smallest scale, from which on it has grown
+MIN_GROWN_DISTANCE = 10.0
 
 
 class Model:

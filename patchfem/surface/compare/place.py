@@ -10,15 +10,17 @@ from ..profile import robust_deviation
 from .raster import Raster, fill_gaps
 from .statistics import TINY, remove_long_waves, smooth
 
-# By number of axes: errors of length of a trace, and rotations of a scan [rad], the same turned by 180 degrees too.
+# Rotations of a scan [rad] that are tried, also after half a turn
 ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
+# Turns that are tried, by number of axes: relative differences in length of traces, and rotations [rad] of scans
 TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
 MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
 IMAGE_WAVES = {
     1: 40,
     2: 12,
 }  # side of an image relative to the deviation of the Gaussian of its long waves
-BORDER_FRACTION = 0.1  # part of a trace that falls to zero at its ends before it is whitened
+# Fraction of a trace, half of it at each end, over which its heights fall to zero before its spectrum is whitened
+BORDER_FRACTION = 0.1
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
 # Significance of a place beyond which no mirrored scan is tried.
 CLEAR_SIGNIFICANCE = 9.0

@@ -18,7 +18,12 @@ MAX_PLACE_UNEVENNESS = (
 
 
 class Raster(NamedTuple):
-    """Heights z (n,) or (m, n) [m], NaN where missing; first place and step (d,) [m] of each axis, y before x."""
+    """Surface on even steps, of d = 1 axis (trace) or d = 2 axes (scan, y before x).
+
+    - z (n,) or (m, n): heights [m], NaN where missing.
+    - origin (d,): first position [m] along each axis.
+    - steps (d,): step [m] along each axis.
+    """
 
     z: np.ndarray
     origin: np.ndarray

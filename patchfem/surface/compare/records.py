@@ -16,6 +16,7 @@ from ..quantity import SIDE, Quantity, read_definitions
 if TYPE_CHECKING:
     from .depth_map import DepthMap
 
+# Unit and definition of each quantity of a comparison, by name
 DEFINITIONS = read_definitions("comparison")
 
 

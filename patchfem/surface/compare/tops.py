@@ -10,7 +10,8 @@ from .changes import MIN_RUN, WINDOWS
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .statistics import compute_threshold, remove_long_waves
 
-CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
+# Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear; its reverse shows growth
+CONTROL = 3.0
 MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
 TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
 N_CLASSES = 10  # number of classes of heights whose depths are compared

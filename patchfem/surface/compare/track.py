@@ -16,11 +16,12 @@ from .tops import find_tops
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
-MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
-MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
-MAX_VALLEY_DEPTH = (
-    0.5  # largest mean depth of valleys relative to that of tops at which only tops are worn
-)
+# Mean depth of the tops of a part of a trace, in standard deviations of a depth, from which on it belongs to a track
+MIN_TRACK_DEPTH = 0.5
+# Largest mean depth over the few samples of a top that is not worn, in standard deviations of a single depth
+MAX_UNWORN_TOP = 1.5
+# Mean depth of valleys relative to that of tops below which only the tops of a part are worn
+MAX_VALLEY_DEPTH = 0.5
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
 # Standard deviations of a single height on a flank.
 MIN_FLANK_DEPTH = 4.0
@@ -37,14 +38,19 @@ MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
 RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
-N_FIFTHS = 5  # the floor is the deepest part of a track that is as long as a fifth of it
+# The floor of a track is its deepest part of the length of a fifth of it
+N_FIFTHS = 5
 # Bias of the largest of the means over parts of a length, in standard deviations of such a mean, for each length over
 # which they are within two of these of the largest; 0.5 to 0.9 for flat, round, wedge-shaped and tilted bottoms.
 MAXIMUM_BIAS = 0.7
 
 
 class End(NamedTuple):
-    """Place [m] where a track begins or ends, with its interval."""
+    """Place where a track begins or ends.
+
+    - value: place [m].
+    - low, high: ends of its interval [m].
+    """
 
     value: float
     low: float

@@ -17,6 +17,7 @@ from .units import HEADER_EXAMPLE, shorten
 MIN_MATRIX_ROWS = (
     8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
 )
+# Names of an array of heights in a MATLAB file, the first one that it has is read
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 
 

@@ -24,6 +24,7 @@ _FIRST_BYTES = {  # format of a file by its first bytes
     b"\xff\xfe": "text",
     b"\xfe\xff": "text",
 }
+# End of the message about a damaged file
 DAMAGED = "the file is cut off or damaged; save or export it anew"
 
 

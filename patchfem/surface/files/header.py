@@ -25,7 +25,9 @@ MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was
 _COLUMN = re.compile(
     r"([^\W\d][\w .-]*?)\s*(?:[\[(]([^\[\]()]*)[\])]|(?:[_/]|\s(?:in\s)?)\s*(\w+)(?=\s\s|$))"
 )
+# Pattern of a cell between blanks, with its unit
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
+# Pattern of a line that states the size or the units of a matrix
 _FACT = re.compile(
     r"(?:(width|height|lateral units|value units)\s*:|(length),(?=\s*[0-9.]+ \w+$))\s*(.*)",
     re.IGNORECASE,

@@ -10,6 +10,7 @@ from .table import make_surface
 from .text import read_text
 from .units import SIZE_LINES, UNIT_LIST, parse_length_unit
 
+# Reader of each kind of content
 READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
 

@@ -25,7 +25,9 @@ from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 MAX_STEP_UNEVENNESS = 1e-6
+# Pattern of a number in quotes with a decimal comma
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+# Pattern of a control character, which no text contains
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 

@@ -13,6 +13,7 @@ DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 2517
 MIN_LENGTH_STEPS = 2.0
 N_RAYS = 360  # number of directions in which the autocorrelation is followed
 RAY_POINTS = 4  # number of points on a ray per raster step
+# Unit and definition of each parameter of a scan, by name
 AREAL = read_definitions("areal")
 
 

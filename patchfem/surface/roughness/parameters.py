@@ -21,7 +21,9 @@ MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 WITHOUT_INTERVAL = ("t", "sk", "ku")
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
+# Unit and definition of each parameter of a trace, by name
 PROFILE = read_definitions("profile")
+# Unit and definition of each amplitude of waves, by name
 WAVES = read_definitions("waves")
 
 

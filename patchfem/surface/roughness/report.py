@@ -34,7 +34,7 @@ CONFIDENCE_TAIL = 0.05  # probability of a true value below, and above, the inte
 
 
 class Sampling(NamedTuple):
-    """Length, step [m] and numbers of samples of a surface, after resampling."""
+    """Length [m], step [m] and numbers of samples (`shape`) of a surface, after resampling."""
 
     length: float
     step: float
