@@ -78,12 +78,12 @@ def compare(
     """
     length = parse_quantity(shift, "length", "compare --shift")
     options = Options(parse_units(units), direction, length, datum, keep_spikes)
-    given = {"--scene": scene, "--predicted": predicted, "--piece": piece}
+    other_options = {"--scene": scene, "--predicted": predicted, "--piece": piece}
     files = [path for path in (before, after, *other) if path is not None]
 
     # an option that the kind of comparison does not use is a mistake of the user
     if pairs is not None:
-        _refuse_others({"another file": files, **given}, "a table of pairs")
+        _refuse_others({"another file": files, **other_options}, "a table of pairs")
         _compare_pairs(pairs, options, output_options.into(pairs.stem))
         return
     if len(files) != 2:
@@ -98,7 +98,7 @@ def compare(
     if before.is_dir() or after.is_dir():
         set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
         set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
-        _refuse_others({**set_options, **given}, "results folders")
+        _refuse_others({**set_options, **other_options}, "results folders")
         save(lambda _: worn.answer_runs(before, after), output)
     elif scene is not None:
         _compare_in_scene(before, after, options, (scene, set_), output)

@@ -314,8 +314,8 @@ class Progress:
             return
         text = text or f"{fraction:.0%} done"
         if fraction > first_fraction:
-            left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
-            text += f", about {format_duration(left)} left"
+            seconds_left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
+            text += f", about {format_duration(seconds_left)} left"
         self._print(text)
 
     def count(self, done: int, total: int) -> None:

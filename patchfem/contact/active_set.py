@@ -375,33 +375,33 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
     load, moment, spring : float
         Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
     """
-    left = 0
+    left_index = 0
     right = x.size - 1
-    while left < right:
+    while left_index < right:
         # Rotation at which the piece would rest on both nodes
-        theta = -(gap[right] - gap[left]) / (x[right] - x[left])
+        theta = -(gap[right] - gap[left_index]) / (x[right] - x[left_index])
         height = gap + theta * x
         lowest = int(np.argmin(height))
 
         # A node between them touches first. The side of it that the load line is on keeps the support.
-        if left < lowest < right and height[lowest] < min(height[left], height[right]):
+        if left_index < lowest < right and height[lowest] < min(height[left_index], height[right]):
             imbalance = load * x[lowest] - moment - spring * theta
             if imbalance == 0:
                 return float(theta)
             if imbalance > 0:
                 right = lowest
             else:
-                left = lowest
+                left_index = lowest
         # Both nodes touch. Against a spring the moment may lift the piece off one of them.
-        elif spring > 0 and load * x[left] - moment - spring * theta > 0:
-            right = left
+        elif spring > 0 and load * x[left_index] - moment - spring * theta > 0:
+            right = left_index
         elif spring > 0 and load * x[right] - moment - spring * theta < 0:
-            left = right
+            left_index = right
         else:
             return float(theta)
 
     # The piece rests on one node, and the spring balances the moment
-    return float((load * x[left] - moment) / spring)
+    return float((load * x[left_index] - moment) / spring)
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:

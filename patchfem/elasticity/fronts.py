@@ -289,9 +289,9 @@ def _assemble_leaf(blocks, cells, position) -> _Stiffness:
     selected = []
     n_cells = 0
     for nodes, matrices in blocks:
-        here = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
+        block_cells = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
         n_cells += len(nodes)
-        selected.append((nodes[here], matrices[here]))
+        selected.append((nodes[block_cells], matrices[block_cells]))
     nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in selected]))
     position[nodes] = np.arange(nodes.size)
     size = 2 * nodes.size + 2

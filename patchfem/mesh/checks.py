@@ -135,12 +135,12 @@ def _check_tags(mesh: TaggedMesh) -> None:
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
     ]
     if missing:
-        found = set()
+        known_tags = set()
         for block in mesh.blocks:
-            found |= set(np.unique(block.names).tolist()) - {""}
+            known_tags |= set(np.unique(block.names).tolist()) - {""}
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
-            f"file: {', '.join(sorted(found)[:MAX_LISTED_TAGS]) or 'none'})"
+            f"file: {', '.join(sorted(known_tags)[:MAX_LISTED_TAGS]) or 'none'})"
         )
 
     # Cells without a known tag have no material. Other elements, such as edges, may have any tag.
@@ -270,10 +270,10 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
     the piece in the message.
     """
     is_quadratic = edges.middles >= 0
-    begin, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
+    start, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
     middle = points[edges.middles[is_quadratic]]
-    along = end - begin
-    offset = middle - (begin + end) / 2
+    along = end - start
+    offset = middle - (start + end) / 2
 
     # Parts of the offset along and across the edge, as fractions of its length
     length_squared = (along**2).sum(axis=1)
@@ -287,7 +287,7 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
         raise PatchfemError(
             f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
             f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
-            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle; "
+            f"{_format_place(start[worst])}, to {_format_place(end[worst])}) away from the middle; "
             f"{MAX_MIDDLE_SHIFT:.0%} along the edge and {MAX_MIDDLE_BULGE:.0%} across are permitted"
         )
 
@@ -387,16 +387,16 @@ def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
     """
     # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)
-    begin = mesh.points[border[:, 0]]
-    along = mesh.points[border[:, 1]] - begin
+    start = mesh.points[border[:, 0]]
+    along = mesh.points[border[:, 1]] - start
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
-    nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 + 1e-9))
-    edge = np.repeat(np.arange(len(border)), [len(found) for found in nearby_nodes])
+    nearby_nodes = tree.query_ball_point(start + along / 2, length / 2 * (1 + 1e-9))
+    edge = np.repeat(np.arange(len(border)), [len(neighbours) for neighbours in nearby_nodes])
     node = nodes[np.concatenate(nearby_nodes).astype(int)]
 
     # The area that edge and node span is 0 where the node lies on the edge
-    offset = mesh.points[node] - begin[edge]
+    offset = mesh.points[node] - start[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
     is_touching = np.abs(area) <= LENGTH_TOL * mesh.length * length[edge]
     is_touching &= (border[edge] != node[:, None]).all(axis=1)

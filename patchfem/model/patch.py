@@ -409,19 +409,19 @@ def build_pieces(contact: Contact) -> PatchPieces:
         Pieces, and length, width and height [m] of the patch.
     """
     pieces = []
-    for own in (contact.lower or OnePiece(), contact.upper or OnePiece()):
+    for piece_keys in (contact.lower or OnePiece(), contact.upper or OnePiece()):
         end = SHARP_END
-        if own.chamfer:
-            end = End("chamfer", own.chamfer)
-        elif own.end_radius:
-            end = End("radius", own.end_radius)
+        if piece_keys.chamfer:
+            end = End("chamfer", piece_keys.chamfer)
+        elif piece_keys.end_radius:
+            end = End("radius", piece_keys.end_radius)
 
         # Keys of the piece come before those of [contact].
         piece = PatchPiece(
-            height=own.height or contact.height,
-            substrate=own.substrate or contact.substrate,
-            coating=None if own.coating == "none" else own.coating or contact.coating,
-            length=own.length or contact.length,
+            height=piece_keys.height or contact.height,
+            substrate=piece_keys.substrate or contact.substrate,
+            coating=None if piece_keys.coating == "none" else piece_keys.coating or contact.coating,
+            length=piece_keys.length or contact.length,
             end=end,
         )
         pieces.append(piece)

@@ -160,8 +160,8 @@ class PlainNumbers:
             name, *pieces = key.split(".")
             table = tables.get(name) or getattr(self.scene, name)
             tables[name] = _replace_number(table, pieces, value)
-        kept = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
-        return replace(self.scene, sets=(*kept, *sets), **tables)
+        other_sets = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
+        return replace(self.scene, sets=(*other_sets, *sets), **tables)
 
     def changed_tables(self) -> set[str]:
         """Return the names of the tables in which a number differs."""

@@ -69,10 +69,10 @@ def point_fields(patch, shear, snapshots) -> ShearFields:
     weight = patch.pieces.interface.weight[index]
     traction = np.zeros((len(snapshots), patch.x.size))
     local_slip = np.zeros_like(traction)
-    for i, one in enumerate(snapshots):
-        traction[i, index] = one.forces / weight
-        local_slip[i] = one.slide
-        local_slip[i, index] -= one.stretch + one.bend
+    for i, snapshot in enumerate(snapshots):
+        traction[i, index] = snapshot.forces / weight
+        local_slip[i] = snapshot.slide
+        local_slip[i, index] -= snapshot.stretch + snapshot.bend
     return ShearFields(traction, local_slip)
 
 

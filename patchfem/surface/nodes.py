@@ -59,9 +59,9 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     first = max(int(np.searchsorted(known, x[0], "right")) - 1, 0)
     last = min(int(np.searchsorted(known, x[-1], "left")), known.size - 1)
     places = profile.x + shift
-    kept = (places >= known[first]) & (places <= known[last])
+    is_kept = (places >= known[first]) & (places <= known[last])
 
-    step = float(np.median(np.diff(places[kept])))
+    step = float(np.median(np.diff(places[is_kept])))
     element = float(np.diff(x).max())
     if step > MAX_STEP_ELEMENTS * element:
         notes += (
@@ -69,7 +69,7 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
             f"{format_length(element)} long; the surface between samples is interpolated",
         )
     return replace(
-        profile, x=frozen_array(places[kept]), z=frozen_array(profile.z[kept]), notes=notes
+        profile, x=frozen_array(places[is_kept]), z=frozen_array(profile.z[is_kept]), notes=notes
     )
 
 

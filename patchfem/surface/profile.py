@@ -18,7 +18,9 @@ SPIKE_DEVIATIONS = 8.0
 FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
-CHUNK = 131_072  # number of medians that are computed at a time, which limits the memory
+MEDIANS_PER_CHUNK = (
+    131_072  # number of medians that are computed at a time, which limits the memory
+)
 MAX_TRACE_SAMPLES = (
     2_097_152  # largest number of samples in a resampled trace, which limits the memory
 )
@@ -170,8 +172,8 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
     windows = np.lib.stride_tricks.sliding_window_view(z, window)
     median = np.empty(len(windows))
     spread = np.empty(len(windows))
-    for start in range(0, len(windows), CHUNK):
-        part = slice(start, start + CHUNK)
+    for start in range(0, len(windows), MEDIANS_PER_CHUNK):
+        part = slice(start, start + MEDIANS_PER_CHUNK)
         median[part] = np.median(windows[part], axis=1)
         spread[part] = np.median(np.abs(windows[part] - median[part, None]), axis=1)
     place = np.clip(np.arange(z.size) - window // 2, 0, z.size - window)

@@ -192,13 +192,13 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     # interpolation in logarithms; each step adds the points that it found
     tolerance = 1e-2 * joint.model.accuracy.tolerance
     for _ in range(MAX_FORCE_STEPS):
-        found = np.array([_interpolate_amplitude(known, force) for force in forces])
-        new = _estimate_forces(joint, np.unique(found))
-        reached = np.interp(found, new.amplitude, new.force)
+        amplitudes_of_forces = np.array([_interpolate_amplitude(known, force) for force in forces])
+        new = _estimate_forces(joint, np.unique(amplitudes_of_forces))
+        reached = np.interp(amplitudes_of_forces, new.amplitude, new.force)
         if np.all(np.abs(reached - forces) <= tolerance * forces):
             break
         known = _join(known, new)
-    return found
+    return amplitudes_of_forces
 
 
 def _estimate_forces(joint: JointMode, amplitudes) -> Curve:

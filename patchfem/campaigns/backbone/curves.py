@@ -31,7 +31,7 @@ from .records import (
     make_band,
 )
 
-CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
+CURVE_FUNCTIONS = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_RATIO = 4.0
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
@@ -187,7 +187,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
     amplitudes : (k,) array
         Amplitudes at the output [m].
     methods : iterable of str
-        Keys of CURVES.
+        Keys of CURVE_FUNCTIONS.
     progress : callable or None
         Called with the name of each method before it begins.
 
@@ -215,9 +215,9 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
         if progress is not None:
             progress(method)
         try:
-            curve = CURVES[method](joint, amplitudes)
+            curve = CURVE_FUNCTIONS[method](joint, amplitudes)
             if richer is not None:
-                curve = _widen_by_missing_modes(curve, CURVES[method](richer, amplitudes))
+                curve = _widen_by_missing_modes(curve, CURVE_FUNCTIONS[method](richer, amplitudes))
             curves[method] = curve
         except (NotConverged, PatchfemError) as reason:
             missing[method] = str(reason).removeprefix("backbone: ")
@@ -364,7 +364,7 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
 
     def net_loss(log_amplitude: float) -> float:
         """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
-        point = CURVES[method](joint, np.exp([log_amplitude]))
+        point = CURVE_FUNCTIONS[method](joint, np.exp([log_amplitude]))
         return point.damping[0] * point.amplitude[0]
 
     try:

@@ -98,11 +98,11 @@ def make_band(curves: dict[str, Curve]) -> Band | None:
         low = getattr(curve, name) - getattr(curve, f"{name}_error")
         high = getattr(curve, name) + getattr(curve, f"{name}_error")
         for other in curves.values():
-            here, there = match_amplitudes(curve, other)
-            value = getattr(other, name)[there]
-            error = getattr(other, f"{name}_error")[there]
-            low[here] = np.fmin(low[here], value - error)
-            high[here] = np.fmax(high[here], value + error)
+            indices, other_indices = match_amplitudes(curve, other)
+            value = getattr(other, name)[other_indices]
+            error = getattr(other, f"{name}_error")[other_indices]
+            low[indices] = np.fmin(low[indices], value - error)
+            high[indices] = np.fmax(high[indices], value + error)
         limits += low, high
     return Band(method, curve.amplitude, *limits)
 

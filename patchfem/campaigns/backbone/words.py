@@ -21,7 +21,7 @@ REASONS_OF_GAPS = {
     "quasi-static": "the static curve does not reach these amplitudes",
 }
 # What the curve of each method is for
-PURPOSES = {
+METHOD_PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
 }
@@ -114,7 +114,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = backbone.best
     sentences = [
-        f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
+        f"Use the curve of method {band.method}: {METHOD_PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
         describe_band_width(backbone),
         *_describe_coupling(joint, curve),

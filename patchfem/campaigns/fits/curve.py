@@ -30,25 +30,25 @@ from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
 # Factors to SI by unit, for each column of a measured curve
-UNITS = {
+CURVE_UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "frequency": {"Hz": 1.0},
     "damping": RATIO_UNITS,
 }
 # Header of the table of a measured curve, for messages
-HEADER = "amplitude [um],frequency [Hz],damping [%]"
+CURVE_HEADER = "amplitude [um],frequency [Hz],damping [%]"
 FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
 # First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
-FIRST_ERROR = 5e-2
+FIRST_RELATIVE_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
 # Relative change of an assumed error from one fit to the next below which it is known
-SAME_ERROR = 0.1
+SAME_ERROR_TOL = 0.1
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 # Largest relative difference of a measured amplitude and that of its computed point.
-SAME_AMPLITUDE = 1e-6
+SAME_AMPLITUDE_TOL = 1e-6
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
@@ -156,11 +156,11 @@ def read_damping_curve(path) -> MeasuredCurve:
     """
     # names may have the prefix "decay_"
     units = {}
-    for name, unit in UNITS.items():
+    for name, unit in CURVE_UNITS.items():
         for prefix in ("decay_", ""):
             units |= dict.fromkeys((f"{prefix}{name}", f"{prefix}{name}_error"), unit)
-    required = tuple(f"{name} decay_{name}" for name in UNITS)
-    form = TableFormat(units, required, HEADER, "a decay")
+    required = tuple(f"{name} decay_{name}" for name in CURVE_UNITS)
+    form = TableFormat(units, required, CURVE_HEADER, "a decay")
     table = read_columns(path, form)
     columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
     methods = table.labels.get("method", ("decay",))
@@ -178,7 +178,7 @@ def read_damping_curve(path) -> MeasuredCurve:
         if f"{name}_error" in columns:
             error[row] = columns[f"{name}_error"]
         else:
-            error[row] = FIRST_ERROR * np.abs(value[row])
+            error[row] = FIRST_RELATIVE_ERROR * np.abs(value[row])
             assumed[row] = True
     if (error < 0).any():
         raise PatchfemError(
@@ -293,7 +293,7 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
     curve = backbone.curves[method]
     distance = np.abs(np.log(curve.amplitude[:, None] / amplitudes))
     points = np.array([curve.frequency, curve.damping])[:, distance.argmin(axis=0)]
-    return np.where(distance.min(axis=0) <= SAME_AMPLITUDE, points, np.nan)
+    return np.where(distance.min(axis=0) <= SAME_AMPLITUDE_TOL, points, np.nan)
 
 
 def fit_curve(
@@ -348,7 +348,7 @@ def fit_curve(
     for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
         before = measured.error
         measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
-        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR:
+        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR_TOL:
             break
         again = curves.solve(measured, method, start=first.values)
         first = again.count_earlier_search(first)

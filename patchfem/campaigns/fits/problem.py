@@ -41,7 +41,7 @@ class Listener:
 # Options of a fit for which the user gives none
 DEFAULT_OPTIONS = FitOptions()
 # Listener that reports nothing
-SILENT = Listener()
+SILENT_LISTENER = Listener()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

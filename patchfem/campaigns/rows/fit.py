@@ -18,7 +18,7 @@ from ...identify.least_squares import Fit, Search
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..fits.options import FitOptions
-from ..fits.problem import SILENT, FittedKeys, Listener
+from ..fits.problem import SILENT_LISTENER, FittedKeys, Listener
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels
 from .model_readings import ModelReadings
@@ -92,7 +92,7 @@ def fit_rows(
     measured: Path,
     ranges: Sequence[Range],
     options: FitOptions,
-    listener: Listener = SILENT,
+    listener: Listener = SILENT_LISTENER,
     seed: int = 0,
 ) -> FittedRows:
     """Fit free keys of a rig to a table of measured responses.

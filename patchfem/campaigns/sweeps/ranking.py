@@ -79,7 +79,7 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
     if table.is_grid:
         names = [name for name in names if np.isfinite(columns[name]).all()]
         grids = [columns[name].reshape(table.shape) for name in names]
-        found = [compute_grid_indices(grid)[:, varied] for grid in grids]
+        index_arrays = [compute_grid_indices(grid)[:, varied] for grid in grids]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
         if known.sum() < MIN_CASES_PER_KEY * len(varied):
@@ -90,10 +90,10 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
         ranks = [rankdata(table.keys[axis].values)[known] for axis in varied]
         coordinates = (np.stack(ranks, axis=1) - 0.5) / len(table)
         values = np.stack([column[known] for column in columns.values()], axis=1)
-        found = estimate_random_indices(coordinates, values)
+        index_arrays = estimate_random_indices(coordinates, values)
 
     ranking = {}
-    for name, array in zip(names, found):
+    for name, array in zip(names, index_arrays):
         if array is not None:
             keys = [table.keys[axis].key for axis in varied]
             indices = [SobolIndex(key, *numbers) for key, numbers in zip(keys, array.T.tolist())]
@@ -160,14 +160,14 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
         It is the mean over the folds of the deviation from a surface through the cases of the other folds
         (cross-validation).
         """
-        left = []
+        unexplained = []
         for others, fold in folds:
             deviation = fit(others, smoothing)(coordinates[fold]) - scaled[fold]
-            left.append(
+            unexplained.append(
                 np.mean(deviation**2, axis=0)
                 / np.maximum(scaled[fold].var(axis=0), SPREAD_ROUND_OFF)
             )
-        return np.mean(left, axis=0)
+        return np.mean(unexplained, axis=0)
 
     # The smoothing is that with the smallest median over the measures (cross-validation).
     fractions = [find_unexplained(smoothing) for smoothing in SMOOTHING_PARAMETERS]

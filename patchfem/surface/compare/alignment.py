@@ -37,7 +37,7 @@ SURE_SIGNIFICANCE = 12.0
 # Significance of the correlation at a place that suffices if enough heights agree, too
 LIKELY_SIGNIFICANCE = 6.0
 # Smallest fraction, of the heights that do not agree by chance, that must agree at a likely place
-MIN_EXCESS = 0.2
+MIN_EXCESS_AGREEMENT = 0.2
 # Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
 MIN_AGREEMENT = 3.0
 # Fraction of heights that must agree in addition to MIN_AGREEMENT times that of unrelated surfaces
@@ -177,7 +177,9 @@ def _is_same_place(aligned: Aligned) -> bool:
         return True
     chance = _estimate_chance(*waves, noise)
     agreeing = fit.unworn.mean()
-    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS * (1 - chance):
+    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS_AGREEMENT * (
+        1 - chance
+    ):
         return True
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 

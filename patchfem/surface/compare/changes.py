@@ -13,16 +13,18 @@ from .statistics import (
     make_polynomials,
 )
 
-WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
+# Sides in samples of the windows whose mean depth is tested, by number of axes
+WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
 # Side in samples of the smallest changed part of scans; a smaller one may be an error of interpolation
 MIN_PART_SIDE = 4
 # Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
 # and one more on each side
-MIN_RUN = 9
+MIN_RUN_SAMPLES = 9
 # Side in samples of the smallest group of points whose own depths, not means over windows, show a change; by number of
 # axes
 MIN_SPOT_SIDE = {1: 1, 2: 3}
-MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
+# Standard deviations to which a single depth counts in a mean over a window, by number of axes
+MAX_PULL_DEVIATIONS = {1: 4.0, 2: 8.0}
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
 N_PARTS = 60  # parts of the trace whose means show a shallow track
@@ -49,9 +51,9 @@ def find_changed(depth, noise) -> np.ndarray:
     known = np.isfinite(depth)
     relative = np.where(known, depth / noise, 0.0)
     changed = np.zeros(depth.shape, bool)
-    windows = WINDOWS[depth.ndim]
+    windows = WINDOW_SIDES[depth.ndim]
     limit = compute_threshold(len(windows) * known.sum())
-    pull = MAX_PULL[depth.ndim]
+    pull = MAX_PULL_DEVIATIONS[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
 
     for side in windows:
@@ -78,7 +80,7 @@ def find_changed(depth, noise) -> np.ndarray:
         shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
         changed[places[shallow.samples]] = True
         changed = ndimage.binary_dilation(changed)
-        side = MIN_RUN
+        side = MIN_RUN_SAMPLES
     return ndimage.binary_opening(changed, np.ones((side,) * depth.ndim)) & known
 
 
@@ -158,8 +160,10 @@ def find_detection_limit(depth, noise) -> float:
     """
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
-    side = max(side for side in WINDOWS[2] if side <= max(min(depth.shape) / 4, 1))
-    mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
+    side = max(side for side in WINDOW_SIDES[2] if side <= max(min(depth.shape) / 4, 1))
+    mean = ndimage.uniform_filter(
+        np.clip(depth / noise, -MAX_PULL_DEVIATIONS[2], MAX_PULL_DEVIATIONS[2]), side
+    )
     scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
-    threshold = compute_threshold(len(WINDOWS[2]) * depth.size)
+    threshold = compute_threshold(len(WINDOW_SIDES[2]) * depth.size)
     return float(threshold * scatter * np.median(noise))

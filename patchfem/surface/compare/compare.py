@@ -42,13 +42,14 @@ from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 END_SAMPLES = 7
 # Fraction of the points of a line near an end above which the end has grown
 MIN_GROWN_LINE = 0.5
-MARGIN = 7  # side of the square by which worn places of scans are enlarged, so that flanks count
+# Side in samples of the square by which worn places of scans are enlarged, so that flanks count
+WORN_MARGIN_SIDE = 7
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
 MAX_TRACK_FRACTION = 0.8
 # Smallest fraction of worn heights in a track as wide as the whole surface; where only tops are worn, it is smaller
 MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
-MIN_BOW = 3.0
+MIN_BOW_RATIO = 3.0
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_TOPS_FRACTION = 0.6
@@ -377,8 +378,8 @@ def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool
 
 
 def _enlarge(part) -> np.ndarray:
-    """Return a mask, `part`, enlarged by a square of MARGIN samples."""
-    return ndimage.binary_dilation(part, np.ones((MARGIN,) * part.ndim))
+    """Return a mask, `part`, enlarged by a square of WORN_MARGIN_SIDE samples."""
+    return ndimage.binary_dilation(part, np.ones((WORN_MARGIN_SIDE,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
@@ -440,7 +441,7 @@ def _doubt(
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
     waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = bow > area and bend > MIN_BOW * waves_height
+    is_bow_large = bow > area and bend > MIN_BOW_RATIO * waves_height
     if is_bow_large and (code == "no_wear" or (code.startswith("worn") and is_cut)):
         return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
     return code, {}

@@ -102,8 +102,8 @@ class DepthMap:
         limit = 2 * UNWORN_LIMIT
         relative = np.clip(self.depth / self.noise, -limit, limit)
         beside = self.inside & ~covered & ~self.missing
-        left = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
+        loss_beside = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
         height = remove_long_waves(self.before + self.after)
         valleys = relative[self.unworn & (height < np.median(height))]
         lowered = max(-float(np.median(valleys)), 0.0) if valleys.size else 0.0
-        return left + lowered * self.noise_level * self.size
+        return loss_beside + lowered * self.noise_level * self.size

@@ -48,7 +48,7 @@ MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
 MIN_DETERMINANT = 1e-3
 # Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one; datums of larger
 # scale are not compared
-MAX_SCALE = 4.0
+MAX_DATUM_SCALE = 4.0
 MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
 # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
 MAX_AGREEING_DISTANCE = 5.0
@@ -279,7 +279,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
         datums = np.linalg.solve(normal, right[..., None])[..., 0]
 
     scales = _scale_datums(datums, few_base, few)
-    near = np.flatnonzero(scales <= MAX_SCALE * scales.min())
+    near = np.flatnonzero(scales <= MAX_DATUM_SCALE * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
     agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
     has_end = np.zeros(near.size, bool)

@@ -15,10 +15,8 @@ ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
 # Turns that are tried, by number of axes: relative differences in length of traces, and rotations [rad] of scans
 TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
 MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
-IMAGE_WAVES = {
-    1: 40,
-    2: 12,
-}  # side of an image relative to the deviation of the Gaussian of its long waves
+# Side of an image relative to the standard deviation of the Gaussian of its long waves, by number of axes
+IMAGE_WAVES = {1: 40, 2: 12}
 # Fraction of a trace, half of it at each end, over which its heights fall to zero before its spectrum is whitened
 BORDER_FRACTION = 0.1
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image

@@ -7,7 +7,7 @@ from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
-BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
+BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
@@ -19,7 +19,7 @@ WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussi
 MIN_NEIGHBOUR_FRACTION = (
     0.2  # smallest weight of the neighbours in the mask that determines the level beside a height
 )
-MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
+MAX_FINISH_RATIO = 1.5  # short waves relative to the noise, below which no place can be found
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -55,7 +55,7 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     excluded : (n,) bool array, optional
         Depths without weight.
     """
-    root = np.clip(1 - (depth / (BIWEIGHT * sigma)) ** 2, 0.0, None)
+    root = np.clip(1 - (depth / (BIWEIGHT_CONSTANT * sigma)) ** 2, 0.0, None)
     if excluded is not None:
         root = np.where(excluded, 0.0, root)
     scale = np.sqrt((jacobian**2).mean(axis=0)) + TINY
@@ -140,7 +140,7 @@ def find_mirror_finish(surfaces) -> dict[str, float]:
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
         height = robust_deviation(remove_long_waves(z))
-        if height <= MAX_FINISH * noise:
+        if height <= MAX_FINISH_RATIO * noise:
             return {"rq": float(height), "noise": float(noise)}
     return {}
 

@@ -28,7 +28,7 @@ MIN_FLANK_DEPTH = 4.0
 FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
 MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
-FLANKS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
+FLANK_POWERS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
 CLEAR_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
 FLANK_HEIGHT = 25.0  # depth, in standard deviations, to which a flank is fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
@@ -36,7 +36,7 @@ MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FL
 SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
 MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
-MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
+MAX_SQUARED_RESIDUAL = 16.0  # squared residual of a single depth beyond which it counts no more
 RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
 # The floor of a track is its deepest part of the length of a fifth of it
 N_FIFTHS = 5
@@ -224,15 +224,15 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
     """
     distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
     is_inside = distance > 0
-    deviance = np.empty((len(depths), len(FLANKS), places.size))
-    for form, powers in enumerate(FLANKS):
+    deviance = np.empty((len(depths), len(FLANK_POWERS), places.size))
+    for form, powers in enumerate(FLANK_POWERS):
         base = is_inside[..., None] * distance[..., None] ** np.array(powers)
         normal = np.einsum("mni,mnj->mij", base, base)
         normal += 1e-12 * np.eye(len(powers)) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
         residual = depths.T - fitted
-        deviance[:, form] = np.minimum(residual**2, MAX_SQUARE).sum(axis=1).T
+        deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_RESIDUAL).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 

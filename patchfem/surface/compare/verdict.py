@@ -6,7 +6,7 @@ from scipy import special
 from ..quantity import SIDE
 from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
-from .tops import CONTROL, find_worn_tops
+from .tops import LOSS_TO_GROWTH_RATIO, find_worn_tops
 
 MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
 MIN_LOST_DEVIATIONS = (
@@ -66,10 +66,10 @@ def judge_change(
     grown, grown_error : float
         Material above the first surface, and its standard deviation.
     """
-    if area > SIDE * error and lost > CONTROL * grown:
+    if area > SIDE * error and lost > LOSS_TO_GROWTH_RATIO * grown:
         return "worn" if area > sure_loss * error else "scar_or_drift"
     is_grown = grown > MIN_GROWN_DEVIATIONS * grown_error
-    if is_grown and grown > CONTROL * max(lost, 0.0):
+    if is_grown and grown > LOSS_TO_GROWTH_RATIO * max(lost, 0.0):
         return "grown"
     if is_grown and lost > MIN_LOST_DEVIATIONS * error:
         return "worn_and_grown"

@@ -12,15 +12,16 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
-from .units import HEADER_EXAMPLE, ROLES, parse_length_unit
+from .units import HEADER_EXAMPLE, ROLES_BY_NAME, parse_length_unit
 
 MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought
 MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 MAX_NAME = 80  # largest number of characters in the name of a column with its unit
 MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
-COMMENT = ("#", "%", "//")
+COMMENT_SIGNS = ("#", "%", "//")
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was not measured
+# Pattern of a height that was not measured
+MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
 _COLUMN = re.compile(
     r"([^\W\d][\w .-]*?)\s*(?:[\[(]([^\[\]()]*)[\])]|(?:[_/]|\s(?:in\s)?)\s*(\w+)(?=\s\s|$))"
@@ -82,7 +83,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
     facts = {}
     number = 0
     for number, line in islice(lines, MAX_HEADER_LINES):
-        is_comment = line.lstrip().startswith(COMMENT)
+        is_comment = line.lstrip().startswith(COMMENT_SIGNS)
         text = line.strip(" \n\t#%/") if is_comment else line.strip()
         cells, delimiter = split_cells(text)
         is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
@@ -94,19 +95,19 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
             facts[(fact[1] or fact[2]).lower()] = fact[3]
             continue
 
-        found = [_parse_column(cell) for cell in cells]
-        if any(column.role for column in found):
-            is_other = any(re.search("[:=]", column.name) for column in found)
-            if not 1 < len(found) <= MAX_HEIGHT_COLUMNS or is_other:
+        parsed = [_parse_column(cell) for cell in cells]
+        if any(column.role for column in parsed):
+            is_other = any(re.search("[:=]", column.name) for column in parsed)
+            if not 1 < len(parsed) <= MAX_HEIGHT_COLUMNS or is_other:
                 continue
             start = number
-            columns = found
+            columns = parsed
         else:
             # A line of units belongs to the names above it, or to x, (y,) z.
-            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(found), "")]
+            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(parsed), "")]
             columns = [
                 column._replace(unit=column.unit or unit.unit)
-                for column, unit in zip(columns, found)
+                for column, unit in zip(columns, parsed)
             ]
         named[len(cells)] = (start, columns)
         # Names of a comment count if one of them is known.
@@ -130,11 +131,11 @@ def _parse_column(cell: str) -> Column:
     match = _COLUMN.match(cell[:MAX_NAME])
     name, unit, word = match.groups() if match else (cell, None, None)
     role = name.strip(" _").lower()
-    if word is not None and role in ROLES and parse_length_unit(word):
+    if word is not None and role in ROLES_BY_NAME and parse_length_unit(word):
         unit = word
     elif word is not None:
         role = cell.lower()
-    return Column(ROLES.get(role, role), unit, cell)
+    return Column(ROLES_BY_NAME.get(role, role), unit, cell)
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
@@ -174,6 +175,6 @@ def is_number(cell: str, delimiter: str | None) -> bool:
 
     A decimal comma is possible unless the delimiter is a comma.
     """
-    if NUMBER_PATTERN.fullmatch(cell) or MISSING.fullmatch(cell):
+    if NUMBER_PATTERN.fullmatch(cell) or MISSING_PATTERN.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

@@ -11,7 +11,7 @@ from .text import read_text
 from .units import SIZE_LINES, UNIT_LIST, parse_length_unit
 
 # Reader of each kind of content
-READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
+READERS_BY_KIND = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
 
 def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
@@ -42,7 +42,7 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     content = fetch(path)
     if content.kind == "text":
         return make_surface(read_text(content, has_units=units is not None), units)
-    return make_surface(READERS[content.kind](content), units)
+    return make_surface(READERS_BY_KIND[content.kind](content), units)
 
 
 def _require_units(path, units) -> None:

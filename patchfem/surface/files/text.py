@@ -19,7 +19,15 @@ import numpy as np
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
-from .header import COMMENT, MISSING, Column, Header, parse_fact, read_header, split_cells
+from .header import (
+    COMMENT_SIGNS,
+    MISSING_PATTERN,
+    Column,
+    Header,
+    parse_fact,
+    read_header,
+    split_cells,
+)
 from .table import Table
 from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
@@ -200,7 +208,7 @@ def _read_rows(
     for number, line in lines:
         line = line.strip(" \n")
         place = f"{path}:{number}: '{shorten(line)}'"
-        if line.startswith(COMMENT):
+        if line.startswith(COMMENT_SIGNS):
             if is_matrix and re.search("[:=]", line):
                 raise PatchfemError(
                     f"{place} ends the scan or begins another one; keep only one scan per file"
@@ -239,7 +247,7 @@ def _parse_cell(place: str, role: str, cell: str) -> float:
     """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
-    if role == "index" or (role == "z" and MISSING.fullmatch(cell)):
+    if role == "index" or (role == "z" and MISSING_PATTERN.fullmatch(cell)):
         return np.nan
     raise PatchfemError(
         f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"

@@ -30,7 +30,7 @@ _COLUMN_NAMES = {
     "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil, raw",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
 }
-ROLES = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
+ROLES_BY_NAME = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
 
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"

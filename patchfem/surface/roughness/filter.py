@@ -41,7 +41,7 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
     is_scan = isinstance(surface, Areal)
     surface = surface if is_scan else level(resample_evenly(surface))
     axes = {"y": surface.y, "x": surface.x} if is_scan else {"x": surface.x}
-    kept = []
+    kept_slices = []
     cutoffs = []
     for name, axis in axes.items():
         step = measure_step(axis)
@@ -57,12 +57,12 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
                 f"{surface.source}: half a cut-off of {format_length(cutoff)} is trimmed at each end, so that it must be "
                 f"shorter than the length along {name}, {format_length(axis[-1] - axis[0])}"
             )
-        kept.append(slice(edge, axis.size - edge))
+        kept_slices.append(slice(edge, axis.size - edge))
         cutoffs.append(cutoff / step)
 
     waves = mean_surface(surface.z, cutoffs)
-    inside = tuple(kept)
-    places = {name: frozen_array(axes[name][part]) for name, part in zip(axes, kept)}
+    inside = tuple(kept_slices)
+    places = {name: frozen_array(axes[name][part]) for name, part in zip(axes, kept_slices)}
     return tuple(
         replace(surface, **places, z=frozen_array(z[inside])) for z in (waves, surface.z - waves)
     )

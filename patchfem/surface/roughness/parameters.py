@@ -93,9 +93,9 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
     is_kept = (extent >= MIN_HEIGHT_FRACTION * rough) & (width >= MIN_WIDTH_FRACTION * section)
-    kept = np.flatnonzero(is_kept)
+    kept_indices = np.flatnonzero(is_kept)
     # A hill or dale begins at the crossing before it.
-    ends = places[kept[1:][np.diff(above[first[kept]])] - 1]
+    ends = places[kept_indices[1:][np.diff(above[first[kept_indices]])] - 1]
     return float((ends[2:] - ends[:-2]).mean()) if ends.size > 2 else None
 
 
