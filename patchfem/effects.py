@@ -79,7 +79,7 @@ class Waveform(NamedTuple):
         return key in re.findall(r"\w+", " ".join(self.keys))
 
     def _has_trait(self, trait: str) -> bool:
-        """Return whether the waveform has a trait."""
+        """Return whether the waveform has a trait, one of the words of its row in WAVEFORMS."""
         return trait in self.traits.split()
 
     @property
@@ -440,7 +440,7 @@ def find_waveform(drive) -> Waveform:
 
 
 def law_has_trait(law: str | None, trait: str) -> bool:
-    """Return whether a friction law has a trait; False for an unknown law."""
+    """Return whether a friction law has a trait, such as "bonds"; False for an unknown law."""
     return law in LAWS and trait in LAWS[law].traits.split()
 
 

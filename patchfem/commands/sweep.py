@@ -101,7 +101,7 @@ class WorkerOptions:
     ) = False
 
     def part(self) -> tuple[int, int] | None:
-        """Return (i, n) of a shard, or None if there is no shard."""
+        """Return (i, n) for shard i of n parts of the cases, or None without a shard."""
         if not self.shard:
             return None
         i, _, n = self.shard.partition("/")

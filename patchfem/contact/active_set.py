@@ -374,6 +374,11 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
         Increasing positions and gap [m].
     load, moment, spring : float
         Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    float
+        Rotation that opens the gap at positive x [rad].
     """
     left_index = 0
     right = x.size - 1

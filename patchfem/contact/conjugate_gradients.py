@@ -94,6 +94,11 @@ def project_forces(
         Prescribed resultants rigid^T f.
     max_iterations : int
         Number of Newton steps.
+
+    Returns
+    -------
+    (n,) ndarray
+        Nearest such forces [N].
     """
     if not target.size:
         return np.maximum(force, 0.0)

@@ -406,6 +406,11 @@ def _make_state(
         Number of iterations of the solver.
     residuals : dict or sequence of pairs
         Residuals of the solution by name.
+
+    Returns
+    -------
+    StripsState
+        Its position of the holder includes the prescribed rotations.
     """
     _, layout, asperities = strips
     stiffness = None

@@ -140,6 +140,11 @@ def _make_channel(
         Unit factors of dataset 164, if the file has one.
     notes : list of str
         Receives sentences on what was not read as it stands.
+
+    Returns
+    -------
+    Channel
+        Values in the unit of the file.
     """
     location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])

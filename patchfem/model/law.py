@@ -56,7 +56,7 @@ class InterfaceLaw:
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
-        """Return the friction limits under a normal load [N]."""
+        """Return the static and the kinetic friction limit [N] under a normal load [N]."""
         law = self.numbers
         kinetic = law.kinetic if law.kinetic is not None else law.static
         return FrictionLimits(law.static * load, kinetic * load)

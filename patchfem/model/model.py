@@ -167,7 +167,7 @@ class Model:
         return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
 
     def friction_limits(self, load: float) -> FrictionLimits:
-        """Return the friction limits of the first interface of a rig under a load [N]."""
+        """Return the static and kinetic friction limit [N] of the first interface of a rig under a load [N]."""
         return self.rig.friction.interfaces[0].friction_limits(load)
 
 

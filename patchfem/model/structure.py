@@ -77,6 +77,11 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
     joint : float, optional
         Stiffness [N/m] of the joint; by default it follows from the friction laws. Modes that
         were measured with a pressed patch are not changed until its stiffness is given.
+
+    Returns
+    -------
+    ModalBasis
+        Modes with the participations of interfaces, drive and sensors.
     """
     modes = _build_given_modes(scene)
 

@@ -82,6 +82,11 @@ def _build_modes(
         Number of the mass that a force drives.
     needs_interface : bool
         Whether the modes must have an interface that slides.
+
+    Returns
+    -------
+    FileModes
+        Modal basis, and sentences on what was neglected or changed.
     """
     content = read_content(path)
     is_forced = drive_kind == "force"

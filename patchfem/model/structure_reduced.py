@@ -198,6 +198,11 @@ def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _Reduced
         Table [structure.reduced] of the scene.
     is_base_driven : bool
         Whether the base drives the structure.
+
+    Returns
+    -------
+    _ReducedFiles
+        Matrices, rows of the boundary and motion with the base.
     """
     read = [read_matrix(path, key) for key, path in paths.items()]
     with name_key("structure.reduced.mass"):

@@ -71,7 +71,10 @@ def _list_defaults(table: Table) -> dict[str, KeyValue]:
 
 
 def _list_idle_keys(table: Table) -> list[str]:
-    """Return the keys of a table without effect beside its other keys, besides those that `choices` finds."""
+    """Return the keys of a table that have no effect because of its other keys.
+
+    Keys that a selector such as `law` leaves unused are not listed; `find_choices` finds these.
+    """
     if isinstance(table, tables.Friction):
         return find_unused_law_keys(table)
     return ["element_size"] if isinstance(table, Contact) and table.mesh else []

@@ -185,7 +185,10 @@ def _replace_number(
 
 
 def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
-    """Return whether PLAIN_KEYS holds in a scene that is read from a draft."""
+    """Return whether the limits of PLAIN_KEYS are valid for a scene that is read from a draft.
+
+    They are valid for the kinds of scene in PLAIN_SCENES without files, except one of measured responses.
+    """
     names = [key for key, _ in list_named_files(scene)]
     if names not in ([], ["measured.file"]) or (names and scene.normal):
         return False

@@ -142,6 +142,11 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
         New modes in the coordinates of `basis`; their largest entries are made positive.
     damper : (n, n) array_like
         Damping matrix [1/s] that is added.
+
+    Returns
+    -------
+    ModalBasis
+        Basis whose coordinates are those of the new modes.
     """
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], 0)[0]
     shapes = shapes * np.where(largest < 0, -1.0, 1.0)

@@ -47,6 +47,11 @@ def compute_balance_curve(
         At the output [m], increasing.
     counts : tuple of int
         Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
+
+    Returns
+    -------
+    Curve
+        Frequency, damping ratio, loss and force with their errors, at the amplitudes at which the mode oscillates.
     """
     if joint.is_linear:
         return compute_constant_curve(joint, amplitudes)

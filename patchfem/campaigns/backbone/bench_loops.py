@@ -45,6 +45,11 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
         Amplitude of the sinusoidal displacement [m].
     frequency : float
         Frequency of the displacement [Hz].
+
+    Returns
+    -------
+    SteadyLoop
+        The last run, its settings, and the change by the later half of the cycles.
     """
     tolerance = model.accuracy.tolerance
     rested = replace(decays.with_automatic_method(model), kind="bench", rig=None)

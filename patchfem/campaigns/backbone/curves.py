@@ -144,6 +144,11 @@ def compute_backbones(
     levels : Levels
         Amplitudes, or forces at the output, of the points.
 
+    Returns
+    -------
+    list of Backbone
+        One for each model, in their order.
+
     Raises
     ------
     PatchfemError

@@ -54,6 +54,11 @@ def prepare_model(
         the scene.
     sets : tuple of str
         Assignments "table.key=value" that change the scene.
+
+    Returns
+    -------
+    PreparedModel
+        Model, and notes on what was assumed and ignored.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, sets)

@@ -282,6 +282,11 @@ def build_joint(model: Model, name: str) -> JointMode:
     name : str
         Name of the mode, or its number from 1 in a rig of masses; "" for the first mode.
 
+    Returns
+    -------
+    JointMode
+        Mode, pressed patch on several meshes, and stiffness of the stuck contact.
+
     Raises
     ------
     PatchfemError

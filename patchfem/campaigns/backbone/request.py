@@ -67,6 +67,11 @@ def compute_cases(
     progress : callable, optional
         Takes the name of a method that begins.
 
+    Returns
+    -------
+    BackboneCases
+        Backbones, one for each value of the key `over`.
+
     Raises
     ------
     PatchfemError

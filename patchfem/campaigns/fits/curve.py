@@ -252,6 +252,11 @@ class CurveModel(FreeKeys):
             Value of `IntervalKind`.
         start : (n,) array, optional
             First starting point in place of that of the scene.
+
+        Returns
+        -------
+        Fit
+            Values of the keys with their intervals.
         """
 
         def residual(values: np.ndarray) -> np.ndarray:
@@ -317,6 +322,11 @@ def fit_curve(
         Bounds of the free keys.
     options : FitOptions
         `starts` is the number of starting points of the search by the fast method.
+
+    Returns
+    -------
+    FittedCurve
+        Fitted keys, curve of the model and its band.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def choose_kind(scene: Scene, to: str) -> str:
 
 
 def check_options(kind: str, options: FitOptions) -> None:
-    """Raise PatchfemError if an option is invalid or belongs to another kind of fit than a key of KINDS."""
+    """Raise PatchfemError if an option is invalid or does not belong to this kind of fit, a key of KINDS."""
     for name, target in TARGETS.items():
         if getattr(options, name) and name not in KINDS[kind]:
             raise PatchfemError(

@@ -112,6 +112,11 @@ def fit_rows(
     seed : int
         Seed of the random starting points.
 
+    Returns
+    -------
+    FittedRows
+        Fitted keys, and the readings that the model predicts.
+
     Raises
     ------
     SceneError, PatchfemError

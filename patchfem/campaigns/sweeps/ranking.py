@@ -115,7 +115,11 @@ def _varies(table: SweepTable, name: str) -> bool:
 
 
 def compute_grid_indices(values: np.ndarray) -> np.ndarray:
-    """Return first and total index and its (equal) limits (4, keys) of values on a full grid."""
+    """Return Sobol indices (4, keys) of values on a full grid with one axis per key.
+
+    The rows are the first-order index, the total index, and the lower and upper limit of the latter, which are equal
+    to it.
+    """
     first = []
     total = []
     for axis in range(values.ndim):

@@ -76,6 +76,11 @@ def _solve_waves(k, depths: list[float], moduli: list[tuple[float, float]]) -> W
         Thickness [m] of each layer from the face down.
     moduli : list of tuple
         Lamé constants [Pa] of each layer.
+
+    Returns
+    -------
+    WaveCompliance
+        Displacement of the face per traction [m/Pa] at each wavenumber.
     """
     n_unknowns = 4 * len(depths)
     scale = moduli[0][1]

@@ -150,7 +150,7 @@ def split_keys(words: str) -> list[str]:
 
 
 def format_keys(words: str) -> str:
-    """Return a text of required or optional keys in words."""
+    """Return a text of keys such as "a+b c|d" in words: "a and b, c or d"."""
     return re.sub("[|/]", " or ", words.replace(" ", ", ").replace("+", " and "))
 
 
@@ -184,7 +184,10 @@ class TableChoices(NamedTuple):
 
 
 def find_choices(table: Table) -> TableChoices:
-    """Return what a table needs and does not use."""
+    """Return the keys that a table needs, and the keys in it that have no meaning.
+
+    Both follow from its selectors, keys such as `law` whose value decides which other keys are used.
+    """
     choices = TableChoices([], {})
     for selector in find_selectors(type(table)):
         value = getattr(table, selector.key, "")

@@ -63,7 +63,10 @@ class MotionFeatures(NamedTuple):
         return self.spring.endswith("grooves]")
 
     def describe_features(self) -> dict[str, str]:
-        """Return the end of a message on each feature that an engine may lack, "" if the motion does not have it."""
+        """Return features of the motion that an engine may lack, by name, as the end of a message.
+
+        A feature that the motion does not have is "".
+        """
         words = {
             "no-law": "" if self.joints else "for law 'none'",
             "load": self.load_change,

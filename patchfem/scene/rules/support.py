@@ -88,15 +88,15 @@ class Joint(TableFacts):
         return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
 
     def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait of `effects.LAWS[...].traits`."""
+        """Return whether the law has a trait, such as "bonds"; `effects.LAWS` lists them."""
         return law_has_trait(self.law or None, trait)
 
     def supports(self, *words: str) -> bool:
-        """Return whether the law is known and supports all of the given features."""
+        """Return whether the law is known and supports all of some features, such as "pieces"."""
         return self.law in LAWS and all(law_supports(self.table, word) for word in words)
 
     def lacks(self, *words: str) -> bool:
-        """Return whether the law is known and does not support all of the given features."""
+        """Return whether the law is known and does not support all of some features, such as "pieces"."""
         return self.law in LAWS and not self.supports(*words)
 
     @property

@@ -463,7 +463,7 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
 
 
 def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
-    """Return the largest depth and its place."""
+    """Return the largest depth and its place, as quantities by name."""
     largest, near = measure_largest(depths)
     best = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
     x = depths.x[best[-1]]

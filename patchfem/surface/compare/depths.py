@@ -142,6 +142,11 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         Functions of which the datum is a combination.
     shifts : sequence of (n,) or (m, n) array, optional
         Changes of the depths by one standard deviation of other errors [m].
+
+    Returns
+    -------
+    DepthErrors
+        Its `variance` is a function of a mask.
     """
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):

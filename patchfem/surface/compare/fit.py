@@ -140,6 +140,11 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
         Scale of all depths [m].
     worn : (n,) bool array
         Depths that do not count.
+
+    Returns
+    -------
+    (n,) array
+        Standard deviation of each depth [m], also of worn ones.
     """
     from scipy.optimize import nnls
 

@@ -104,7 +104,7 @@ class Model:
         self.keep_common(self.start)
 
     def _shape(self, values) -> np.ndarray:
-        """Return values (d,) in the shape of a factor of points (d, ...)."""
+        """Return values (d,) as an array that can be combined with points (d, ...)."""
         return np.reshape(values, (-1,) + (1,) * self.n_axes)
 
     def keep_common(self, state) -> None:
@@ -182,7 +182,7 @@ class Model:
         return image
 
     def find_changed(self, depth, noise) -> np.ndarray:
-        """Return the points (n,) bool that noise does not explain, of positive depth."""
+        """Return a mask (n,) of points whose positive depth (n,) [m] exceeds what noise (n,) [m] explains."""
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
 
     def find_worn(self, depth, noise) -> np.ndarray:
@@ -228,7 +228,7 @@ class Model:
         return (smooth(image, width) - smooth(image, np.hypot(self.smoothing, width)))[self.known]
 
     def find_datum(self, state, n_terms: int) -> np.ndarray:
-        """Return the state with the datum of some terms on which the unworn heights lie."""
+        """Return a state whose datum, of the first `n_terms` functions, goes through the unworn heights."""
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
         parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]

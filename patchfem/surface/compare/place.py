@@ -52,7 +52,10 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
 
 
 def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
-    """Return own and other surface: depths stand at the samples of the second trace, or of the first scan."""
+    """Return the own and the other surface, of the surfaces before and after wear.
+
+    Depths are computed at the points of the own surface: the second of two traces, the first of two scans.
+    """
     return (second, first) if first.z.ndim == 1 else (first, second)
 
 

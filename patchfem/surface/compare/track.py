@@ -250,6 +250,11 @@ def measure_track(
         First and last worn sample.
     lost : tuple of float, optional
         Area lost in the track [m2] and its interval; by default, what is lost between its ends.
+
+    Returns
+    -------
+    Track
+        Quantities by name, such as "width" and "depth_mean", each with its interval.
     """
     start, end = find_ends(depths, span)
     x = depths.x

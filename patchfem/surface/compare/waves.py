@@ -50,6 +50,11 @@ def compare_waves(
         Standard deviation of the depth [m], of both surfaces together.
     ends : sequence of float, optional
         Ends of tracks, in samples.
+
+    Returns
+    -------
+    dict of str to Quantity
+        "amplitude_ratio" and "slope_ratio"; without value where noise or the length does not allow one.
     """
     is_kept = np.ones(lines[0].shape[1], bool)
     for end in ends:

@@ -83,6 +83,11 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     units : tuple of str, optional
         Units of x (and y) and of z. They complete and overrule those of the file, with a note, except in formats that
         always state their units.
+
+    Returns
+    -------
+    Profile or Areal
+        Positions and heights [m], with increasing positions.
     """
     size = table.columns["z"].size
     refuse_many_heights(table.path, size)

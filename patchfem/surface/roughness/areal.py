@@ -26,6 +26,11 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
         Heights about the reference surface, NaN where missing.
     steps : tuple of float
         Spacings along y and along x [m].
+
+    Returns
+    -------
+    dict
+        Value, or code of the reason why there is none, by name.
     """
     heights = z[~np.isnan(z)]
     distribution = compute_moments(heights) | compute_core(heights)
