@@ -263,6 +263,7 @@ class KernelFunction:
     Parameters
     ----------
     module : KernelModule
+        Module of the function.
     name : str
         Name of the function in the module.
     file_prefix : str

@@ -120,6 +120,7 @@ class LoadedFunction:
     Parameters
     ----------
     address : int
+        Address of the machine code in memory.
     result_format : str or list
         Format of the result (`_describe_result`).
     nogil : bool

@@ -66,6 +66,7 @@ def _solve_by_fallbacks(
     compliance : StripCompliance
         Compliance [m/N] of the nodes.
     problem : ContactProblem
+        Gap [m], motions and loads of the nodes.
     max_iterations : int
         Largest number of contact sets that the primal-dual method tries from each start.
 

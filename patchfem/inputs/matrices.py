@@ -64,6 +64,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
     Parameters
     ----------
     *matrices : Matrix
+        Matrices of one structure, from several files.
 
     Returns
     -------

@@ -53,6 +53,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
     Parameters
     ----------
     path : Path
+        CSV file.
 
     Returns
     -------

@@ -246,6 +246,7 @@ def read_columns(path, form: TableFormat) -> Columns:
     Parameters
     ----------
     path : path-like
+        CSV file.
     form : TableFormat
         Columns that the table may have.
 

@@ -80,6 +80,7 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     Parameters
     ----------
     patch : PatchModel
+        Patch whose pieces may have rounded ends.
 
     Returns
     -------

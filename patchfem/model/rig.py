@@ -316,6 +316,7 @@ def _build(
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     own_modes : ModalBasis
         Modes without the spring of the bonded joint.
     interfaces : tuple of InterfaceLaw

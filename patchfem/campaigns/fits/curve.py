@@ -203,6 +203,7 @@ class CurveModel(FreeKeys):
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     ranges : sequence of Range
         Bounds of the free keys.
     amplitude : (k,) array
@@ -405,6 +406,7 @@ def extrapolate_curve(
     curves : CurveModel
         Model of the curve as a function of the free keys.
     measured : MeasuredCurve
+        Measured curve, whose errors a further measurement would have.
     fit : Fit
         Fitted values with their intervals.
     method : str

@@ -168,6 +168,7 @@ def read_response_table(path: Path) -> Readings:
     Parameters
     ----------
     path : Path
+        CSV file.
 
     Returns
     -------

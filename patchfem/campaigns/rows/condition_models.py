@@ -28,6 +28,7 @@ class ConditionModels(FreeKeys):
     Parameters
     ----------
     scene : Scene
+        Scene of a rig under sinusoidal base motion.
     conditions : (c, 2) array
         Frequency [Hz] and input [m s-2].
     ranges : sequence of Range

@@ -24,6 +24,7 @@ class ModelReadings:
     Parameters
     ----------
     models : ConditionModels
+        Models of the rig at the measured conditions.
     say : callable, optional
         Called with a line of text before code is compiled.
     """

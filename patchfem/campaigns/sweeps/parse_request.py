@@ -204,7 +204,9 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     Parameters
     ----------
     sweep_scene : SweepScene
+        Scene of the sweep.
     cases : Cases
+        All cases, of which some are checked.
 
     Returns
     -------

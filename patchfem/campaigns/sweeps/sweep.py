@@ -175,6 +175,7 @@ class ChunkQueue:
     numbers : sequence of int
         Numbers of the cases.
     workers : int
+        Number of workers that take chunks.
     min_size : int
         Smallest number of cases per chunk, used with a single worker.
     """

@@ -25,6 +25,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     Parameters
     ----------
     path : Path
+        CSV file.
 
     Returns
     -------

@@ -14,6 +14,7 @@ class TableFacts(TableView):
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read, to which mistakes are added.
     table_key : str
         Dotted key of the table, such as "contact" or "structure.interface.0.contact".
     table : Table or None

@@ -53,9 +53,11 @@ class Joint(TableFacts):
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read, to which mistakes are added.
     table_key : str
         Dotted key of the law: "friction", or that of an interface between masses.
     law : Friction or None
+        Table of the friction law, None if it could not be read.
     contact : Contact or None
         Patch of the joint.
     kind : str

@@ -241,6 +241,7 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
     Parameters
     ----------
     model : Model
+        Common points of both surfaces.
     fit : Fit
         Fit with a gain of 1.
     digit : float

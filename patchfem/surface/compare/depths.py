@@ -206,6 +206,7 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     Parameters
     ----------
     depths : DepthMap
+        Depths of aligned surfaces.
 
     Returns
     -------

@@ -32,6 +32,7 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
     Parameters
     ----------
     surface : Profile or Areal
+        Trace or scan.
     form : int or str
         1 for a line or a plane, "circle" for a circle under a trace.
 

@@ -248,6 +248,7 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     Parameters
     ----------
     surface : Profile or Areal
+        Trace or scan.
     *ends : float
         First and last position [m] along x of a trace; of a scan, the same along x and then along y.
 
