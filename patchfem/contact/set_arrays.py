@@ -131,6 +131,10 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         Contact set of the reference state, the first target of the search.
     n_slots : int
         Number of contact sets that can be stored.
+
+    Returns
+    -------
+    SetArrays
     """
     m = x.size
     tableau = Tableau(
