@@ -52,21 +52,27 @@ def find_changed(depth, noise) -> np.ndarray:
     relative = np.where(known, depth / noise, 0.0)
     changed = np.zeros(depth.shape, bool)
     windows = WINDOW_SIDES[depth.ndim]
+
+    # Threshold in standard deviations, so high that noise rarely exceeds it anywhere in all windows
     limit = compute_threshold(len(windows) * known.sum())
     pull = MAX_PULL_DEVIATIONS[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
 
+    # Windows from single points to wide ones; points that have changed already do not count in wider windows
     for side in windows:
         if side > min(depth.shape) / 4:
             break
         use = known & ~changed
         weight = ndimage.uniform_filter(use.astype(float), side)
         values = relative if side == 1 else remainder
+        # Mean over the window of the points that count
         mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
         # Slow errors of the datum make means scatter more than those of white noise.
         fraction = UNCHANGED_FRACTION[depth.ndim]
         scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], fraction)
         scatter = max(scatter, side ** (-depth.ndim / 2))
+
+        # All points of a window whose mean is too high have changed; single points of scans count only in groups
         high = (mean > limit * scatter) & (weight > 0.25)
         spot = MIN_SPOT_SIDE[depth.ndim]
         if side == 1:
@@ -74,6 +80,7 @@ def find_changed(depth, noise) -> np.ndarray:
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
+    # A trace may have a track too shallow for any window; groups of points too small for a change are left out
     side = MIN_PART_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)

@@ -153,6 +153,8 @@ def compare_surfaces(
     """
     surfaces = (before, after)
     _check_options(surfaces, options)
+
+    # Spikes and dust become missing heights, and both surfaces get even steps
     cleaned = [clean_surface(each, keep_spikes=options.keep_spikes) for each in surfaces]
     removed = tuple(
         int(clean.missing.sum() - raw.missing.sum()) for clean, raw in zip(cleaned, surfaces)
@@ -165,11 +167,14 @@ def compare_surfaces(
         values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
         result = Comparison(before, after, Finding("identical", {}), values)
     else:
+        # The second surface is placed on the first, the depths at their common points are measured, and the waves of
+        # both are compared
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
         result = _measure(surfaces, (first, second), aligned)
         ratios = _compare_waves(result, options.direction)
         result = replace(result, values=result.values | ratios)
 
+    # The user is told how many heights were left out
     evidence = replace(result.evidence, removed=removed)
     findings = result.findings
     if any(removed):

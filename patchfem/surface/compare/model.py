@@ -257,6 +257,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
         Indices of the heights of each tile, and of each end that may be unworn.
     """
     random = np.random.default_rng(0)
+
+    # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
+    # MAX_DATUMS
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
@@ -264,12 +267,14 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DETERMINANT]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
+    # Their scale is the distance within which a fifth of some heights lie
     thin = np.arange(0, depth.size, max(depth.size // MAX_DATUM_SAMPLES, 1))
     few_base = base[thin]
     few = depth[thin]
     # A quarter of the heights shows which datums are worth improving.
     scales = _scale_datums(datums, few_base[::4], few[::4])
     datums = datums[np.argsort(scales)[:N_DATUMS]]
+    # Concentration step: a least-squares fit to the fifth of the heights that are nearest to the datum
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
         nearest = np.argpartition(residual, few.size // 5, axis=1)[:, : few.size // 5]
@@ -278,6 +283,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
         right = -np.einsum("kni,kn->ki", rows, few[nearest])
         datums = np.linalg.solve(normal, right[..., None])[..., 0]
 
+    # Of the datums with a small scale the best one is taken: with an unworn end, few heights above it, and many on it
     scales = _scale_datums(datums, few_base, few)
     near = np.flatnonzero(scales <= MAX_DATUM_SCALE * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)

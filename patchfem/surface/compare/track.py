@@ -180,6 +180,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
+
+    # Samples from well before the first worn one to where the flank is deep
     part = x[low:stop]
     values = relative[low:stop]
     if part.size < 8:
@@ -192,6 +194,9 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     places = part[2:-1:stride] - step / 2
     levels = np.array([values, values + level, values - level])
     deviance = _fit_flanks(part, levels, places, depths.errors.correlation)
+
+    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form; the
+    # interval of the end reaches over all of them
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE

@@ -32,6 +32,8 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     dict
         Value, or code of the reason why there is none, by name.
     """
+
+    # Parameters of the distribution of heights: Sa, Sq, Ssk, Sku, and those of the core
     heights = z[~np.isnan(z)]
     distribution = compute_moments(heights) | compute_core(heights)
     values = {f"S{name.lower()}": value for name, value in distribution.items()}
@@ -43,6 +45,7 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))
 
+    # Sal is the shortest distance at which the autocorrelation falls to 0.2, Str its ratio to the longest one
     values |= {"Sal": "not_falling", "Str": "not_falling"}
     distances = np.full(1, np.inf)
     if values["Sq"] > 0:
