@@ -59,6 +59,8 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
         half_length[k] = np.ptp(rigid[:, k]) / 2
         rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
         target[k] = (target[k] - target[0] * middle) / half_length[k]
+
+    # Without a spring these are all forces; a spring adds two, which turn the piece in opposite directions
     spring_indices = np.flatnonzero(problem.springs)
     if not spring_indices.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)

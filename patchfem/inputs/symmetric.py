@@ -34,6 +34,8 @@ def to_real(values, subject: str):
         numbers = values.data
     if not np.iscomplexobj(numbers):
         return values
+
+    # Imaginary parts that are exactly 0 are dropped; any others are refused, with a remedy for structural damping
     largest = max(float(np.abs(numbers.real).max(initial=0.0)), 1e-300)
     ratio = float(np.abs(numbers.imag).max(initial=0.0)) / largest
     if ratio == 0.0:
@@ -141,6 +143,8 @@ def symmetrize(values, subject: str):
         raise PatchfemError(
             f"{subject} contains values that are not finite; finite ones are needed"
         )
+
+    # A small skew part is round-off of the program that wrote the matrix
     skew = abs(values - values.T).max()
     largest = abs(values).max()
     if skew > MAX_SKEW * largest:

@@ -58,6 +58,8 @@ def read_datasets(path) -> list[Dataset]:
         raise Missing(
             "reading universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
+
+    # Only these three kinds of datasets are read; files of other programs contain many more
     path = Path(path)
     check_file(path, "export fewer channels or a part of the record")
     with refuse_damage(f"{path}: cannot be read as a universal file"):

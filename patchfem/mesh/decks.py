@@ -66,6 +66,7 @@ class Deck:
             raise PatchfemError(
                 f"*{keyword} is not supported yet; write a flat deck (without parts and instances)"
             )
+        # Lines are words: node number and coordinates, or element number and nodes
         if keyword == "NODE":
             new = [(int(line[0]), [float(word) for word in line[1:]]) for line in lines]
             self._add_numbered(self.nodes, new, "NSET", parameters)

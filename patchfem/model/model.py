@@ -219,6 +219,8 @@ def _build(scene: Scene) -> Model:
     if scene.structure is not None:
         rig_model = rig.build_rig(scene)
         rig_model = _attach_bolted_model(scene, rig_model)
+
+    # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     law = _build_law(scene, rig_model)
     if patch_model is not None:
         edge_motion = _find_edge_motion(scene, rig_model)

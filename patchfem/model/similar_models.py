@@ -133,6 +133,7 @@ def replace_numbers(
         if "structure" in tables:
             rig = _replace_modes(rig, scene.structure)
 
+    # What the scene contains for the engines, and its text with the new numbers
     motion = find_motion_features(scene, model.kind)
     unwritten = replace(model, source=None, rig=rig, motion=motion, **changes)
     write = partial(write_resolved, scene, unwritten)

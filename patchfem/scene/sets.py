@@ -170,6 +170,7 @@ def write_value(key: str, value: PythonValue, kind: str | None = None) -> str:
                 "in SI units, a boolean, or a list of such values"
             ]
         )
+    # A number gets the SI unit of its key
     kind = kind or _find_kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))

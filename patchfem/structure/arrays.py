@@ -118,6 +118,8 @@ def build_basis(
     PatchfemError
         If an array is missing or wrong; the message names it.
     """
+
+    # Mass and stiffness must be there; interfaces and drive must name coordinates that exist
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
@@ -145,6 +147,7 @@ def build_basis(
             "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
         )
 
+    # A force acts at a numbered coordinate, along the array `force`, or at the output
     force = None
     if is_forced:
         force = np.eye(n)[driven_mass - 1] if driven_mass else data.get("force", output)

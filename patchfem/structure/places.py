@@ -59,6 +59,8 @@ class MeasuredModes:
         PatchfemError
             If the text names no node and direction, or one that the file does not contain.
         """
+
+        # Sum of the motions at all directions that the text names, with their signs
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
             match = DIRECTION_PATTERN.fullmatch(part.strip())

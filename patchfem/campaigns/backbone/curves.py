@@ -214,6 +214,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
     if joint.has_errors and model.rig.structure.richer_rig is not None:
         richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
 
+    # A method that fails leaves its reason in place of a curve
     curves = {}
     missing = {}
     for method in methods:
@@ -227,6 +228,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
         except (NotConverged, PatchfemError) as reason:
             missing[method] = str(reason).removeprefix("backbone: ")
 
+    # What follows from the curves: exponents of the loss, the amplitude of flutter, the band of both methods
     exponents = LossExponents()
     if not joint.is_linear:
         exponents = _fit_exponents(joint, curves.get("quasi-static", curves.get("balance")))

@@ -247,6 +247,8 @@ class JointMode(NamedTuple):
         error = 0.0
         if not self.has_errors or not (self.has_cells or self.has_partial_slip):
             return error
+
+        # Change of the quantity on a coarser mesh, and with neighbouring cells of sliders joined
         group = self.steady_laws()
         if self.has_partial_slip:
             error = error + decays.estimate_mesh_error(

@@ -364,6 +364,7 @@ def fit_curve(
         again = curves.solve(measured, method, start=first.values)
         first = again.count_earlier_search(first)
 
+    # The search by the reference method begins at this result; the other method takes its place where it has no curve
     reference = METHODS[0]
     try:
         fit = curves.solve(measured, reference, kind="series", start=first.values)
@@ -373,6 +374,7 @@ def fit_curve(
         fit = curves.solve(measured, reference, kind="series", start=first.values)
     fit = fit.count_earlier_search(first)
 
+    # The curve of the fit, the effect of modes that the model neglects, and the band beyond the measured amplitudes
     fitted = curves.compute(fit.values, reference)
     widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
     beyond, advice = extrapolate_curve(curves, measured, widened, reference)

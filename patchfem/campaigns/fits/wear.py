@@ -174,6 +174,7 @@ def fit_wear(
         )
 
     bounds = ranges[0]
+    # The measured depth needs a patch without earlier wear
     target = read_measured_depth(measured_depth)
     if model.patch is None:
         raise PatchfemError(
@@ -229,6 +230,8 @@ def fit_wear(
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
 
+    # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth into that
+    # of the coefficient
     low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
     return FittedCoefficient(
         value=float(value),

@@ -124,6 +124,8 @@ def fit_rows(
     NotConverged
         If all descents of a search fail.
     """
+
+    # Measured readings; some rows are held out, and groups of the others are left out in turn
     cells = read_response_table(measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
@@ -135,6 +137,8 @@ def fit_rows(
             "in this column, so leaving this value out leaves no rows for the fit; choose another "
             "column"
         )
+
+    # A rig for each measured frequency and input, and the readings that it would give, as functions of the free keys
     models = ConditionModels(scene, cells.conditions, ranges, measured)
     for left_out in (np.zeros(held_out.size, bool), *groups.values()):
         models.require_enough_rows(measured, np.count_nonzero(~held_out & ~left_out), "readings")
@@ -160,6 +164,7 @@ def fit_rows(
         search = Search(n_starts, seed, computed.reset_motions, report)
         return problem.search(search, interval_kind)
 
+    # The fit to all rows that are not held out, which also predicts the others
     best = fit(~held_out, "rows")
     prediction = computed.predict(best.values, range(len(cells.conditions)))
     logs = cells.compute_log_ratios(*prediction)

@@ -161,6 +161,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
         raise SceneError([*sweep_scene.find_errors(first_case), *errors])
 
+    # All combinations of the cases of a file and of the values of the axes, or random cases in place of the latter
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_SWEEP_CASES:

@@ -147,6 +147,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     """
     from scipy.interpolate import RBFInterpolator
 
+    # The cases are divided into folds: each is predicted by a response surface through the others
     rng = np.random.default_rng(0)
     every = rng.permutation(len(coordinates))[:MAX_SURFACE_CASES]
     folds = [(np.setdiff1d(every, fold), fold) for fold in np.array_split(every, N_FOLDS)]
@@ -181,6 +182,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     surfaces = [fit(cases, SMOOTHING_PARAMETERS[best]) for cases in fitted]
     first, total = np.transpose([_compute_surface_indices(one) for one in surfaces], (1, 0, 2, 3))
 
+    # Limits of the total index: the smallest and largest of all surfaces, widened by what they leave unexplained
     margin = unexplained[:, None] + INDEX_ERROR
     limits = [total.min(axis=0) - margin, total.max(axis=0) + margin]
     arrays = np.clip([first[0], total[0], *limits], 0.0, 1.0).transpose(1, 0, 2)

@@ -87,6 +87,8 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         text = line.strip(" \n\t#%/") if is_comment else line.strip()
         cells, delimiter = split_cells(text)
         is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
+
+        # A row of numbers ends the header; its columns are those of the last line of as many names
         start, columns = named.get(len(cells), (number, []))
         if is_row and cells[0] and not is_comment:
             return Header(columns, facts, len(cells), start), chain([(number, line)], lines)

@@ -263,12 +263,14 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
         if np.abs(n_digits - np.rint(n_digits)).max() > DIGIT_TOL:
             return table, x
 
+    # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
     count = np.arange(x.size) - (x.size - 1) / 2
     evens = [x.mean() + float(count @ x / (count @ count)) * count]
     if table.length is not None:
         lengths = [table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
         evens = [*(x[0] + places for places in lengths), *evens]
 
+    # The first candidate from which the positions differ by rounding alone
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])

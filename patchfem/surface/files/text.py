@@ -152,6 +152,8 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     """
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
+
+    # The first row and column may be coordinates, which no header states
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
     if has_axes and not _is_even(z[1, 1:]):
         raise PatchfemError(
