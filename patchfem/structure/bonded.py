@@ -148,8 +148,10 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     ModalBasis
         Basis whose coordinates are those of the new modes.
     """
+    # The sign of a mode is free: its largest entry is made positive, so that equal rigs give equal modes.
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], 0)[0]
     shapes = shapes * np.where(largest < 0, -1.0, 1.0)
+    # Entries of the damping matrix within the round-off of these products count as zero.
     size = np.abs(shapes)
     D = shapes.T @ (basis.damping_matrix + damper) @ shapes
     scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from .values import TomlValue
 
+# Tables of units.toml by kind of quantity: the factors of its units, and an example
 _KINDS = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # Factors to SI by unit for each kind of quantity; the first unit of each kind is its SI unit.
 UNIT_FACTORS: dict[str, dict[str, float]] = {kind: row["units"] for kind, row in _KINDS.items()}

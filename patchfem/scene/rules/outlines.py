@@ -3,7 +3,9 @@
 from .facts import TableFacts
 from .view import UNKNOWN_VALUE, TableView
 
+# Keys of a patch that hold its two pieces
 PIECE_NAMES = ("upper", "lower")
+# Keys of a piece for the lengths [m] of its shaped ends
 END_KEYS = ("chamfer", "end_radius")
 # Smallest end, or difference of lengths, as a fraction of the length of a piece; a smaller
 # one is smaller than any element.

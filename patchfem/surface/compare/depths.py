@@ -148,6 +148,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     DepthErrors
         Its `variance` is a function of a mask.
     """
+    # Count of unworn heights in each tile, and the means of their depths and of the functions of the datum there.
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
         use = unworn[tile]
@@ -155,6 +156,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
             parts = [values[tile][use].mean() for values in (depth, *base)]
             tiles.append((use.sum(), *parts))
     counts, means, *centers = np.array(tiles).T if tiles else np.zeros((2 + len(base), 1))
+    # Rows are weighted by the root of the count, because the variance of a mean falls with it.
     root = np.sqrt(counts)
     centers = np.array(centers).T * root[:, None]
     # Where tiles are few, a tile may share a single error.
@@ -162,6 +164,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     freedom = MIN_FREEDOM
     drift = 0.0
     if counts.size >= MIN_TILES:
+        # The scatter of the means about the datum that fits them best gives s^2.
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
         # A slow drift makes neighbouring tiles share their errors, so that fewer of them are independent.
@@ -171,6 +174,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         scatter = residual @ residual / (counts.size - len(base))
         drift = float(np.sqrt(scatter / counts.mean()))
         variance = float(scatter * shared * student**2)
+    # Covariance of the coefficients of the datum for s = 1.
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
     def compute_variance(part) -> float:

@@ -74,6 +74,7 @@ def find_place(first: Raster, second: Raster) -> Place:
     Place
         Shift [m], turn and mirroring of the second surface.
     """
+    # Both surfaces become images with the same square pixels: those of the finer surface, unless they were too many.
     n_axes = first.z.ndim
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
@@ -84,6 +85,7 @@ def find_place(first: Raster, second: Raster) -> Place:
         own, other = order(first, second.mirror() if mirrored else second)
         images = zip(*(_make_images(surface, pixel) for surface in (own, other)))
         for (image, other_image), turn in product(images, TURNS[n_axes]):
+            # The other image is turned about its middle, and correlated with the own one at all lags at once.
             matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
@@ -93,6 +95,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             if significance[peak] <= best.significance:
                 continue
 
+            # Lags beyond the size of the own image are negative: they stand at the end of each axis.
             lag = np.where(
                 np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
             )
@@ -100,6 +103,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             at = (own.middle - own.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
             best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
+        # Mirrored scans are tried only if this side does not fit clearly; traces are always tried both ways.
         if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
             break
     return best

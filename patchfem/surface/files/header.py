@@ -18,7 +18,9 @@ MAX_LINE = 1000  # largest number of characters of a line in which names of colu
 MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 MAX_NAME = 80  # largest number of characters in the name of a column with its unit
 MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
+# Signs at the start of a line of the header that is a comment
 COMMENT_SIGNS = ("#", "%", "//")
+# Pattern of a number with a decimal comma, such as -1,25e-6
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 # Pattern of a height that was not measured
 MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
