@@ -39,6 +39,7 @@ class Setting(NamedTuple):
     words : str
         Description of the setting for use in a sentence.
     model : Model
+        Model of the scene with this value.
     """
 
     label: str

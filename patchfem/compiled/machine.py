@@ -151,14 +151,20 @@ class LoadedFunction:
 
 
 def _flatten_format(result_format) -> str:
-    """Return the format of the numbers of a result in their order in memory."""
+    """Return the characters, as in `struct`, of all numbers of a result in their order in memory.
+
+    `result_format` is the character of a number, or a list of the formats of the elements of a tuple.
+    """
     if isinstance(result_format, str):
         return result_format
     return "".join(map(_flatten_format, result_format))
 
 
 def _build_result(result_format, values):
-    """Return a result of this format from an iterator over its numbers, `values`."""
+    """Return a result of this format from an iterator over its numbers, `values`.
+
+    `result_format` is the character of a number, a list of the formats of the elements of a tuple, or "" for None.
+    """
     if result_format == "":
         return None
     if isinstance(result_format, str):

@@ -299,7 +299,10 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
 
 
 def _fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Fit a rigid motion (r,) to nodal values (k,) by least squares."""
+    """Fit a rigid motion (r,) to nodal values (k,) by least squares.
+
+    `rigid` (k, r) holds the displacements of the nodes per unit of each motion.
+    """
     if not rigid.shape[1]:
         return np.zeros(0)
     return np.linalg.lstsq(rigid, values, rcond=1e-13)[0]

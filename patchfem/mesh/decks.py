@@ -118,7 +118,10 @@ class Deck:
         return members
 
     def _find_members(self, kind: str, word: str) -> list[int]:
-        """Return the numbers that a word of a set or of a surface stands for: a number or the name of a set."""
+        """Return the numbers that a word of a set or of a surface stands for.
+
+        A word is a number, or the name of a set of the `kind` NSET (nodes) or ELSET (elements), whose members are returned.
+        """
         if word.isdigit():
             return [int(word)]
         if word.lower() not in self.sets[kind]:

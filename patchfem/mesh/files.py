@@ -194,6 +194,7 @@ def _read_tags(path: Path, mesh) -> _Tags:
             names[1, family] = names[2, family] = (known or words)[0]
         tag_help = "names of groups of faces and of edges"
         return _Tags(names, mesh.cell_data.get("cell_tags"), tag_help)
+    # A .vtu file has no names: its codes are fixed, for cells (2) and lines (1).
     names = {(2, code): name for name, code in CELL_TAGS.items()}
     names |= {(1, code): name for name, code in EDGE_TAGS.items()}
     numbers = ", ".join(f"{code} {name}" for name, code in (CELL_TAGS | EDGE_TAGS).items())

@@ -50,6 +50,7 @@ class JointMode(NamedTuple):
     Attributes
     ----------
     model : Model
+        Model with the rig and its contact.
     patch : Patch or None
         Pressed patch of [contact].
     coarser : tuple
@@ -57,6 +58,7 @@ class JointMode(NamedTuple):
     mode : int
         Index of the coordinate of the mode.
     stuck_mode : StuckMode
+        Frequency and shape of the mode while nothing slips.
     stiffness : (i,) array
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
@@ -364,6 +366,7 @@ def _find_mode(rig, name: str) -> int:
     modes = rig.modes
     names = list(rig.modes.names)
     count = modes.omega.size
+    # Computed modes have numbers, listed ones have names.
     if not rig.structure.lists_modes:
         if not name:
             return int(np.argmax(modes.omega > 0))

@@ -145,14 +145,17 @@ class Backbone(NamedTuple):
     mode : str
         Name of the mode.
     frequencies : ModeFrequencies
+        Frequencies [Hz] without the contact, and with a sticking one.
     curves : dict of Curve
         By method.
     missing : dict of str
         By method, the reason why it has no curve.
     exponents : LossExponents
+        Exponents of the energy loss in micro-slip and in gross slip.
     flutter : float or None
         Amplitude [m] above which the mode gains energy.
     notes : tuple of str
+        Sentences for the user, such as on what the curves leave out.
     band : Band or None
         None without a curve, or without errors.
     advice : tuple of str

@@ -114,9 +114,11 @@ class FittedCurve:
     Attributes
     ----------
     keys : FittedKeys
+        Fitted values of the free keys, with intervals.
     path : Path
         File of the measured curve.
     measured : MeasuredCurve
+        Frequency and damping to which the keys are fitted.
     model : (2, k) array
         Computed frequency [Hz] and damping ratio.
     method : {"balance", "quasi-static"}

@@ -45,6 +45,7 @@ class FittedLoop:
     Attributes
     ----------
     keys : FittedKeys
+        Fitted values of the free keys, with intervals.
     loop : Loop
         Measured loop.
     held_out : (k,) bool

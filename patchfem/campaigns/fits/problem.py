@@ -59,6 +59,7 @@ class FittedKeys:
     sets : list of str
         The ``table.key=value`` strings of the fitted scene.
     warnings : list of str
+        Sentences for the user on the fit and its assumptions.
     seconds : float
         Elapsed time of the fit.
     """

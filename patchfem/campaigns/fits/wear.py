@@ -57,6 +57,7 @@ class FittedCoefficient:
     value, low, high : float
         Coefficient and its interval [m2/N].
     measured : MeasuredDepth
+        Wear depth to which the coefficient is fitted.
     model : float
         Wear depth that is computed with the fitted coefficient [m].
     bounds : Range

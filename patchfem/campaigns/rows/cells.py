@@ -28,6 +28,7 @@ class Readings:
     Attributes
     ----------
     path : Path
+        File of the response table.
     rows : tuple of MeasuredRow
         All rows, including those without a reading (`inputs.measured`).
     row : (n,) array

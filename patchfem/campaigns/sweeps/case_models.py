@@ -36,6 +36,7 @@ class SweepScene:
     path : Path
         File of the scene, whose folder is the base of relative file names.
     text : str
+        Content of the scene file.
     sets : tuple of str
         --set strings of all cases.
     n_written : int

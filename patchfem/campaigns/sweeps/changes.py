@@ -20,6 +20,7 @@ class MeasureRange(NamedTuple):
     Attributes
     ----------
     measure : str
+        Name of the measure.
     low_case, high_case : int
         Indices of the cases with the smallest and the largest value.
     relative : float
@@ -44,7 +45,9 @@ class SweepAnalysis:
     ranges : list of MeasureRange
         Ranges of the main measures that vary by more than their errors, largest change first.
     limits : list of KeyLimit
+        Values of the keys up to which measures stay within limits.
     peaks : list of PeakOnLine
+        Peaks of the measures over a swept frequency.
     ranking : dict
         List of SobolIndex by measure.
     quantiles : dict

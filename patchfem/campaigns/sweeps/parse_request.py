@@ -40,6 +40,7 @@ class Request:
     sobol : bool
         Whether the random cases form a Sobol sequence.
     seed : int
+        Seed of the random cases.
     """
 
     over: Sequence[str] = ()

@@ -38,7 +38,9 @@ class WorkerData:
     Attributes
     ----------
     sweep_scene : SweepScene
+        Scene and the settings that all cases share.
     cases : Cases
+        Values of the swept keys in each case.
     extract : callable, optional
         extract(number, model or error, results, index) returns additional data of the case at an
         index of the CaseResults.

@@ -96,6 +96,7 @@ class SweepTable:
     Attributes
     ----------
     keys : tuple of SweptKey
+        Swept keys with their values in the cases.
     shape : tuple of int
         Number of values of each key, of which the last one varies fastest; (n,) if the cases are
         rows of a table.

@@ -149,6 +149,7 @@ def _check_modes(structure: TableFacts) -> None:
                 f"{path}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
+        # Participation in the base motion: that of the first mode is the one in the sliding unless it is given.
         default = 0.0 if index else mode.slide
         base = mode.base if structure.has(f"{path}.base") else default
         squares.append((base or 0.0) ** 2)

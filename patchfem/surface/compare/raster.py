@@ -107,6 +107,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
         origin = np.array([axis[0] for axis in axes])
         return Raster(surface.z, origin, np.array([np.diff(axis).mean() for axis in axes]))
 
+    # The raster has the mean step of an even trace, and finer steps for an uneven one, whose heights are interpolated.
     known = ~surface.missing
     x = surface.x[known]
     distances = np.diff(x)
@@ -117,6 +118,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
         step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_TRACE_SAMPLES)
     grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
     z = np.interp(grid, x, surface.z[known])
+    # Points within a wide gap of the trace are missing, unless they are next to a measured height.
     after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
     nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
     is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (
