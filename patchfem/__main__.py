@@ -35,7 +35,10 @@ LATER_GC_THRESHOLD = 50_000  # number of new objects before each later collectio
 
 
 def _lower_gc_threshold(phase: str, _) -> None:
-    """Lower the threshold of the garbage collector when its first collection starts."""
+    """Lower the threshold of the garbage collector when its first collection starts.
+
+    The collector calls it with the phase "start" or "stop".
+    """
     gc.set_threshold(LATER_GC_THRESHOLD, *gc.get_threshold()[1:])
     if phase == "stop":
         gc.callbacks.remove(_lower_gc_threshold)
@@ -53,6 +56,7 @@ class _LazyMetadata(ModuleType):
     """
 
     def __getattr__(self, name: str):
+        """Import the module that this object stands for, and return its attribute of this name."""
         if sys.modules.get(self.__name__) is self:
             del sys.modules[self.__name__]
         return getattr(importlib.import_module(self.__name__), name)
@@ -124,6 +128,7 @@ VERBS = {verb: row[0] for verbs in VERB_GROUPS.values() for verb, row in verbs.i
 # largest number of characters of an example on the same line as its description
 MAX_EXAMPLE_WIDTH = 45
 
+# Message if the memory is exhausted
 OUT_OF_MEMORY = (
     "out of memory; if a key of the scene sets the size of the largest part of the "
     "memory, `patchfem plan` names this part and the key"
@@ -157,7 +162,7 @@ def format_verb_overview() -> str:
 
 
 def _describe_unexpected_arguments(verb: str, unused: list) -> str:
-    """Return the error message for an unknown verb or for arguments that a verb does not accept."""
+    """Return the error message for an unknown verb or for arguments, `unused`, that it does not accept."""
     if verb in VERBS or verb in app:
         return f"unexpected '{' '.join(unused)}'; see `patchfem {verb} --help`"
     similar = get_close_matches(verb, VERBS, 1)
@@ -179,7 +184,7 @@ def _describe_removed_option(arguments: list) -> str:
 
 
 def register_verbs(arguments: list) -> None:
-    """Register the requested verb with the command-line parser, or all verbs if there is none.
+    """Register the verb in the arguments with the command-line parser, or all verbs without one.
 
     `--version` needs no verb, whose modules would be imported.
     """
@@ -214,7 +219,7 @@ def install_completion(
 
 
 def main(argv: list | None = None) -> None:
-    """Run the command line, and end the process with an exit code.
+    """Run the command line `argv`, by default that of the process, and end it with an exit code.
 
     The codes are 0 for success, 2 for invalid input, 3 for missing convergence, 4 for a missing file or an exhausted
     resource, and 130 for an interrupt.
@@ -227,7 +232,7 @@ def main(argv: list | None = None) -> None:
 
 
 def _exit_quickly(code: int) -> None:
-    """End the process without the clean-up of modules, which takes 50 ms.
+    """End the process with an exit code, without the clean-up of modules, which takes 50 ms.
 
     The function returns without effect if other threads run, if a profiler or a debugger is active, or if the output
     cannot be flushed.
@@ -334,7 +339,11 @@ def _describe_os_error(error: OSError) -> str:
 
 
 def _report_error(error: Exception) -> int:
-    """Print the message of an error to stderr, and return the exit code."""
+    """Print the message of an error to stderr, and return the exit code.
+
+    The code is 4 if memory is exhausted, 2 for a scene with mistakes, that of the error for errors of this package,
+    and 1 for an internal fault.
+    """
     # A shared library does not fit into memory.
     if isinstance(error, ImportError) and "failed to map" in str(error):
         print_message(OUT_OF_MEMORY)
@@ -403,6 +412,8 @@ def _repeat_interrupt(unraisable) -> None:
     """Raise an interrupt again that Python has discarded.
 
     Python discards exceptions in callbacks, such as those of LLVM during a compilation.
+
+    `unraisable` describes the discarded exception, as for `sys.unraisablehook`.
     """
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)

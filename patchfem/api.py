@@ -458,7 +458,10 @@ def cost(
 
 
 def _save(make_answer: Callable[[Path], Any], out: str | Path) -> Any:
-    """Write the answer of a function of the results folder with its page into this folder, and return it."""
+    """Write the answer of a study with its page into the folder `out`, and return it.
+
+    `make_answer` computes the answer; it is called with the path of the folder while that is being written.
+    """
     with Folder(Path(out)) as folder:
         answer = make_answer(folder.path)
         store.write(answer, folder.path)
@@ -535,7 +538,10 @@ def backbone(
     """
 
     def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
-        """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
+        """Build the model of the scene with the tables of a backbone.
+
+        `sets` are `key=value` strings of a case; None stands for the scene as written, without other values.
+        """
         if isinstance(scene, Model):
             return build(scene, **changes)
         values = {} if sets is None else changes | dict(text.split("=", 1) for text in sets)
@@ -676,6 +682,7 @@ class SweepPlots:
         dataset : xarray.Dataset
             Result of `pf.sweep`.
         measure : str
+            Name of the measure, such as "loop_area".
         ax : matplotlib.axes.Axes, optional
             Axes to draw on. Default: a new figure.
 
@@ -862,9 +869,9 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
 
 
 def _format_bounds(key: str, ends: Any) -> str:
-    """Return a free parameter and its bounds as for --free; `ends` is a pair of values, or a text.
+    """Return the key of a free parameter and its bounds as for --free.
 
-    Raises PatchfemError for anything else.
+    `ends` is a pair of values, or a text. Raises PatchfemError for anything else.
     """
     is_pair = hasattr(ends, "__len__") and len(ends) == 2
     if not (is_pair or isinstance(ends, str)):
@@ -1277,9 +1284,11 @@ def _count_written(scene) -> int:
 
 
 def _require_path(value: Any, name: str) -> Path:
-    """Return a file or folder name as a Path.
+    """Return the name of a file or folder, `value`, as a Path.
 
     Raises PatchfemError for other types.
+
+    `name` is that of the argument, for the message.
     """
     if not isinstance(value, str | Path):
         needed = "a path, a text, a dict of tables or a Scene" if name == "a scene" else "a path"
@@ -1288,15 +1297,16 @@ def _require_path(value: Any, name: str) -> Path:
 
 
 def _require_paths(value: Any, name: str) -> list:
-    """Return one or several paths as a list of Path."""
+    """Return one or several paths, `value`, as a list of Path; `name` is that of the argument."""
     is_collection = isinstance(value, Iterable) and not isinstance(value, str)
     return [_require_path(path, name) for path in (value if is_collection else [value])]
 
 
 def _parse_length(value: Any, name: str) -> float | None:
-    """Convert a number [m], or a string with a unit, to a length [m].
+    """Convert a value, a number [m] or a string with a unit, to a length [m].
 
-    None is returned unchanged. Raises PatchfemError for other types and invalid strings.
+    None is returned unchanged. `name` is that of the argument, for the message. Raises PatchfemError for other types
+    and invalid strings.
     """
     if value is None:
         return None
@@ -1310,16 +1320,16 @@ def _parse_length(value: Any, name: str) -> float | None:
 
 
 def _require_string(value: Any, name: str) -> str:
-    """Return a value that is a string; raise PatchfemError for other types."""
+    """Return a value that is a string; raise PatchfemError, which names the argument, for other types."""
     if not isinstance(value, str):
         raise PatchfemError(f"{name}: a text is needed, not {value!r:.60}")
     return value
 
 
 def _require_strings(value: str | Iterable[str], name: str) -> tuple:
-    """Return one or several strings as a tuple.
+    """Return one or several strings, `value`, as a tuple.
 
-    Raises PatchfemError for other types.
+    Raises PatchfemError, which has the name of the argument, for other types.
     """
     is_collection = isinstance(value, Iterable) and not isinstance(value, str)
     return tuple(_require_string(string, name) for string in (value if is_collection else [value]))
@@ -1338,7 +1348,7 @@ def _refuse_removed(verb: str, names: Iterable[str]) -> None:
 
 
 def _reject_keys(sets: dict, kind: str) -> None:
-    """Raise PatchfemError if keys are given for a Plan or a Model, which cannot be changed.
+    """Raise PatchfemError if keys (`sets`) are given for a Plan or a Model, which cannot be changed.
 
     `kind` is the class name for the message.
     """
@@ -1365,6 +1375,7 @@ class Measures(Mapping):
         self._measures = dict(measures)
 
     def __getitem__(self, name: str) -> Measure:
+        """Return a measure by its name; the KeyError for another name suggests a similar one."""
         if name in self._measures:
             return self._measures[name]
         similar_names = get_close_matches(str(name), self._measures, 1, 0.6)
@@ -1374,6 +1385,7 @@ class Measures(Mapping):
         raise KeyError(f"no measure {name!r} in this run; {advice}")
 
     def __getattr__(self, name: str) -> Measure:
+        """Return a measure by its name."""
         if name.startswith("_"):
             raise AttributeError(name)
         try:
@@ -1425,7 +1437,10 @@ class Plots:
         return self._draw(ax, "pressure", titles, reason)
 
     def loop(self, ax: Axes | None = None) -> Axes:
-        """Plot the friction force against the relative displacement of the interface."""
+        """Plot the friction force against the relative displacement of the interface.
+
+        It is drawn on `ax`, by default on a new figure.
+        """
         reason = self._explain_missing_motion() or "no friction acted, or nothing slid"
         return self._draw(ax, "loop", ("Friction loop",), reason)
 
@@ -1438,7 +1453,10 @@ class Plots:
         return self._draw(ax, "history", titles, self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
-        """Plot the amplitude for each level, or the steady-state amplitude against level or frequency."""
+        """Plot the amplitude for each level, or the steady-state amplitude against level or frequency.
+
+        It is drawn on `ax`, by default on a new figure.
+        """
         no_levels = (
             'the drive has no levels; use drive.waveform = "levels", or a sweep with '
             'accuracy.method = "harmonic"'
@@ -1447,7 +1465,10 @@ class Plots:
         return self._draw(ax, "levels", titles, self._explain_missing_motion() or no_levels)
 
     def accuracy(self, ax: Axes | None = None) -> Axes:
-        """Plot the largest error of the motion against CPU time, for different numbers of time steps."""
+        """Plot the largest error of the motion against CPU time, for different numbers of time steps.
+
+        It is drawn on `ax`, by default on a new figure.
+        """
         no_steps = (
             "the number of time steps does not limit its accuracy; a rig takes time steps with "
             'accuracy.method = "march"'
@@ -1476,7 +1497,10 @@ class Plots:
     def _draw(self, ax: Axes | None, name: str, titles: tuple[str, ...], reason: str) -> Axes:
         """Plot the charts with some titles for which the run has data, and return the first Axes.
 
-        With `ax`, only the first chart is drawn. Raises PatchfemError with `reason` if the run has no data for any of them.
+        With `ax`, only the first chart is drawn. Raises PatchfemError with `reason` if the run has no data for any of
+        them.
+
+        `titles` are those of the charts, and `name` is that of the method, for the message.
         """
         answer = runs.make_answer(self._result)
         axes_of_chart = chart_axes.draw_charts(answer, titles, ax, f"plot.{name}")

@@ -73,6 +73,7 @@ class Outcome(StrEnum):
         return _SENTENCES[self]
 
 
+# Sentence about each outcome of a run
 _SENTENCES = {
     Outcome.DONE: "The run finished as requested.",
     Outcome.STEADY: "The motion is steady: it repeats within the tolerance.",
@@ -95,7 +96,7 @@ _SENTENCES = {
 
 
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
-    """Return a read-only, C-ordered copy of values."""
+    """Return a read-only, C-ordered copy of values as an array of this dtype."""
     out = np.array(values, dtype=dtype, order="C")
     out.setflags(write=False)
     return out
@@ -164,7 +165,11 @@ class ContactState:
 
 
 class StuckMode(NamedTuple):
-    """Natural mode with stuck interfaces: circular frequency [rad/s], and shape (n,) that is 1 at one coordinate."""
+    """Natural mode of a rig with stuck interfaces.
+
+    - omega: circular frequency [rad/s]; None if an interface is rigid.
+    - shape (n,): shape, which is 1 at one coordinate.
+    """
 
     omega: float | None
     shape: np.ndarray

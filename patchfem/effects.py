@@ -79,7 +79,7 @@ class Waveform(NamedTuple):
         return key in re.findall(r"\w+", " ".join(self.keys))
 
     def _has_trait(self, trait: str) -> bool:
-        """Return whether the waveform has a trait."""
+        """Return whether the waveform has a trait, one of the words of its row in WAVEFORMS."""
         return trait in self.traits.split()
 
     @property
@@ -130,7 +130,19 @@ _DRIVE_SIZE_KEYS = "acceleration|displacement force"
 def _make_law(
     module: str, equations: str, keys: tuple[str, str], supports: str, traits: str = ""
 ) -> Effect:
-    """Return the effect of a friction law, whose module is in patchfem.friction."""
+    """Return the effect of a friction law.
+
+    Parameters
+    ----------
+    module : str
+        Module inside patchfem.friction.
+    equations : str
+        Equations of the law as text, for the report page.
+    keys : tuple of str
+        Required and optional keys.
+    supports, traits : str
+        Words, separated by blanks, for engines and features that know the law, and for its properties.
+    """
     return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
 
 
@@ -140,7 +152,11 @@ def _make_waveform(
     traits: str = "",
     module: str = "patchfem.structure.drives",
 ) -> Effect:
-    """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`."""
+    """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`.
+
+    `equations` are those of the waveform as text, for the report page, `traits` are words for its properties, and `module`
+    computes it.
+    """
     required, optional = keys
     if "endless" in traits:
         required = f"{required} cycles|duration".strip()
@@ -364,7 +380,7 @@ EFFECTS |= {
 
 
 def import_effect(name: str):
-    """Import and return the module that computes an effect."""
+    """Import and return the module that computes the effect `name`, such as "contact.tilt"."""
     return import_module(EFFECTS[name].module)
 
 
@@ -386,7 +402,10 @@ def list_absent_effects(names) -> list[str]:
 
 
 def list_displayed_absent_effects(names, engine: str | None) -> list[str]:
-    """Return the absent effects without the method that the program selected automatically."""
+    """Return the names of absent effects without the method that the program selected itself.
+
+    `engine` is that method.
+    """
     return [name for name in names if name != f"accuracy.method={engine}"]
 
 
@@ -421,7 +440,7 @@ def find_waveform(drive) -> Waveform:
 
 
 def law_has_trait(law: str | None, trait: str) -> bool:
-    """Return whether a friction law has a trait; False for an unknown law."""
+    """Return whether a friction law has a trait, such as "bonds"; False for an unknown law."""
     return law in LAWS and trait in LAWS[law].traits.split()
 
 

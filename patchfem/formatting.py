@@ -35,7 +35,9 @@ UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for eac
 }
 # keys of UNIT_LADDERS by the name of the unit in a sentence
 SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
+# Pattern of the units that sentences contain
 _UNIT_PATTERN = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
+# Pattern of a number with an exponent, and its unit
 _POWER_PATTERN = re.compile(
     rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNIT_PATTERN})(?![\w/^]))?"
 )
@@ -134,7 +136,7 @@ def round_to_error(
 
 
 def format_number(value: float, digits: int) -> str:
-    """Format a number with a number of significant digits, without trailing zeros."""
+    """Format a value with a number of significant digits, without trailing zeros."""
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
     rounded_value = float(f"{value:.{digits}g}")
@@ -227,7 +229,7 @@ def format_quantity(value: float, unit: str, digits: int, floor: float = 0.0) ->
 
 
 def format_length(length: float, digits: int = 4) -> str:
-    """Format a length [m] for a message, such as "200 um" or "12.7 mm"."""
+    """Format a length [m] with significant digits for a message, such as "200 um" or "12.7 mm"."""
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(length) >= size * (1 - 1e-9):
             return f"{format_number(length / size, digits)} {unit}"
@@ -235,7 +237,7 @@ def format_length(length: float, digits: int = 4) -> str:
 
 
 def rewrite_powers_of_ten(text: str) -> str:
-    """Rewrite the numbers of a sentence with readable units, such as 302 nJ for 3.02e-07 J."""
+    """Rewrite the numbers of a text with readable units, such as 302 nJ for 3.02e-07 J."""
 
     def rewrite(match) -> str:
         """Return the readable form of a matched number with its unit."""

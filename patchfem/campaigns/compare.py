@@ -19,7 +19,9 @@ from ..surface.areal import level
 from ..surface.compare.records import Comparison
 from ..surface.profile import Profile, resample_evenly
 
+# The two surfaces of a comparison, in names of files and results
 SIDES = ("before", "after")
+# Measures of a pressed patch that are compared for both surfaces
 COMPARED_MEASURES = (
     "pressure_peak",
     "contact_fraction",
@@ -49,19 +51,19 @@ class SurfaceRuns(NamedTuple):
 
     def pressures(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Return the positions [m] and the normal stress [Pa] at the nodes, (n,) each, by side."""
-        found = {}
+        pressures = {}
         for side, result in self.results.items():
             surface = patch_surface(result.patch, result.fields)
-            found[side] = np.array(surface.x), np.array(result.fields["normal_stress"][0])
-        return found
+            pressures[side] = np.array(surface.x), np.array(result.fields["normal_stress"][0])
+        return pressures
 
     def as_dict(self) -> dict[str, object]:
         """Return measures, outcomes, failures and warnings as a dict in SI units."""
         measures = {}
         for name in COMPARED_MEASURES:
-            found = {side: one.measures.get(name) for side, one in self.results.items()}
-            if any(one is not None and one.value is not None for one in found.values()):
-                measures[name] = {side: _measure_to_dict(found.get(side)) for side in SIDES}
+            by_side = {side: one.measures.get(name) for side, one in self.results.items()}
+            if any(one is not None and one.value is not None for one in by_side.values()):
+                measures[name] = {side: _measure_to_dict(by_side.get(side)) for side in SIDES}
         warnings = []
         for side, result in self.results.items():
             texts = [*result.warnings, *result.notes]
@@ -112,6 +114,18 @@ def write_common_traces(comparison: Comparison, folder: Path) -> list[Path]:
 
     A scene reads them with heights = "surface": x counts from their middle, and the heights are levelled. Without a common
     part the whole traces are written.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Comparison of two traces.
+    folder : Path
+        Folder of the files.
+
+    Returns
+    -------
+    list of Path
+        Both files.
 
     Raises
     ------

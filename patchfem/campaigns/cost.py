@@ -87,7 +87,7 @@ class Cost:
     nodes: int | None = None
 
     def has_error(self, name: str) -> bool:
-        """Return whether a measure has an error estimate."""
+        """Return whether the measure `name` has an error estimate."""
         return name in self.measures and self.measures[name].error is not None
 
 
@@ -134,7 +134,10 @@ def compute_setting_costs(
 
 
 def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
-    """Run and time a model with each of some settings; settings that fail are left out."""
+    """Run and time a model with each of some settings; settings that fail are left out.
+
+    `say`, if given, is called with a line of text that reports the progress.
+    """
     # The first run includes imports and compilation, which the timings must not contain.
     _run_setting(settings[0], None)
 
@@ -163,7 +166,10 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
 
 
 def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
-    """Return the cost of a setting from its pairs of CPU time and elapsed time [s], and the result of its run."""
+    """Return the cost of a setting from the timings and the result of its run.
+
+    A timing is a pair of CPU time and elapsed time [s]; the shortest counts.
+    """
     advice = [finding.advice for finding in result.findings if finding.advice is not None]
     seconds, wall_seconds = min(timings)
     return Cost(

@@ -13,9 +13,12 @@ from ..scene.rules.accuracy import has_effect
 
 # Settings that are counts, with their limits, besides the element size.
 COUNT_LIMITS = {"steps_per_cycle": (4, 12800), "shear_modes": (1, inf), "jumps": (1, inf)}
+# Names of all numerical settings that can be varied
 NUMERICAL_SETTINGS = ("element_size", *COUNT_LIMITS)
-COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # counts over that of the scene
-CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)  # cells of uniform meshes over those of the scene
+# Factors by which a count of the scene is varied
+COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+# Factors by which the number of cells of a uniform mesh is varied
+CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
 CELL_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
 DEFAULT_COUNT = 8  # middle value of a count that the scene does not set
 # Name of the accuracy of all settings together, which a curve may vary in place of a single one.
@@ -36,6 +39,7 @@ class Setting(NamedTuple):
     words : str
         Description of the setting for use in a sentence.
     model : Model
+        Model of the scene with this value.
     """
 
     label: str
@@ -60,10 +64,12 @@ def find_applicable_settings(model: Model) -> list[str]:
 
 
 def make_setting_values(model: Model, name: str) -> list[Setting]:
-    """Return the values of a numerical setting, or of TOLERANCE, from coarse to fine.
+    """Return the values of a numerical setting of a model, or of its tolerance, from coarse to fine.
 
     The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
     values if the value of the scene is small.
+
+    `name` is that of the setting, such as "element_size", or TOLERANCE.
     """
     words = name.replace("_", " ")
     if name == TOLERANCE:
@@ -87,7 +93,7 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
 
 
 def _change_setting(model: Model, name: str, value: float | None) -> Model:
-    """Return a model with another value of a numerical setting; None if the tolerance sets it."""
+    """Return a model with another value of the numerical setting `name`; None lets the tolerance set it."""
     if name == "element_size":
         return replace(model, patch=model.patch.with_element_size(value))
     if name == "jumps":
@@ -99,7 +105,10 @@ def _change_setting(model: Model, name: str, value: float | None) -> Model:
 
 
 def _find_count(model: Model, name: str) -> int:
-    """Return the count that a run of the model takes; DEFAULT_COUNT if only the run itself finds it."""
+    """Return the number of steps, modes or jumps that a run of the model takes by default.
+
+    `name` is that of the setting. It is DEFAULT_COUNT if only the run itself finds the number.
+    """
     if name == "steps_per_cycle":
         if model.kind == "bench":
             return engine.steps_per_cycle(model)
@@ -108,7 +117,7 @@ def _find_count(model: Model, name: str) -> int:
 
 
 def _scale_count(middle: int, factors: tuple[float, ...], limits: tuple[float, float]) -> list[int]:
-    """Return a count and its multiples within limits, in rising order."""
+    """Return a count, `middle`, and its products with factors that are within limits, in rising order."""
     low, high = limits
     scaled = (max(1, round(middle * factor)) for factor in factors)
     return sorted({middle, *(count for count in scaled if low <= count <= high)})

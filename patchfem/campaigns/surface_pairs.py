@@ -8,6 +8,7 @@ from ..core import PatchfemError
 from ..inputs.tables import TableFormat, find_factors, read_text
 
 COLUMNS = ("before", "after")  # columns that every table has
+# Possible cells of the column `direction`, "" if it is not known
 DIRECTIONS = ("", "x", "y")
 
 
@@ -33,6 +34,15 @@ def read_pairs(table: Path) -> list[TableLine]:
 
     Names are relative to the folder of the table. A column direction (x, y or empty) gives the axis along which the
     traces of a pair run; other columns are kept as text.
+
+    Parameters
+    ----------
+    table : Path
+        CSV file.
+
+    Returns
+    -------
+    list of TableLine
 
     Raises
     ------

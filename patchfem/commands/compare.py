@@ -78,12 +78,12 @@ def compare(
     """
     length = parse_quantity(shift, "length", "compare --shift")
     options = Options(parse_units(units), direction, length, datum, keep_spikes)
-    given = {"--scene": scene, "--predicted": predicted, "--piece": piece}
+    other_options = {"--scene": scene, "--predicted": predicted, "--piece": piece}
     files = [path for path in (before, after, *other) if path is not None]
 
     # an option that the kind of comparison does not use is a mistake of the user
     if pairs is not None:
-        _refuse_others({"another file": files, **given}, "a table of pairs")
+        _refuse_others({"another file": files, **other_options}, "a table of pairs")
         _compare_pairs(pairs, options, output_options.into(pairs.stem))
         return
     if len(files) != 2:
@@ -98,7 +98,7 @@ def compare(
     if before.is_dir() or after.is_dir():
         set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
         set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
-        _refuse_others({**set_options, **given}, "results folders")
+        _refuse_others({**set_options, **other_options}, "results folders")
         save(lambda _: worn.answer_runs(before, after), output)
     elif scene is not None:
         _compare_in_scene(before, after, options, (scene, set_), output)
@@ -107,14 +107,21 @@ def compare(
 
 
 def _refuse_others(given: dict[str, Any], subject: str) -> None:
-    """Raise UsageError for the first option that has a value but does not apply to what is compared."""
+    """Raise UsageError for the first of some options that has a value but does not apply.
+
+    `given` has the values by option, and `subject` says in the message what is compared.
+    """
     for name, value in given.items():
         if value:
             raise UsageError(f"compare: {name} cannot be used with {subject}; leave it out")
 
 
 def _compare_pairs(table: Path, options, output: Output) -> None:
-    """Compare all pairs in a table; the exit code is 3 if some pairs fail and 2 if all pairs fail."""
+    """Compare all pairs in a table, and print or write the answer.
+
+    `options` tell how surfaces are read and compared, and `output` where the answer goes. The exit code is 3 if some
+    pairs fail and 2 if all pairs fail.
+    """
     with Progress(output.quiet or output.json_) as progress:
         answer = save(lambda _: compared_pairs.answer_pairs(table, options, progress), output)
     rows = answer.details["pairs"]
@@ -128,7 +135,11 @@ def _compare_pairs(table: Path, options, output: Output) -> None:
 def _compare_in_scene(
     before: Path, after: Path, options, base: tuple[Path, tuple[str, ...]], output: Output
 ) -> None:
-    """Compare two traces, and run a scene with each of them as the profile of its patch."""
+    """Compare two traces, and run a scene with each of them as the profile of its patch.
+
+    `before` and `after` are the files, `options` tell how they are compared, `base` is the scene with its --set
+    strings, and `output` tells where the answer goes.
+    """
     scene, sets = base
     if load_scene(scene, sets).contact is None:
         raise UsageError(

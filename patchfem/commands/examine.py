@@ -27,6 +27,7 @@ REQUIRED_PACKAGES = (
     "threadpoolctl",
     "contourpy",
 )
+# Optional packages: extra of patchfem that installs each, and what it is for
 OPTIONAL_PACKAGES = {
     "pyuff": ("lab", "universal files"),
     "nbclient": ("notebook", "the notebooks of studies/notebooks"),
@@ -64,14 +65,24 @@ def check_installation() -> list[Finding]:
 
 
 def _check_package(name: str, label: str, source: str, remark: str) -> Finding:
-    """Check a package; `source` is what pip installs, `remark` follows the words for a missing package."""
+    """Check whether a package is installed.
+
+    Parameters
+    ----------
+    name, label : str
+        Name of the distribution, and the words for it in the report.
+    source : str
+        What pip installs.
+    remark : str
+        Text that follows the words for a missing package.
+    """
     version = _find_version(name)
     cure = "" if version else f"pip install {source}"
     return Finding(label, bool(version), version or f"not installed{remark}", cure)
 
 
 def _find_version(name: str) -> str:
-    """Return the version of a package, or "" if it is not installed."""
+    """Return the version of the package `name`, or "" if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -100,7 +100,12 @@ def profile(
 def _print_split(
     trace: Path, scene_path: Path, cutoff: float | None, out: Path | None, *, json_: bool
 ):
-    """Print the tables that divide a trace between the mesh and a layer of asperities; write the new scene."""
+    """Print the tables that divide a trace between the mesh and a layer of asperities; write the new scene.
+
+    The trace is a file, `scene_path` the scene of the patch, and `cutoff` [m] the wavelength between both, None for
+    the shortest wave that mesh and load resolve. The new scene is written to `out`, unless it is None; `json_` prints
+    JSON.
+    """
     target = scene_path if out is None else out
     refuse_existing(out)
     relative_path = Path(os.path.relpath(trace, target.parent)).as_posix()
@@ -131,7 +136,11 @@ def _print_split(
 
 
 def _write_split(text: str, tables: str, scene_path: Path, out: Path) -> None:
-    """Write a scene with new tables of profile and asperities; UsageError if it has them inside [contact]."""
+    """Write a scene with new tables of profile and asperities to the file `out`.
+
+    `text` is the scene in the file `scene_path`, and `tables` are the new tables as text. Raises UsageError if the
+    scene has such tables inside [contact].
+    """
     remaining_text = SPLIT_TABLES.sub("", text).rstrip()
     if {"profile", "asperities"} & tomllib.loads(remaining_text)["contact"].keys():
         raise UsageError(
@@ -144,7 +153,7 @@ def _write_split(text: str, tables: str, scene_path: Path, out: Path) -> None:
 
 
 def _window(text: str) -> tuple[float, ...]:
-    """Read the positions of a window [m]; raise UsageError unless there are two or four."""
+    """Read the positions [m] of a window from a text; raise UsageError unless there are two or four."""
     positions = text.split(",")
     if len(positions) not in (2, 4) or not all(map(str.strip, positions)):
         raise UsageError(

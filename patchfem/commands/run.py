@@ -76,7 +76,10 @@ def run(
 
 
 def _report_complete_run(target: Path, output: Output) -> None:
-    """Say that a run to be resumed is already complete, and print it again as JSON if that is asked for."""
+    """Say that a run to be resumed is already complete, and print it again as JSON if that is asked for.
+
+    `target` is the results folder, and `output` tells what is printed.
+    """
     if not output.quiet:
         print_message(
             f"{target}: this run is already complete; to run it again, leave out --resume"
@@ -88,7 +91,7 @@ def _report_complete_run(target: Path, output: Output) -> None:
 
 
 def _end_run(answer, is_quiet: bool) -> None:
-    """End with exit code 3 if a run did not converge; a quiet run prints only these warnings."""
+    """End with exit code 3 if the run of an answer did not converge; a quiet run prints its warnings."""
     if answer.details["outcome"] != "not_converged":
         return
     for text in answer.remarks.warnings if is_quiet else ():
@@ -97,7 +100,10 @@ def _end_run(answer, is_quiet: bool) -> None:
 
 
 def _report_missing_page(fault: BaseException, target: Path) -> None:
-    """Say why a run has no page, and end with exit code 4; with 130 if the page was interrupted."""
+    """Say why a run has no page, and end with exit code 4; with 130 if the page was interrupted.
+
+    `fault` is the exception that ended the page, and `target` is the results folder.
+    """
     if isinstance(fault, KeyboardInterrupt):
         reason = "interrupted while the page was drawn"
     elif isinstance(fault, MemoryError):

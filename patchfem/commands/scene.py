@@ -103,8 +103,14 @@ def plan(
 def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> None:
     """Print a plan: effects, measured time, sentences, stiffnesses and groups.
 
-    is_solved: whether the stiffness of the pieces is that of a solved patch.
-    verbose: whether to list the effects that the scene does not have.
+    Parameters
+    ----------
+    plan_data : dict
+        Plan as JSON, see `pf.plan`.
+    is_solved : bool
+        Whether the stiffness of the pieces is that of a solved patch.
+    verbose : bool
+        Whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
 
@@ -141,11 +147,11 @@ def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> No
             "         the shear stiffness of the pieces is an upper estimate; use --probe to compute it"
         )
 
-    for one in plan_data.get("modes", ()):
-        text = f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact"
-        if one["stuck_frequency"] is not None:
+    for mode in plan_data.get("modes", ()):
+        text = f"mode     {mode['name']} {mode['free_frequency']:.5g} Hz without contact"
+        if mode["stuck_frequency"] is not None:
             limit = "at most " * is_upper_estimate
-            text += f", {limit}{one['stuck_frequency']:.5g} Hz while the contact sticks"
+            text += f", {limit}{mode['stuck_frequency']:.5g} Hz while the contact sticks"
         print(text)
 
     for name, value in plan_data["groups"].items():

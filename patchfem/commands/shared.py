@@ -42,7 +42,10 @@ def flag_option(text: str, *names: str) -> type:
 
 
 def repeated_option(text: str, name: str | None = None) -> type:
-    """Return the type of a repeatable option with a text value; `text` is its help text."""
+    """Return the type of a repeatable option with a text value; `text` is its help text.
+
+    `name` is its spelling, by default the name of the parameter.
+    """
     return Annotated[
         tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)
     ]
@@ -51,7 +54,8 @@ def repeated_option(text: str, name: str | None = None) -> type:
 def text_option(text: str, name: str | None = None) -> type:
     """Return the type of an option with a text value, "" by default; `text` is its help text.
 
-    The value may begin with a hyphen, as a negative position does.
+    `name` is its spelling, by default the name of the parameter. The value may begin with a hyphen, as a negative
+    position does.
     """
     return Annotated[
         str, Parameter(name=name, allow_leading_hyphen=True, help=text, show_default=False)
@@ -110,6 +114,7 @@ class Output:
 
 
 OutputGroup = Annotated[Output, Parameter(name="*")]
+# Output options for which the user gives none
 DEFAULT_OUTPUT = Output()
 
 
@@ -150,7 +155,10 @@ def describe_command() -> str:
 
 
 def present(answer: "Answer", output: Output) -> None:
-    """Print an answer, draw its picture, and print the names of its files."""
+    """Print an answer, draw its picture, and print the names of its files.
+
+    The options in `output` tell what is printed, and where picture and files go.
+    """
     if output.json_:
         content = store.make_summary(answer) if answer.is_run else answer.details
         if answer.kind == "pairs":
@@ -170,7 +178,7 @@ def present(answer: "Answer", output: Output) -> None:
 
 
 def refuse_existing(out: Path | None) -> None:
-    """Raise UsageError if the file to write exists."""
+    """Raise UsageError if the file to write, `out`, exists."""
     if out is not None and out.exists():
         raise UsageError(f"{out}: already exists; choose another file with -o, or remove it")
 
@@ -216,7 +224,7 @@ class UsageError(Exception):
 
 
 def print_message(text: str) -> None:
-    """Print a line on stderr; do nothing if the stream cannot be written."""
+    """Print a line of text on stderr; do nothing if the stream cannot be written."""
     try:
         print(text, file=sys.stderr, flush=True)
     except (OSError, ValueError):
@@ -224,12 +232,15 @@ def print_message(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print a note on stderr."""
+    """Print the text of a note on stderr."""
     _print_remark(f"note: {text}")
 
 
 def _print_remark(text: str) -> None:
-    """Print a warning or a note on stderr, without control characters that could move the cursor."""
+    """Print the text of a warning or note on stderr, without control characters.
+
+    These could move the cursor.
+    """
     # some remarks are followed by tables for the scene file
     for line in text.split("\n"):
         print_message(make_printable(line))
@@ -253,7 +264,10 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
 
 
 def load_model(path: Path, sets):
-    """Build the model of the scene in a file; raise SceneError with every mistake."""
+    """Build the model of the scene in the file `path`; raise SceneError with every mistake.
+
+    `sets` are the `table.key=value` strings of --set.
+    """
     return model.build(load_scene(path, sets))
 
 
@@ -300,12 +314,15 @@ class Progress:
             return
         text = text or f"{fraction:.0%} done"
         if fraction > first_fraction:
-            left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
-            text += f", about {format_duration(left)} left"
+            seconds_left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
+            text += f", about {format_duration(seconds_left)} left"
         self._print(text)
 
     def count(self, done: int, total: int) -> None:
-        """Show the number of completed cases, and the remaining time; the first call may count stored cases."""
+        """Show how many of all cases (`total`) are done, and the remaining time.
+
+        The first call may count stored cases.
+        """
         if done > self.done:
             self(done / total, f"{done}/{total} cases")
         self.done = done
@@ -318,7 +335,7 @@ class Progress:
             wait *= 2
 
     def _print(self, text: str) -> None:
-        """Print a line; on a terminal in place of the last one."""
+        """Print a line of text; on a terminal in place of the last one."""
         self.shown_at = self.clock()
         if self.on_terminal:
             print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
@@ -327,7 +344,7 @@ class Progress:
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration as text, such as "40 s", "12 min" or "3.1 h"."""
+    """Return a duration in seconds as text, such as "40 s", "12 min" or "3.1 h"."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

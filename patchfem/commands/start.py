@@ -55,7 +55,10 @@ def new(
 
 
 def _write_scene(text: str, out: Path | None, description: list[str], verb: str) -> None:
-    """Write a scene to a file and print its description and the next command; without a file, print it."""
+    """Write the text of a scene to the file `out`; print its description and the next command.
+
+    The next command has this verb. Without a file, the text is printed.
+    """
     if out is None:
         print(text, end="")
         return
@@ -66,7 +69,17 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
-    """Write the scene of a joint that follows from two answers; ask the user for an answer that is ""."""
+    """Write the scene of a joint that follows from two answers; ask the user for an answer that is "".
+
+    Parameters
+    ----------
+    kind : str
+        Kind of scene that the user asks for; only "joint" is possible.
+    out : Path or None
+        File; None prints the scene.
+    known, wanted : str
+        Words on what is known of the joint, and on what is to be computed, separated by commas.
+    """
     if kind != "joint":
         raise UsageError("--ask, --know and --want are for a joint: patchfem new joint --ask")
     refuse_existing(out)

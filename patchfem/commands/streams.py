@@ -18,7 +18,7 @@ class _OutputPipe(io.FileIO):
     """
 
     def write(self, data) -> int:
-        """Write bytes and return their number."""
+        """Write the bytes of `data` and return their number, also if nobody reads the pipe any more."""
         try:
             return super().write(data)
         except BrokenPipeError:

@@ -101,7 +101,7 @@ class WorkerOptions:
     ) = False
 
     def part(self) -> tuple[int, int] | None:
-        """Return (i, n) of a shard, or None if there is no shard."""
+        """Return (i, n) for shard i of n parts of the cases, or None without a shard."""
         if not self.shard:
             return None
         i, _, n = self.shard.partition("/")
@@ -174,6 +174,9 @@ def _run_cases(sweep_scene, cases, place, by: WorkerOptions, *, is_quiet: bool):
     """Run the cases of a sweep, and return its Answer, or None for a shard.
 
     If it is interrupted, the folder has the tables of the cases that are done, and the command that continues is printed.
+
+    `sweep_scene` and `cases` say what is computed, `place` which folder and files are written, and `by` how many
+    workers compute. Without `is_quiet`, progress is shown.
     """
     executor = executors.make_executor(by.executor, by.jobs)
     report = None if is_quiet else print_message

@@ -179,6 +179,7 @@ class KernelModule:
         self._functions = {}
 
     def __getattr__(self, name: str):
+        """Return a constant or a KernelFunction of the module; the module itself is imported for other names."""
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
         if name not in self._functions:
@@ -225,7 +226,7 @@ def pause_garbage_collection():
 
 @contextmanager
 def lock_exclusively(path: Path):
-    """Let one process at a time run the block, by a lock on a file.
+    """Let one process at a time run the block, by a lock on the file `path`.
 
     The operating system releases the lock if the process is killed. Other processes wait for at most `MAX_LOCK_WAIT`
     seconds, because the lock of a machine that has disappeared may remain on a network file system. On a file system
@@ -240,6 +241,7 @@ def lock_exclusively(path: Path):
         yield
         return
     try:
+        # Ask again and again; a lock that waits by itself could not be given up.
         end = monotonic() + MAX_LOCK_WAIT
         while monotonic() < end:
             try:
@@ -262,6 +264,7 @@ class KernelFunction:
     Parameters
     ----------
     module : KernelModule
+        Module of the function.
     name : str
         Name of the function in the module.
     file_prefix : str
@@ -299,7 +302,11 @@ class KernelFunction:
     def call_with_bound_args(
         self, bound: tuple[tuple[str, ...] | None, bytes, tuple[object, ...]], *first
     ):
-        """Call the function with first arguments and the last arguments of `bind_arguments`."""
+        """Call the function with first arguments, and with last ones that `bind_arguments` has converted.
+
+        `bound` has the type codes and the words of the last arguments, and these themselves; without codes numba
+        converts them.
+        """
         last_codes, last_words, last = bound
         if last_codes is None:
             return self(*first, *last)
@@ -325,12 +332,16 @@ class KernelFunction:
         return function(b"".join(words)) if function else self.get_dispatcher()(*arguments)
 
     def _make_file_name(self, type_codes) -> str:
+        """Return the name of the file with the code for arguments of these types."""
         return f"{self.file_prefix}{hash_text(','.join(type_codes))}.code"
 
     def _call_first_time(
         self, type_codes: tuple[str, ...], words: tuple[bytes, ...], arguments: tuple[object, ...]
     ):
-        """Load or compile the code for arguments of these types, and return the result of the call."""
+        """Load or compile the code for arguments of these types, and return the result of the call.
+
+        `words` are the arguments as machine words, one entry for each.
+        """
         path = _prepare_cache() / "code" / self._make_file_name(type_codes)
         function = machine.load_file(path) or _load_prebuilt(path)
         if function is None:
@@ -347,9 +358,9 @@ class KernelFunction:
         return function(b"".join(words))
 
     def _build_machine_code(self, path: Path, arguments: tuple[object, ...]):
-        """Compile code for arguments of these types, or load it if another process has compiled it.
+        """Compile code for arguments of these types into the file `path`, or load it from there.
 
-        Returns None if the function cannot be compiled in this way.
+        It is there if another process has compiled it. Returns None if the function cannot be compiled in this way.
         """
         with lock_exclusively(path.with_suffix(".lock")):
             function = machine.load_file(path)
@@ -367,6 +378,7 @@ class KernelFunction:
         return function.get_standalone() if hasattr(function, "get_standalone") else function
 
     def __getattr__(self, name: str):
+        """Return an attribute, by its name, of the dispatcher of numba, which is imported for it."""
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.get_dispatcher(), name)
@@ -393,7 +405,7 @@ def _read_names(source: Path | str) -> tuple[dict, set]:
 
 
 def _add_constants(constants: dict[str, object], target: ast.expr, value) -> None:
-    """Add what an assignment of a value to a name, or to a tuple of names, defines."""
+    """Add to the constants what an assignment of a value to a target, a name or several, defines."""
     is_tuple = isinstance(target, ast.Tuple)
     names = target.elts if is_tuple else [target]
     for name, element in zip(names, value if is_tuple else [value]):
@@ -402,7 +414,7 @@ def _add_constants(constants: dict[str, object], target: ast.expr, value) -> Non
 
 
 def _evaluate(node: ast.expr, names: dict[str, object]):
-    """Evaluate an expression of constants, known names, arithmetic and ranges.
+    """Evaluate an expression (`node`) of constants, known names, arithmetic and ranges.
 
     Raises KeyError for any other expression.
     """
@@ -507,7 +519,7 @@ def instantiate(
 
 
 def hash_text(text: str) -> str:
-    """Return a short hash of a string."""
+    """Return a hash of a text, 12 hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -558,13 +570,13 @@ def _list_code_folders(machine_folder: Path | None = None) -> list[Path]:
 
 
 def _load_prebuilt(path: Path) -> machine.LoadedFunction | None:
-    """Load the code from the file of this name in the wheel; return None if there is none."""
+    """Load the code from the file in the wheel with the name of `path`; return None if there is none."""
     folder = prebuilt.find_folder(hash_sources)
     return folder and machine.load_file(folder / "code" / path.name)
 
 
 def _read_bytes(path: Path) -> bytes | None:
-    """Return the content of a file; None if it cannot be read."""
+    """Return the content of the file `path`; None if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError:

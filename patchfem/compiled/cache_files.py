@@ -26,6 +26,7 @@ class ChecksummedFiles(IndexDataCacheFile):
     """Index and data files of numba with a checksum; code with a changed bit may run and give wrong numbers."""
 
     def _dump(self, obj) -> bytes:
+        """Return the content of a cache file for an object (`obj`), with a checksum."""
         return pickle.dumps(CheckedContent(super()._dump(obj)))
 
 
@@ -37,9 +38,11 @@ class FaultTolerantCache(FunctionCache):
         self._cache_file.__class__ = ChecksummedFiles
 
     def load_overload(self, sig, target_context):
-        """Load the code for these types; return None if there is none or its file is damaged.
+        """Load the code for a signature (`sig`); return None if there is none or its file is damaged.
 
         The index of a damaged file is removed, so numba compiles the function again.
+
+        `target_context` is the compiler target of numba.
         """
         try:
             return super().load_overload(sig, target_context)
@@ -49,13 +52,13 @@ class FaultTolerantCache(FunctionCache):
             return None
 
     def save_overload(self, sig, data) -> None:
-        """Store the code for these types if it can be written."""
+        """Store the code (`data`) for a signature (`sig`) if it can be written."""
         with suppress(Exception):
             super().save_overload(sig, data)
 
 
 def store_on_disk(function):
-    """Make a numba dispatcher store its machine code in the cache folder, and return it."""
+    """Make a numba dispatcher, `function`, store its machine code in the cache folder; return it."""
     from . import _set_cache_folder
 
     _set_cache_folder()

@@ -23,6 +23,7 @@ from patchfem.compiled import hash_sources, prebuilt
 if not prebuilt.is_cpu_sufficient():
     raise SystemExit('this CPU lacks instruction sets of the machine code')
 print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
+# Scene of a rig whose kernels are compiled
 RIG_TEXT = """
 [normal]
 load = "26 lbf"
@@ -45,6 +46,7 @@ cycles = 20
 [friction]
 static = 0.3
 law = """
+# Laws whose kernels are compiled, as the table [friction] gives them
 LAW_TEXTS = (
     '"coulomb"',
     '"elastic-plastic"\nbond_length = "1 um"',
@@ -140,6 +142,8 @@ def get_build_hook():
             """Compile the kernels, add their files to the wheel and tag it for this platform.
 
             `version` is "editable" for an installation that refers to the source folder; it gets no machine code.
+
+            `build_data` is the description of the wheel by the build tool hatchling, which is changed.
             """
             if version == "editable" or os.environ.get("PATCHFEM_MACHINE_CODE", "0") in ("", "0"):
                 return

@@ -16,12 +16,16 @@ class IntegerMember(AttributeTemplate):
     key = types.IntEnumClass
 
     def generic_resolve(self, enum_class, name: str):
-        """Return the integer type if the class has this member, otherwise None."""
+        """Return the integer type if the class `enum_class` has a member of this name, otherwise None."""
         return types.intp if name in enum_class.instance_class.__members__ else None
 
 
 def _lower_member(context, builder, enum_class, value, name: str):
-    """Return the member as a constant of LLVM."""
+    """Return the member `name` of an IntEnum class as a constant of LLVM.
+
+    numba calls this function for `enum_class.name`, with the target `context`; the LLVM `builder` and the `value` of
+    the class itself are not needed.
+    """
     return context.get_constant(types.intp, int(enum_class.instance_class[name]))
 
 

@@ -102,11 +102,18 @@ def _memoize_call_types(method):
     Numba tries all overloads of the function, some dozens for a sum of two numbers, at each of the 4000 calls of a
     loop, which took a seventh of its compile time. A signature that depends on more than the types of the arguments is
     not stored: that of an overload written in Python, which numba compiles with the flags of the caller.
+
+    `method` is the method of numba that is replaced.
     """
     signatures = {}
 
     @wraps(method)
     def get_call_type(self, context, args, kws):
+        """Return the signature of a call with arguments of these types, from the memo if it is known.
+
+        `context` is the typing context of numba, `args` and `kws` are the types of the arguments by position and by
+        name.
+        """
         key = self, tuple(args)
         if not kws and key in signatures:
             signature = signatures[key]
@@ -140,6 +147,8 @@ class InlinedDispatcher(CPUDispatcher):
         """Resolve a call by the types of its arguments, not by the values of constants.
 
         Otherwise numba would compile the function again for every constant argument.
+
+        `args` and `kws` are the types of the arguments by position and by name.
         """
         if not self.targetoptions.get("forceinline"):
             args = tuple(map(types.unliteral, args))
@@ -226,7 +235,7 @@ class UnoptimisedLibrary(JITCodeLibrary):
     codegen = SimpleNamespace(set_env=lambda name, environment: None)
 
     def _optimize_functions(self, module):
-        """Run the LLVM passes for single functions on every function that has a body."""
+        """Run the LLVM passes for single functions on every function of a module that has a body."""
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
@@ -241,7 +250,7 @@ class UnoptimisedLibrary(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name):
-        """Return 0 for the address of any function, because there is no machine code."""
+        """Return 0 for the address of a function, whatever its name, because there is no machine code."""
         self._ensure_finalized()
         return 0
 

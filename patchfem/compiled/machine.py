@@ -45,9 +45,10 @@ class ArgumentConverter:
         self.lock = threading.Lock()
 
     def convert(self, value) -> tuple[str, bytes]:
-        """Return the type code and the words (bytes) of an argument; raise UnsupportedError for other types.
+        """Return the type code and the machine words (bytes) of an argument `value`.
 
-        A tuple that contains only numbers is not cached.
+        Raises UnsupportedError for a type that compiled code cannot take. A tuple that contains only numbers is not
+        cached.
         """
         code = NUMBER_CODES.get(type(value))
         if code is not None:
@@ -100,6 +101,7 @@ def _convert_array(array) -> tuple[str, bytes]:
 
 
 def _make_array_format(array) -> ArrayFormat:
+    """Return type code and packing of arrays with the type, dimensions and layout of this array."""
     flags = array.flags
     order = "A"
     if flags.c_contiguous:
@@ -118,6 +120,7 @@ class LoadedFunction:
     Parameters
     ----------
     address : int
+        Address of the machine code in memory.
     result_format : str or list
         Format of the result (`_describe_result`).
     nogil : bool
@@ -134,7 +137,10 @@ class LoadedFunction:
         self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
 
     def __call__(self, words: bytes):
-        """Call the function and return its result; raise RuntimeError if it raised an exception."""
+        """Call the function and return its result; raise RuntimeError if it raised an exception.
+
+        `words` are the machine words of all arguments.
+        """
         buffer = bytearray(self.header + words)
         self.call(ctypes.addressof(ctypes.c_char.from_buffer(buffer)))
         status = struct.unpack_from("q", buffer)[0]
@@ -145,14 +151,20 @@ class LoadedFunction:
 
 
 def _flatten_format(result_format) -> str:
-    """Return the format of the numbers of a result in their order in memory."""
+    """Return the characters, as in `struct`, of all numbers of a result in their order in memory.
+
+    `result_format` is the character of a number, or a list of the formats of the elements of a tuple.
+    """
     if isinstance(result_format, str):
         return result_format
     return "".join(map(_flatten_format, result_format))
 
 
 def _build_result(result_format, values):
-    """Return a result of this format from an iterator over its numbers."""
+    """Return a result of this format from an iterator over its numbers, `values`.
+
+    `result_format` is the character of a number, a list of the formats of the elements of a tuple, or "" for None.
+    """
     if result_format == "":
         return None
     if isinstance(result_format, str):
@@ -161,7 +173,7 @@ def _build_result(result_format, values):
 
 
 def load_file(path: Path) -> LoadedFunction | None:
-    """Load the function of a file; return None if there is no usable file.
+    """Load the function in the file `path`; return None if there is no usable file.
 
     The file may be missing or damaged, or contain code that this machine cannot run.
     """
@@ -206,7 +218,7 @@ def _create_engine() -> tuple[object, ModuleType]:
 
 
 def _is_in_c_library(name: str) -> bool:
-    """Return whether a function is in the C library and does not belong to Python or numba.
+    """Return whether the function `name` is in the C library and does not belong to Python or numba.
 
     Functions of Python and numba need more than a call: the interpreter or the run-time library of numba.
     """
@@ -319,9 +331,10 @@ def _make_file_content(file_name: str, target, result, options: dict[str, object
 
 
 def _describe_result(kind):
-    """Return the format of the result of a function; raise UnsupportedError for other types.
+    """Return the format of a result of the numba type `kind`.
 
-    It is "d" for a float, "q" for an integer, "" for None, "?" for a boolean, and a list of formats for a tuple.
+    Raises UnsupportedError for types that compiled code cannot return. The format is "d" for a float, "q" for an
+    integer, "" for None, "?" for a boolean, and a list of formats for a tuple.
     """
     from numba.core import types
 

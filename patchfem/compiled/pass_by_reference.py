@@ -25,12 +25,15 @@ class ReferencedTuple(types.Type):
 
 
 def get_argument_type(kind):
-    """Return the type by which a function receives an argument: `ReferencedTuple` for a named tuple."""
+    """Return the type by which a function receives an argument of the numba type `kind`.
+
+    It is a `ReferencedTuple` for a named tuple, and `kind` itself for others.
+    """
     return ReferencedTuple(kind) if isinstance(kind, types.BaseNamedTuple) else kind
 
 
 def count_words(kind) -> int:
-    """Return the number of 8-byte words of a value of this type in memory."""
+    """Return the number of 8-byte words in memory of a value of the numba type `kind`."""
     if isinstance(kind, ReferencedTuple):
         return count_words(kind.tuple_type)
     if isinstance(kind, types.BaseTuple):
@@ -53,7 +56,7 @@ class FieldTyping(AttributeTemplate):
     key = ReferencedTuple
 
     def generic_resolve(self, kind, name):
-        """Return the type of the field of this name; None if the tuple has no such field."""
+        """Return the type of a field by its name, in a tuple of the type `kind`; None if it has none."""
         fields = kind.tuple_type.fields
         if name not in fields:
             return None
@@ -62,7 +65,24 @@ class FieldTyping(AttributeTemplate):
 
 @lower_getattr_generic(ReferencedTuple)
 def load_field(context, builder, kind, value, name):
-    """Generate the LLVM code that loads a field of a tuple passed by reference."""
+    """Generate the LLVM code that loads a field of a tuple passed by reference.
+
+    Parameters
+    ----------
+    context, builder
+        Target context of numba, and the LLVM builder to which the code is added.
+    kind : ReferencedTuple
+        Type of the tuple.
+    value
+        Address of the tuple, an LLVM value.
+    name : str
+        Name of the field.
+
+    Returns
+    -------
+    LLVM value
+        Value of the field; its address if it is a tuple itself.
+    """
     field_types = kind.tuple_type.types
     index = kind.tuple_type.fields.index(name)
     offset = WORD_BYTES * sum(map(count_words, field_types[:index]))

@@ -52,7 +52,10 @@ def compute_key(hash_sources) -> str:
 
 @cache
 def find_folder(hash_sources) -> Path | None:
-    """Return the folder of code in the wheel; None if this CPU cannot run any."""
+    """Return the folder of code in the wheel; None if this CPU cannot run any.
+
+    `hash_sources` is a function that returns a hash of the kernel sources, by which the code is found.
+    """
     if not (COMPILED_FOLDER / "generic").is_dir() or os.environ.get("NUMBA_BOUNDSCHECK"):
         return None
     folder = COMPILED_FOLDER / "generic" / compute_key(hash_sources)

@@ -212,7 +212,7 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
 
 
 def relative_violation(solution: SetSolution) -> float:
-    """Return the largest relative violation of the contact conditions [1].
+    """Return the largest relative violation of the contact conditions [1] by a `SetSolution`.
 
     Openings in contact and overlaps are relative to the terms of the opening, tensile forces to the load.
     """
@@ -227,6 +227,8 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
 
     An empty set gets the nodes of the smallest gap. Where a set does not reach to both sides of the load line of a free
     rotation, the node of the smallest gap on each side is added.
+
+    `problem` gives the gap and the load lines; the array `active` (n,) of bool itself is not changed.
     """
     if not problem.free_rotations:
         return problem.gap <= problem.gap.min()
@@ -372,40 +374,47 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
         Increasing positions and gap [m].
     load, moment, spring : float
         Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    float
+        Rotation that opens the gap at positive x [rad].
     """
-    left = 0
+    left_index = 0
     right = x.size - 1
-    while left < right:
+    while left_index < right:
         # Rotation at which the piece would rest on both nodes
-        theta = -(gap[right] - gap[left]) / (x[right] - x[left])
+        theta = -(gap[right] - gap[left_index]) / (x[right] - x[left_index])
         height = gap + theta * x
         lowest = int(np.argmin(height))
 
         # A node between them touches first. The side of it that the load line is on keeps the support.
-        if left < lowest < right and height[lowest] < min(height[left], height[right]):
+        if left_index < lowest < right and height[lowest] < min(height[left_index], height[right]):
             imbalance = load * x[lowest] - moment - spring * theta
             if imbalance == 0:
                 return float(theta)
             if imbalance > 0:
                 right = lowest
             else:
-                left = lowest
+                left_index = lowest
         # Both nodes touch. Against a spring the moment may lift the piece off one of them.
-        elif spring > 0 and load * x[left] - moment - spring * theta > 0:
-            right = left
+        elif spring > 0 and load * x[left_index] - moment - spring * theta > 0:
+            right = left_index
         elif spring > 0 and load * x[right] - moment - spring * theta < 0:
-            left = right
+            left_index = right
         else:
             return float(theta)
 
     # The piece rests on one node, and the spring balances the moment
-    return float((load * x[left] - moment) / spring)
+    return float((load * x[left_index] - moment) / spring)
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) at which a rigid piece is in equilibrium under load and moments.
+    """Return the motion q (r,) of a contact problem at which a rigid piece is in equilibrium.
 
     The rotations are found about one axis after the other.
+
+    The motion is the approach [m], then the rotations [rad] that the problem leaves free.
     """
     motion = np.zeros(problem.target.size)
     gap = problem.gap
@@ -427,10 +436,13 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes in contact from the gap between rigid pieces in equilibrium.
+    """Guess the nodes in contact (n,) of a problem from the gap between rigid pieces in equilibrium.
 
     The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
     Under a prescribed approach these are the nodes that overlap.
+
+    `compliance` [m/N] is that of the n nodes: a `StripCompliance`, or an object with its `product` and
+    `node_compliance`.
     """
     gap = problem.gap
     if not problem.target.size:

@@ -27,7 +27,7 @@ class LinearAsperities:
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m], which is 0 where the layer is not compressed."""
+        """Stiffness -dP/ds (m,) [Pa/m] at s (m,) [m], which is 0 where the layer is not compressed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
@@ -35,6 +35,8 @@ class SmoothAsperities:
     """Base class of pressure laws that are positive and smooth at every separation.
 
     Each law has `log_pressure` and `separation`.
+
+    `needs_load` tells whether a law must be given the mean pressure of a load before it can be evaluated.
     """
 
     __slots__ = ()
@@ -135,6 +137,18 @@ def peak_integral(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     F(h) = int_h^inf (z - h)^3/2 phi(z) dz with the unit normal density phi. It is computed as F = phi(h) 2 int_0^inf
     v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of (z - h)^3/2 below h = -8, which is
     short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of the decay rate 3e-13.
+
+    Parameters
+    ----------
+    h : ndarray
+        Separation of the mean planes in standard deviations of the asperity heights [1], of any shape.
+
+    Returns
+    -------
+    log_integral : ndarray
+        ln F(h) [1], of the shape of h.
+    decay_rate : ndarray
+        -d ln F/dh [1] > 0, of the same shape.
     """
     # Trapezoidal rule in v, whose width is scaled so that the integrand decays alike at every h. The decay rate is
     # 3/2 of the ratio of the integrals of (z - h)^1/2 and (z - h)^3/2.

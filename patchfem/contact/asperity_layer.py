@@ -22,6 +22,7 @@ from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_LAYER_STEPS = 60
+# Message if Newton's method fails
 DIVERGED_MESSAGE = (
     "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
     'deviation, or set law = "linear"'
@@ -64,7 +65,7 @@ class AsperityProblem(NamedTuple):
         return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return the part of load and moments (r,) that the forces and the springs do not balance."""
+        """Return load [N] and moments [N m] (r,) that forces (n,) [N] and springs do not balance at a given motion (r,)."""
         contact = self.contact
         return contact.target - contact.motions.T @ force - contact.springs * motion
 
@@ -138,7 +139,10 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
 
 
 def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution:
-    """Solve by Newton's method from initial separations (n,) [m] and an initial motion (r,).
+    """Solve a scaled problem by Newton's method from separations (n,) [m] and a motion (r,).
+
+    `_newton_step` returns the changes of forces [N], motion and separations [m] that remove the errors of both
+    equations to first order.
 
     Raises
     ------
@@ -194,7 +198,11 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
 
 
 def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
-    """Solve strips under a prescribed approach, which the gap contains; no node carries force if nothing touches."""
+    """Solve strips under a prescribed approach, which the gap of the problem already contains.
+
+    No node carries force if nothing touches. The law of the layer gives ln p [p in Pa] and its decay rate [1/m] by
+    `log_pressure`, and the separation [m] at a pressure by `separation`.
+    """
     asperities = problem.asperities
     gap = problem.contact.gap
     no_motion = np.zeros(0)
@@ -217,7 +225,11 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
 
 
 def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Return initial separations and motion from a law that is linearized at the mean pressure."""
+    """Return initial separations (n,) [m] and an initial motion (r,) of a problem for Newton's method.
+
+    They solve the contact with a law that is linearized at the mean pressure, so that the layer is a row of equal
+    springs between bare pieces. Nodes above the mean pressure get the separation of the law itself.
+    """
     contact = problem.contact
     mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))

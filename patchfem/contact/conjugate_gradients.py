@@ -36,7 +36,19 @@ class _QuadraticProgram(NamedTuple):
 def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram:
     """Formulate the contact problem as a quadratic program.
 
-    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
+    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node; the
+    program then has n + 2 forces.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the n nodes.
+    problem : ContactProblem
+        Gap [m], motions, loads and springs; at most one spring is not 0.
+
+    Returns
+    -------
+    _QuadraticProgram
     """
     # Rotations about the middle, scaled to a largest closing of 1: the columns are then comparable
     rigid = problem.motions.astype(float)
@@ -47,6 +59,8 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
         half_length[k] = np.ptp(rigid[:, k]) / 2
         rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
         target[k] = (target[k] - target[0] * middle) / half_length[k]
+
+    # Without a spring these are all forces; a spring adds two, which turn the piece in opposite directions
     spring_indices = np.flatnonzero(problem.springs)
     if not spring_indices.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)
@@ -82,6 +96,11 @@ def project_forces(
         Prescribed resultants rigid^T f.
     max_iterations : int
         Number of Newton steps.
+
+    Returns
+    -------
+    (n,) ndarray
+        Nearest such forces [N].
     """
     if not target.size:
         return np.maximum(force, 0.0)
@@ -107,9 +126,21 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> float:
-    """Find the step t > 0 at which change . max(0, start + t change) has a given value.
+    """Find the step t > 0 at which change . max(0, start + t change) has the value `target_value`.
 
-    The left-hand side is piecewise linear in t.
+    The left-hand side is piecewise linear in t; all entries have the unit that the caller gives them.
+
+    Parameters
+    ----------
+    start, change : (k,) ndarray
+        Values at t = 0, and their change per unit of t.
+    target_value : float
+        Prescribed value of the sum.
+
+    Returns
+    -------
+    float
+        Step t; 0 if the sum stays below the value.
     """
     # Terms that are positive just after t = 0, and the steps at which a term appears or vanishes
     is_positive = (start > 0) | ((start == 0) & (change > 0))
@@ -234,7 +265,11 @@ def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bo
 
 
 def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
-    """Return the gradient (n,) [m] of the energy, from which the least-squares rigid motion is subtracted."""
+    """Return the gradient (n,) [m] of the energy, from which the least-squares rigid motion is subtracted.
+
+    `displacement` (n,) [m] is C f under the present forces. The rigid motion is fitted to the gradient at the nodes
+    `in_contact` (n,), where the gradient of the solution of `program` vanishes.
+    """
     slope = program.gap + displacement
     motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion
@@ -264,7 +299,10 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
 
 
 def _fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Fit a rigid motion (r,) to nodal values (k,) by least squares."""
+    """Fit a rigid motion (r,) to nodal values (k,) by least squares.
+
+    `rigid` (k, r) holds the displacements of the nodes per unit of each motion.
+    """
     if not rigid.shape[1]:
         return np.zeros(0)
     return np.linalg.lstsq(rigid, values, rcond=1e-13)[0]

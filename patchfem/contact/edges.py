@@ -69,7 +69,10 @@ def edge_offset(
 
 
 def _find_ends(active: np.ndarray) -> list[tuple[int, int]]:
-    """Return the nodes at which the contact set ends inside the interface, and the side of each end."""
+    """Return (node, side) of each end of the contact set (m,) inside the interface.
+
+    The node is the last one in contact; the side is 1 where the contact ends towards +x, else -1.
+    """
     return [
         (int(change), 1) if active[change] else (int(change) + 1, -1)
         for change in np.flatnonzero(active[1:] != active[:-1])
@@ -111,7 +114,10 @@ class SetFactor:
         self.solve_on_set = StripCompliance(compliance).solver(active)
 
     def solve(self, motions) -> np.ndarray:
-        """Return the forces (m, r) [N] of the nodes in contact under given displacements (m, r) [m] of them."""
+        """Return the forces (m, r) [N] of the nodes in contact that cause given displacements (m, r) [m] of them.
+
+        Each of the r columns of `motions` is solved by itself; entries of other nodes are ignored and get no force.
+        """
         out = np.zeros(motions.shape)
         out[self.index] = self.solve_on_set(motions[self.index])
         return out
@@ -151,7 +157,11 @@ def find_edges(
     force_rate = normal.solve(np.ones((x.size, 1)))[:, 0]
 
     def _find_offset(node: int, inner: float, outer: float, fraction: float) -> float:
-        """Return the inward offset [m] of an edge beyond a node, between cells of given lengths [m]."""
+        """Return the inward offset [m] of the edge that lies a fraction of a cell beyond a node.
+
+        `inner` and `outer` are the lengths [m] of the cells before and beyond the node. An asperity layer reduces the
+        offset by its part of the compliance, because it has its edge at the node itself.
+        """
         offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
         return (
             offset if softness is None else offset * (1 - softness[node] / compliance[node, node])

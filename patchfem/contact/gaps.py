@@ -24,6 +24,7 @@ class ShapeProperties(NamedTuple):
     wave: Callable | None = None
 
 
+# Properties of each gap shape as functions of its table
 SHAPE_PROPERTIES = {
     "tilt": ShapeProperties(angle=lambda keys: keys.angle),
     "step": ShapeProperties(edge=lambda keys: (keys.at, keys.height)),

@@ -38,10 +38,12 @@ STRIP_RESIDUAL_TOL = 1e-9
 MIN_RELATIVE_FORCE = 1e-12
 # Smallest load [N] or overlap [m] for which the products in the check of the solution do not underflow
 MIN_COMPUTABLE_LOAD = 1e-200
+# Note on what strips neglect
 NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
     "unless their captions name strips; result.nc contains every strip"
 )
+# Message about a roll that the contact does not determine
 LOOSE_ROLL_MESSAGE = (
     "contact.strips: the nodes that touch do not determine the rotation about x; raise "
     "contact.strips.count or prescribe contact.strips.roll"
@@ -183,7 +185,11 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
 
 
 class StripProperties(NamedTuple):
-    """Compliances (m, m) [m/N] and nodal areas (m,) [m2] of one strip."""
+    """Properties of one strip with m nodes.
+
+    - normal, tangential (m, m): normal and shear compliance [m/N].
+    - weight (m,): nodal areas [m2].
+    """
 
     normal: np.ndarray
     tangential: np.ndarray
@@ -191,9 +197,9 @@ class StripProperties(NamedTuple):
 
 
 def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
-    """Return the compliance and the nodal areas of one strip if a patch is split into equal strips.
+    """Return compliance [m/N] and nodal areas [m2] of one of `count` equal strips of a patch.
 
-    A strip is `count` times as compliant as the whole width.
+    `pieces` are those of the whole width. A strip is `count` times as compliant and has 1/`count` of the area.
     """
     normal = pieces.normal
     tangential = pieces.tangential
@@ -290,7 +296,11 @@ def press_strips(strips: StripModel, gap, holder: Holder, start=None) -> StripsS
 
 
 def _holder_problem(layout: StripLayout, gap, holder: Holder) -> ContactProblem:
-    """Formulate the contact problem of all strips, with an unknown motion for each given load."""
+    """Formulate the contact problem of all strips, with an unknown motion for each load of the holder.
+
+    `layout` has the nodes of the strips, and `gap` (s, m) [m] is their gap without load. The n = s m nodes of the
+    problem are numbered strip after strip.
+    """
     n_strips = layout.offsets.size
     motions = (
         (holder.load, np.ones(gap.size), 0.0),
@@ -307,7 +317,11 @@ def _holder_problem(layout: StripLayout, gap, holder: Holder) -> ContactProblem:
 
 
 def _press_bare(compliance: StripCompliance, problem: ContactProblem, start) -> ContactSolution:
-    """Solve strips that have no asperity layer, or a linear one that the compliance contains."""
+    """Solve strips that have no asperity layer, or a linear one that the compliance contains.
+
+    `start` (s, m) or (n,) of bool is a guess of the nodes in contact, or None. Raises NotConverged, with a remedy, if
+    the contact set of the `problem` does not determine the motion.
+    """
     if not problem.target.size and problem.gap.min() >= 0:
         return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
     try:
@@ -322,7 +336,11 @@ def _press_bare(compliance: StripCompliance, problem: ContactProblem, start) -> 
 
 
 def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
-    """Raise PatchfemError for loads and approaches that numbers cannot represent, and for pieces that tip over."""
+    """Raise PatchfemError for loads and approaches that numbers cannot represent, and for pieces that tip over.
+
+    `gap` (s, m) [m] is that of the nodes of the `strips` without load, and `holder` has the loads and prescribed
+    motions. The load line of a free rotation lies at x = moment/load.
+    """
     load = holder.load
     if load is None:
         overlap = holder.approach - gap.min()
@@ -351,7 +369,11 @@ def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
 
 
 def _refuse_loose_holder(force, holder: Holder) -> None:
-    """Raise NotConverged if the nodes in contact do not determine a released rotation."""
+    """Raise NotConverged if the nodes in contact do not determine a released rotation.
+
+    `force` (s, m) [N] are the nodal forces of the strips. A rotation of the `holder` is released if it has a moment
+    but no spring.
+    """
     is_loaded = force > MIN_RELATIVE_FORCE * force.max()
     is_rotation_free = holder.moment is not None and holder.spring == 0
     if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
@@ -384,6 +406,11 @@ def _make_state(
         Number of iterations of the solver.
     residuals : dict or sequence of pairs
         Residuals of the solution by name.
+
+    Returns
+    -------
+    StripsState
+        Its position of the holder includes the prescribed rotations.
     """
     _, layout, asperities = strips
     stiffness = None

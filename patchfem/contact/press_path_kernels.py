@@ -34,6 +34,9 @@ class HolderMotion(NamedTuple):
 def find_first_violation(sets, slot, motion, change, bounds):
     """Return the fraction of an increment after which a node first violates its condition.
 
+    The force of a node in contact and the gap of another one are linear in the heave -d and the rotation t; the
+    coefficients of 1, d and t are stored with the set.
+
     Parameters
     ----------
     sets : set_arrays.SetArrays
@@ -67,6 +70,9 @@ def find_first_violation(sets, slot, motion, change, bounds):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_border(sets, slot, start, motion, change):
     """Find the fraction of an increment at which a contact set ceases to be valid.
+
+    `check_contact_conditions` tells whether all forces in contact and all gaps elsewhere are >= 0 at a displacement d
+    = -heave, and returns the bounds for their rounding errors.
 
     Parameters
     ----------
@@ -111,6 +117,11 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
 
     The mean times the increment is the difference of the energies (a discrete gradient), and the mean
     is itself the gradient of a convex function.
+
+    The increment crosses several contact sets. On each, the energy is a quadratic function of the displacement, whose
+    coefficients are stored (`EnergyTerm`); so the increment is divided where the set changes (`find_border`), and
+    `find_set` returns the slot of the set beyond. `compute_energy` returns the energy [J] and its slopes by heave [N]
+    and rotation [N m].
 
     Parameters
     ----------

@@ -131,6 +131,10 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         Contact set of the reference state, the first target of the search.
     n_slots : int
         Number of contact sets that can be stored.
+
+    Returns
+    -------
+    SetArrays
     """
     m = x.size
     tableau = Tableau(
@@ -165,5 +169,8 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
 
 
 def hash_set(sets: SetArrays, in_contact) -> int:
-    """Return the 64-bit hash of a contact set that consists of given nodes (m,)."""
+    """Return the 64-bit hash of the contact set of the nodes `in_contact` (m,) of bool.
+
+    It is the exclusive or of the names of these nodes.
+    """
     return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))

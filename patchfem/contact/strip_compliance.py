@@ -103,7 +103,7 @@ class StripCompliance:
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:
-            """Solve with the factors of every strip."""
+            """Solve with the factors of every strip for right-hand sides (a,) or (a, r) of the active nodes."""
             parts = [dpotrs(factor, right_sides[rows], lower=1)[0] for rows, factor in blocks]
             return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

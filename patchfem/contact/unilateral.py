@@ -30,6 +30,7 @@ from .strip_compliance import StripCompliance, factorise
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
 RESIDUAL_TOL = 1e-12
+# Message about a compliance that is not positive definite
 INDEFINITE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
@@ -59,6 +60,21 @@ def _solve_by_fallbacks(
 
     The methods are, in turn: primal-dual from all nodes, primal-dual from the result of conjugate gradients, and primal,
     which always ends. The number of iterations is that of all methods.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the nodes.
+    problem : ContactProblem
+        Gap [m], motions and loads of the nodes.
+    max_iterations : int
+        Largest number of contact sets that the primal-dual method tries from each start.
+
+    Returns
+    -------
+    solution : SetSolution
+    n_iterations : int
+        Number of contact sets and of gradient steps of all methods.
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)

@@ -31,7 +31,7 @@ class WriteError(Missing):
 def write_atomically(path) -> Iterator[Path]:
     """Yield the path of a partial file, which is renamed to `path` on success and else removed.
 
-    A device or a pipe is written directly. WriteError if the file cannot be written.
+    A device or a pipe is written directly. Raises WriteError if the file cannot be written.
     """
     path = Path(path)
     if os.path.isdir(path):
@@ -57,12 +57,12 @@ def write_atomically(path) -> Iterator[Path]:
 
 
 def write_text(path, text: str, encoding: str = "utf-8") -> None:
-    """Write a text file atomically, with ? for characters that cannot be encoded."""
+    """Write a text file `path` atomically, with ? for characters that the encoding lacks."""
     write_bytes(path, text.encode(encoding, errors="replace"))
 
 
 def write_rows(path, rows: Iterable[Iterable]) -> None:
-    """Write rows of cells as a comma-separated file atomically."""
+    """Write rows of cells as a comma-separated file `path` atomically."""
     with (
         write_atomically(path) as partial,
         open(partial, "w", newline="", encoding="utf-8") as file,
@@ -71,7 +71,7 @@ def write_rows(path, rows: Iterable[Iterable]) -> None:
 
 
 def write_bytes(path, data) -> None:
-    """Write a binary file atomically."""
+    """Write bytes, `data`, to the file `path` atomically: it is complete, or as it was before."""
     with write_atomically(path) as partial:
         partial.write_bytes(data)
 
@@ -104,14 +104,17 @@ def is_partial_name(name: str) -> bool:
 
 
 def explain_write_error(error: OSError, path: Path) -> WriteError:
-    """Return the error to raise for a file that could not be written, with the reason of the system."""
+    """Return the error to raise for a file `path` that could not be written.
+
+    It has the reason of the system, from the original error.
+    """
     # NumPy reports a full disk as a number of values, without the reason of the system
     reason = error.strerror or f"perhaps no space is left: {error}"
     return WriteError(f"{format_path(path)}: cannot be written ({reason})")
 
 
 def explain_mkdir_error(error: OSError) -> str:
-    """Return why a folder could not be made, with a remedy if there is one."""
+    """Return why a folder could not be made, by the error of the system, with a remedy."""
     if error.errno == errno.ENAMETOOLONG:
         return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
@@ -143,7 +146,7 @@ class LossyFile:
         self.error = None
 
     def write(self, data) -> int:
-        """Write at the present position and return the number of bytes, written or not."""
+        """Write `data` at the present position and return the number of bytes, written or not."""
         with memoryview(data) as view:
             count = view.nbytes
             try:
@@ -170,12 +173,13 @@ class LossyFile:
         return view.nbytes
 
     def __getattr__(self, name: str):
+        """Return any other attribute of the file."""
         return getattr(self.file, name)
 
 
 @contextmanager
 def open_lossy(path) -> Iterator[LossyFile]:
-    """Open a file for `h5py.File(file, "w")`; the first OSError is raised after it is closed."""
+    """Open the file `path` for `h5py.File(file, "w")`; the first OSError is raised after closing it."""
     with open(path, "w+b", buffering=0) as file:
         lossy = LossyFile(file)
         yield lossy

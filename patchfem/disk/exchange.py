@@ -16,7 +16,7 @@ END_SIGNALS = tuple(
 
 
 def make_old_folder_path(target: Path) -> Path:
-    """Return the path to which the previous folder is renamed before it is removed."""
+    """Return the path to which the previous folder `target` is renamed before it is removed."""
     return target.with_name(f".{target.name}.old")
 
 

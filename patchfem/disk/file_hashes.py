@@ -9,7 +9,9 @@ from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 
+# Pattern of signs between which names of files may stand
 _SEPARATOR_PATTERN = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
+# Pattern of a text in quotes
 _QUOTED_PATTERN = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
@@ -53,7 +55,7 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
 
 
 def _iterate_candidate_names(text: str) -> Iterator[str]:
-    """Iterate over the parts of a string that may be names of files."""
+    """Iterate over the parts of a text that may be names of files."""
     yield text
     yield text.partition("=")[2].strip()
     for double_quoted, single_quoted in _QUOTED_PATTERN.findall(text):

@@ -8,6 +8,7 @@ import re
 import sys
 from functools import cache
 
+# Pattern of the name of a metadata folder: package and version
 METADATA_PATTERN = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
 
 

@@ -73,7 +73,10 @@ def make_process_folder() -> Path:
 
 
 def write_cache_file(path: Path, data: bytes) -> bool:
-    """Write a cache file atomically and make its folder; return False if this fails."""
+    """Write the cache file `path` atomically and make its folder; return False if this fails.
+
+    `data` is its content.
+    """
     partial = path.with_name(f".{path.name[:100]}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(mode=0o700, exist_ok=True)

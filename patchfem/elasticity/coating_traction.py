@@ -99,7 +99,10 @@ def _select_coating(cells: Cells, nodes) -> Cells:
 
 
 def _nodal_forces(coating: Cells, gauss_points: list[CellPoints], u) -> np.ndarray:
-    """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells."""
+    """Return nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells under u (N, 2) [m].
+
+    `gauss_points` are the integration points of the cells, one entry for each element of `coating.groups`.
+    """
     out = np.zeros(coating.points.shape)
     for nodes, points in zip(coating.groups.values(), gauss_points):
         strain = points.strain(u[nodes])

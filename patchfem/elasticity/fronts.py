@@ -26,7 +26,11 @@ MAX_REFINEMENT_CHANGE = 1e-2
 
 
 class CellBlock(NamedTuple):
-    """Cells of one element: node numbers (t, k), and stiffnesses (t, 2 k, 2 k) per unit width [N/m per m]."""
+    """Cells of one element.
+
+    - nodes (t, k): node numbers.
+    - matrices (t, 2 k, 2 k): stiffnesses per unit width [N/m per m].
+    """
 
     nodes: np.ndarray
     matrices: np.ndarray
@@ -143,7 +147,11 @@ class _Part(NamedTuple):
 
 
 class _Stiffness(NamedTuple):
-    """Stiffness (2 k + 2, 2 k + 2) of the nodes (k,) of a part; its last two rows and columns are zero."""
+    """Stiffness of a part of a piece.
+
+    - nodes (k,): nodes of the part.
+    - matrix (2 k + 2, 2 k + 2): stiffness [N/m per m]; its last two rows and columns are zero.
+    """
 
     nodes: np.ndarray
     matrix: np.ndarray
@@ -238,7 +246,11 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
 
 
 def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
-    """Return cells in which the fixed displacements are decoupled, with a stiffness of 1 on the diagonal."""
+    """Return cells in which the fixed displacements are decoupled, with a stiffness of 1 on the diagonal.
+
+    `is_fixed` (N, 2) tells which displacements are 0; the rows and columns of these in the stiffness of each cell of
+    the `block` become 0.
+    """
     is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
     cells = np.flatnonzero(is_fixed.any(axis=1))
     is_free = ~is_fixed[cells]
@@ -250,7 +262,10 @@ def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
 
 
 def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first and the last leaf (n_nodes,) that contains a cell of each node."""
+    """Return the numbers (n_nodes,) of the first and the last leaf that contains a cell of each node.
+
+    `leaves` lists the cells of each leaf, numbered through all `blocks` (CellBlock).
+    """
     leaf = np.empty(sum(len(block.nodes) for block in blocks), np.int64)
     for number, cells in enumerate(leaves):
         leaf[cells] = number
@@ -266,13 +281,17 @@ def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.
 
 
 def _assemble_leaf(blocks, cells, position) -> _Stiffness:
-    """Assemble the stiffness of given cells; `position` is a workspace (n_nodes,)."""
+    """Assemble the stiffness of given `cells`, which are numbered through all `blocks` (CellBlock).
+
+    `position` (n_nodes,) is a workspace. The stiffness has a last row and column of zeros for each direction, which
+    stand for nodes that it does not contain.
+    """
     selected = []
     n_cells = 0
     for nodes, matrices in blocks:
-        here = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
+        block_cells = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
         n_cells += len(nodes)
-        selected.append((nodes[here], matrices[here]))
+        selected.append((nodes[block_cells], matrices[block_cells]))
     nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in selected]))
     position[nodes] = np.arange(nodes.size)
     size = 2 * nodes.size + 2
@@ -290,7 +309,26 @@ def _number_unknowns(nodes) -> np.ndarray:
 
 
 def _eliminate(own, boundary, terms, position) -> tuple[Front, _Stiffness]:
-    """Add up the stiffnesses of a part and eliminate its own nodes: K_oo = L L^T, S = K_bb - W^T W with W = L^-1 K_ob."""
+    """Add up the stiffnesses of a part and eliminate its own nodes.
+
+    With K the sum, K_oo = L L^T, W = L^-1 K_ob and the Schur complement S = K_bb - W^T W.
+
+    Parameters
+    ----------
+    own, boundary : (a,) and (b,) ndarray of int
+        Nodes that are eliminated (o), and those that remain (b).
+    terms : list of _Stiffness
+        Stiffnesses of the cells, or of both halves, of the part [N/m per m].
+    position : (n_nodes,) ndarray of int
+        Workspace for the positions of nodes in a term.
+
+    Returns
+    -------
+    front : Front
+        L and W of the eliminated nodes.
+    remaining : _Stiffness
+        S of the boundary.
+    """
     sums = None
     for nodes, matrix in terms:
         # Nodes that the term does not contain take the zeros in its last rows and columns, as does the node that is

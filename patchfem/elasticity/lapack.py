@@ -27,7 +27,10 @@ __all__ = [
 
 
 def _load_compiled(name: str):
-    """Load a compiled module of scipy.linalg, if possible without its package."""
+    """Load the compiled module `name` of scipy.linalg, if possible without its package.
+
+    The import of the package itself takes longer than a small run.
+    """
     try:
         scipy_folder = find_spec("scipy").submodule_search_locations[0]
         spec = PathFinder.find_spec(name, [str(Path(scipy_folder) / "linalg")])
@@ -63,12 +66,12 @@ def cho_factor(matrix) -> np.ndarray:
 
 
 def cho_solve(low, right) -> np.ndarray:
-    """Solve a symmetric system from its `cho_factor`, for right-hand sides (n,) or (n, k)."""
+    """Solve a symmetric system from its `cho_factor` `low`, for right-hand sides (n,) or (n, k)."""
     return dpotrs(low, right, lower=1)[0]
 
 
 def cho_inverse(low) -> np.ndarray:
-    """Return the symmetric inverse (n, n) of a matrix from its `cho_factor`."""
+    """Return the symmetric inverse (n, n) of a matrix from its `cho_factor` `low`."""
     lower_half, _ = _LAPACK.dpotri(np.asfortranarray(low), lower=1)
     return np.tril(lower_half) + np.tril(lower_half, -1).T
 

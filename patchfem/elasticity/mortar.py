@@ -26,7 +26,11 @@ from .elasticity import InterfaceCompliance
 
 
 class PieceInterface(NamedTuple):
-    """Ascending interface nodes (n,) [m] of a piece, and its compliances (n, n) [m2/N]."""
+    """Interface of a piece.
+
+    - x (n,): ascending interface nodes [m].
+    - compliance: compliances (n, n) [m2/N] of these nodes.
+    """
 
     x: np.ndarray
     compliance: InterfaceCompliance
@@ -119,7 +123,10 @@ def transfer_matrix(x, piece_x) -> np.ndarray:
 
 
 def _hat_functions(x, cell, positions) -> np.ndarray:
-    """Return the values (2, k) of both hat functions in cells (k,) at positions (k,) in these cells."""
+    """Return the values (2, k) of both hat functions in cells (k,) at positions (k,) [m] in these cells.
+
+    They belong to the left and the right node of the cell; x (m,) [m] are the nodes.
+    """
     width = x[cell + 1] - x[cell]
     return np.stack([(x[cell + 1] - positions) / width, (positions - x[cell]) / width])
 

@@ -59,7 +59,10 @@ def get_cells(piece: Piece) -> Cells:
 
 
 def make_points(cells: Cells, kind: str) -> list[CellPoints]:
-    """Return the Gauss points ("gauss") or the centres ("centre") of the cells of each element."""
+    """Return points inside the cells of each element, with shape functions and weights.
+
+    They are the Gauss points if `kind` is "gauss" and the centres if it is "centre".
+    """
     out = []
     for name, nodes in cells.groups.items():
         element = ELEMENTS[name]
@@ -127,7 +130,10 @@ class Patches(NamedTuple):
 
 
 def collect_patches(point, cell) -> Patches:
-    """Group pairs of a point and a cell (e,) by point, each pair once."""
+    """Group pairs of a point and a cell near it by point, each pair once.
+
+    `point` and `cell` (e,) are the numbers of both; all weights are 1.
+    """
     keys = np.unique(np.asarray(point, np.int64) << 32 | cell)
     return Patches(keys >> 32, keys & 0xFFFFFFFF, np.ones(keys.size))
 
@@ -159,6 +165,8 @@ def fit_recovery(cells: Cells) -> Recovery:
 
     Where few cells of a material meet at a node, as in a coating of one row, their neighbours are
     added.
+
+    `Patches.list_cells` returns the cells around some points, and for each of these cells the number of its point.
 
     Parameters
     ----------

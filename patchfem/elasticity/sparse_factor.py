@@ -17,6 +17,7 @@ class SparseFactor:
     Parameters
     ----------
     matrix : (n, n) sparse array
+        Symmetric matrix, such as a stiffness [N/m].
     min_pivot : float
         Every pivot must exceed this fraction of the diagonal entry of the matrix [1].
 

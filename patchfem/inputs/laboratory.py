@@ -68,6 +68,11 @@ def read_records(
 def _read_universal(
     path: Path, requests: list[RequestedChannel], exported_names: Mapping
 ) -> Records:
+    """Read the requested channels of a universal file, by default all that it states a quantity for.
+
+    `path` is the file, `requests` are the channels that the user asks for, and `exported_names` has the names that
+    patchfem gives to columns of its own exports, which say more than the data types of the file.
+    """
     notes = []
     channels = universal.make_channels(path, universal.read_datasets(path), notes)
     names = [channel.name for channel in channels]
@@ -86,13 +91,19 @@ def _read_universal(
 
 
 def _find_quantity(name: str, names: list[str], exported_names: Mapping) -> str:
-    """Return the quantity that the name of a column states, or "" if it states none."""
+    """Return the quantity that the name of a column states, or "" if it states none.
+
+    `names` are those of all columns, and `exported_names` those that patchfem gives to columns of its own exports.
+    """
     quantity = find_standard_name(name, names, exported_names)
     return quantity if quantity in CHANNEL_UNITS else ""
 
 
 def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
-    """Read the numeric columns of a table as channels; columns that contain text are left out."""
+    """Read the numeric columns of the table `path` as channels; columns of text are left out.
+
+    `exported_names` has the names that patchfem gives to columns of its own exports.
+    """
     table = read_text(path, "a measured table")
     names = table.names
     is_data = any(map(NUMBER_PATTERN.fullmatch, names))
@@ -117,7 +128,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
 
 
 def _read_matlab(path: Path, requests: list[RequestedChannel]) -> Records:
-    """Read the requested variables of a MATLAB file, such as `F`, `data(:,2)` or `run.load.F`.
+    """Read the requested variables of the MATLAB file `path`, such as `F`, `data(:,2)` or `run.load.F`.
 
     Only real arrays are read; nothing in the file is executed.
     """

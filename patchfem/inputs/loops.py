@@ -42,6 +42,15 @@ class Loop:
 
         Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
         one of the values.
+
+        Parameters
+        ----------
+        condition : str
+            Option such as "cycle=1,2"; the column is one of `labels`.
+
+        Returns
+        -------
+        (k,) bool array
         """
         name, equals, text = map(str.strip, condition.partition("="))
         texts = [value.strip() for value in text.split(",")]
@@ -159,7 +168,7 @@ def find_standard_name(
 
 
 def _parse_label(text: str) -> float | str:
-    """Return a label as a number if it is one, or else unchanged."""
+    """Return the text of a label as a number if it is one, or else unchanged."""
     try:
         return float(text)
     except ValueError:

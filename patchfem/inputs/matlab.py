@@ -21,12 +21,8 @@ MAX_NESTING = 8  # largest depth of nested structures
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMBER_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
 Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
-NUMBER_CLASSES = (
-    "",
-    "double",
-    "single",
-    "logical",
-)  # MATLAB classes with numbers, besides integers
+# MATLAB classes with numbers, besides integers; "" stands for data of other programs
+NUMBER_CLASSES = ("", "double", "single", "logical")
 
 
 def read_variables(path, data: bytes | None = None) -> Arrays:
@@ -73,7 +69,10 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
 
 
 def read_real_arrays(path, data: bytes | None = None) -> dict[str, np.ndarray]:
-    """Read the full arrays of real numbers of a MATLAB file; parameters and errors as in `read_variables`."""
+    """Read the full arrays of real numbers of a MATLAB file, by name.
+
+    `path` is the file, and `data` its content if it has been read. Errors are those of `read_variables`.
+    """
     return {
         name: array
         for name, array in read_variables(path, data).items()
@@ -82,7 +81,10 @@ def read_real_arrays(path, data: bytes | None = None) -> dict[str, np.ndarray]:
 
 
 def _read_version_5(data: bytes, arrays: Arrays) -> None:
-    """Add the variables of a file of version 4 to 7."""
+    """Add the variables of a MATLAB file of version 4 to 7 to the arrays by name.
+
+    `data` is the content of the file.
+    """
     from scipy.io import loadmat, matlab
 
     try:
@@ -120,12 +122,16 @@ def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
 
 
 def _to_numbers(values) -> np.ndarray:
-    """Return numbers as floats, or as complex numbers if they are complex."""
+    """Return values as floats, or as complex numbers if they are complex."""
     return values if values.dtype.kind == "c" else np.asarray(values, float)
 
 
 def _add_group(arrays: Arrays, group, prefix: str, depth: int) -> None:
-    """Add the arrays of a group, and those of the structures in it; links to other files are not followed."""
+    """Add the arrays of a group of an HDF5 file, and those of the structures in it, by name.
+
+    `prefix` stands before the names, and `depth` is the number of structures around the group. Links to other files
+    are not followed.
+    """
     import h5py
 
     for name in group:
@@ -144,13 +150,16 @@ def _add_group(arrays: Arrays, group, prefix: str, depth: int) -> None:
 
 
 def _find_class(item) -> str:
-    """Return the MATLAB class of a dataset or group, or "" if another program wrote it."""
+    """Return the MATLAB class of an item (dataset or group), or "" if another program wrote it."""
     name = item.attrs.get("MATLAB_class", b"")
     return name.decode("latin-1") if isinstance(name, bytes) else ""
 
 
 def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
-    """Add the numbers of a dataset; other programs than MATLAB may write fewer than two dimensions."""
+    """Add the numbers of a dataset of an HDF5 file to the arrays, by name.
+
+    Other programs than MATLAB may write fewer than two dimensions; the array has two.
+    """
     values = np.asarray(dataset[()])
     if "MATLAB_empty" in dataset.attrs:  # such a dataset contains the shape
         values = np.zeros(values.astype(int).ravel()).T
@@ -159,7 +168,10 @@ def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
 
 
 def _read_sparse(group) -> sparse.csc_array:
-    """Return a sparse matrix from the row indices `ir`, the starts of the columns `jc` and `data`."""
+    """Return the sparse matrix that a group of an HDF5 file contains.
+
+    Its datasets are the row indices `ir`, the starts of the columns `jc` and the values `data`.
+    """
     starts = group["jc"][()].astype(np.int64)
     shape = (int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1)
     # MATLAB leaves out the entries of a matrix of zeros

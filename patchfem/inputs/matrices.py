@@ -44,7 +44,7 @@ class Matrix(NamedTuple):
 
 
 def read_matrix(path, matrix_name: str) -> Matrix:
-    """Read the "stiffness", "mass" or "damping" of a file, and make it exactly symmetric.
+    """Read the "stiffness", "mass" or "damping" of the file `path`, and make it exactly symmetric.
 
     Raises PatchfemError if the file cannot be read, if the matrix has none of its `MATRIX_NAMES`, or if it is not
     a square, symmetric matrix of finite real numbers.
@@ -60,6 +60,16 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
     """Extend matrices so that all have the same rows and degrees of freedom.
 
     Raises PatchfemError if the sizes differ, or if only some of the matrices state places.
+
+    Parameters
+    ----------
+    *matrices : Matrix
+        Matrices of one structure, from several files.
+
+    Returns
+    -------
+    list of Matrix
+        In the same order; a row that a matrix lacks is empty.
     """
     with_places = [matrix for matrix in matrices if matrix.places is not None]
     if with_places and len(with_places) < len(matrices):
@@ -89,7 +99,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
 
 
 def _append_empty_rows(values, n: int) -> sparse.csr_array:
-    """Return a matrix (n, n): the given matrix, followed by empty rows and columns."""
+    """Return a sparse matrix (n, n): the given values, followed by empty rows and columns."""
     if values.shape[0] < n:
         values = values.copy()
         values.resize((n, n))
@@ -97,14 +107,21 @@ def _append_empty_rows(values, n: int) -> sparse.csr_array:
 
 
 def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
-    """Expand a matrix to (n, n) by inserting empty rows and columns at the positions that it lacks."""
+    """Expand a sparse matrix (m, m) of values to (n, n) by empty rows and columns.
+
+    `rows` (m,) are the positions of its rows in the result.
+    """
     matrix = values.tocoo()
     i, j = matrix.coords
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
 
 
 def _find_matrix_name(path, names, matrix_name: str) -> str:
-    """Return the name of the requested matrix: one of `MATRIX_NAMES`, or the only one."""
+    """Return the name of the requested matrix among the names in a file: a usual one, or the only one.
+
+    `matrix_name` is "stiffness", "mass" or "damping", whose usual names are in `MATRIX_NAMES`; `path` is for the
+    message.
+    """
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
     for known in MATRIX_NAMES[matrix_name]:
         if known in short_names:
@@ -126,10 +143,12 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
 
 
 def _read_market(path: Path, matrix_name: str) -> Matrix:
-    """Read a Matrix Market file of numbers; a file without Matrix Market header is read as Abaqus text.
+    """Read the Matrix Market file `path`; a file without its header is read as Abaqus text.
 
     `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
     numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal 11).
+
+    `matrix_name` is "stiffness", "mass" or "damping", for messages.
     """
     with open(path, encoding="latin-1") as file:
         banner = file.readline()
@@ -178,7 +197,7 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
 
 
 def _read_abaqus(path: Path) -> Matrix:
-    """Read lines of row, column, number, or of node, direction, node, direction, number.
+    """Read lines of row, column, number, or of node, direction, node, direction, number from `path`.
 
     A file with one triangle stands for the symmetric matrix.
     """
@@ -230,13 +249,17 @@ def _rank_dofs(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
-    """Convert the numbers of rows, nodes or directions to integers."""
+    """Convert numbers of rows, nodes or directions in the file `path` to integers.
+
+    Raises PatchfemError if one is not whole.
+    """
     if not (numbers == np.floor(numbers)).all() or not (np.abs(numbers) < 2**31).all():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
     return numbers.astype(int)
 
 
 def _read_matlab(path: Path, matrix_name: str) -> Matrix:
+    """Read the "stiffness", "mass" or "damping" (`matrix_name`) of the MATLAB file `path`."""
     arrays = {
         name: array
         for name, array in matlab.read_variables(path).items()
@@ -246,6 +269,10 @@ def _read_matlab(path: Path, matrix_name: str) -> Matrix:
 
 
 def _read_numpy(path: Path, matrix_name: str) -> Matrix:
+    """Read the "stiffness", "mass" or "damping" (`matrix_name`) of the .npz file `path`.
+
+    The file is a sparse matrix as SciPy writes it, or contains arrays by name.
+    """
     if not zipfile.is_zipfile(path):
         raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
     refuse_large_content(path, count_zip_bytes(path), "save the matrices as sparse ones")
@@ -256,7 +283,10 @@ def _read_numpy(path: Path, matrix_name: str) -> Matrix:
 
 
 def _make_matrix(path: Path, values) -> Matrix:
-    """Return the matrix of an array or of a sparse array; raise PatchfemError if it has too many rows."""
+    """Return the matrix of an array or sparse array of values from the file `path`.
+
+    Raises PatchfemError if it has too many rows.
+    """
     # A small file may state any number of rows, for each of which a sparse matrix needs memory.
     if max(values.shape, default=0) > MAX_ROWS:
         raise PatchfemError(f"{path}: a matrix of {MAX_ROWS} rows and columns at most can be read")

@@ -8,19 +8,23 @@ from ..exceptions import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
 from .tables import TableFormat, find_factors, parse_number, read_text
 
+# Factors to SI by unit, for each column of numbers in a table of measured responses
 COLUMN_UNITS = {
     "frequency": UNIT_FACTORS["frequency"],
     "input": UNIT_FACTORS["acceleration"],
     "acceleration": UNIT_FACTORS["acceleration"],
     "displacement": UNIT_FACTORS["length"],
 }
+# Columns that a table of measured responses may have
 TABLE_FORMAT = TableFormat(
     COLUMN_UNITS,
     ("frequency", "input"),
     "frequency [Hz],input [g],acceleration [g],displacement [um],flag",
     "a measured table",
 )
+# File name extensions of universal files
 UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
+# Meanings of the letters in the column `flag` of a table of measured responses
 FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
@@ -45,6 +49,15 @@ def read_table(path: Path) -> list[MeasuredRow]:
     """Read a table of measured responses with a header like ``frequency [Hz],input [g],flag``.
 
     Every row has frequency and input; other cells may be empty.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file.
+
+    Returns
+    -------
+    list of MeasuredRow
 
     Raises
     ------
@@ -75,7 +88,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
 
 
 def _make_record_error(path: Path) -> PatchfemError:
-    """Return the error for a time record that was given in place of a table of responses."""
+    """Return the error for a time record, `path`, that was given in place of a table of responses."""
     options = ""
     if path.suffix.lower() == ".mat":
         options = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"'
@@ -88,6 +101,11 @@ def _make_record_error(path: Path) -> PatchfemError:
 
 
 def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) -> MeasuredRow:
+    """Parse one row of a table of measured responses.
+
+    `location` is file and line for messages, `cells` are the texts by column, and `factors` the factors to SI by
+    column.
+    """
     flag = cells.get("flag", "")
     if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(
@@ -106,7 +124,7 @@ def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) 
 
 @lru_cache(64)
 def is_readable(path: Path) -> bool:
-    """Return whether a table of measured responses can be read.
+    """Return whether the file `path` is a table of measured responses that can be read.
 
     The answer is kept, because the models of a sweep name the same table.
     """

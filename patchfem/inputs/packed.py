@@ -11,8 +11,10 @@ MAX_UNPACKED_BYTES = 2**30  # largest size of the content of a packed file in by
 PIECE_BYTES = 2**12  # bytes that are unpacked at once, to at most 1000 times as many
 # Version and order of the bytes in the header of a MATLAB file of version 5 to 7.
 VERSION_5_MARKS = {b"\x00\x01IM": "little", b"\x01\x00MI": "big"}
-HEADER_BYTES = 128  # length of this header in bytes
-COMPRESSED_TYPE = 15  # type of a compressed variable
+# Length [bytes] of the header of a MATLAB file of version 5 to 7
+HEADER_BYTES = 128
+# Type number of a compressed variable in a MATLAB file of version 5 to 7
+COMPRESSED_TYPE = 15
 
 
 def refuse_large_content(path, size: float, remedy: str) -> None:
@@ -45,9 +47,11 @@ def count_zip_bytes(file: Path | io.BytesIO) -> int:
 
 
 def count_matlab_bytes(data: bytes) -> int:
-    """Return the size [bytes] of the compressed variables of a MATLAB file of version 5 to 7, counted up to the limit.
+    """Return the unpacked size [bytes] of the compressed variables of a MATLAB file of version 5 to 7.
 
     Raises zlib.error for damaged variables.
+
+    `data` is the content of the file; the count ends once it exceeds the limit.
     """
     order = VERSION_5_MARKS.get(data[124:128])
     place = HEADER_BYTES if order else len(data)

@@ -83,10 +83,12 @@ def check_file(path: Path, remedy: str) -> None:
 
 
 def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:
-    """Parse requests such as "force=Load cell [lbf]", separated by commas.
+    """Parse texts of requests such as "force=Load cell [lbf]", separated by commas.
 
     Raises PatchfemError for a text that is no request, for an unknown quantity or unit, and for a
     quantity that is requested twice.
+
+    `quantities` are those that may be requested.
     """
     requests = {}
     parts = [part for text in texts for part in re.split(r",(?=\s*\w+\s*=)", text)]
@@ -166,7 +168,10 @@ def select_channels(
 
 
 def _make_requested_channel(path, channels: list[Channel], request: RequestedChannel) -> Channel:
-    """Return a channel with the quantity of a request, and the unit if the request has one."""
+    """Return a channel with the quantity of a request, and the unit if the request has one.
+
+    `path` names the file of the `channels` in messages.
+    """
     channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
     return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
@@ -276,7 +281,10 @@ def make_records(
 
 
 def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Subtract the first row from time and displacements, as a prescribed displacement requires."""
+    """Subtract the first row from time [s] and displacement [m], as a prescribed displacement requires.
+
+    `values` are arrays (k,) by quantity; other quantities are not changed.
+    """
     return {
         name: column - column[0] if name in ("time", "displacement") else column
         for name, column in values.items()
@@ -284,7 +292,7 @@ def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _convert_to_si(path, channel: Channel) -> np.ndarray:
-    """Return the values of a channel in SI."""
+    """Return the values (k,) of a channel of the file `path` in SI."""
     quantity = channel.quantity
     factor = channel.factor
     if factor is None:
@@ -300,7 +308,11 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
 def _find_shared_time(
     path, selected: list[Channel], channels: list[Channel], channel_list: str
 ) -> np.ndarray | None:
-    """Return the time [s] of the selected channels, or of the only channel that contains times."""
+    """Return the time [s] of the selected channels, or of the only channel that contains times.
+
+    `path` and `channel_list`, all channels in words, are for messages; `channels` are all of the file. The selected
+    channels must have the same times. The result is None if no channel contains times, or more than one does.
+    """
     times = [channel.time for channel in selected if channel.time is not None]
     if not times:
         clocks = [channel for channel in channels if channel.quantity == "time"]

@@ -11,7 +11,9 @@ from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS
 from .universal import OrdinateType, make_channels, read_datasets
 
+# End of the message if there is no file of a drive signal
 FILE_REMEDY = "; drive.file is relative to the scene"
+# Columns of the table of a spectrum
 SPECTRUM_FORMAT = TableFormat(
     {
         "frequency": UNIT_FACTORS["frequency"],
@@ -70,7 +72,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_spectrum(path) -> tuple[np.ndarray, np.ndarray]:
-    """Read the spectrum of a random drive signal from a table of frequency and level.
+    """Read the spectrum of a random drive signal from a table, `path`, of frequency and level.
 
     Returns
     -------
@@ -100,7 +102,10 @@ def read_spectrum(path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _read_universal(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
-    """Read time and values of the only time response of a quantity in a universal file."""
+    """Read time [s] and values of the only time response of a quantity in the universal file `path`.
+
+    Datasets of this data type, or of no stated one, count.
+    """
     kind = OrdinateType[quantity.upper()]
     datasets = read_datasets(path)
     candidates = [

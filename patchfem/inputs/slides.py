@@ -11,6 +11,7 @@ from ..core import PatchfemError
 from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS
 
+# Columns of the file of a prescribed slide
 COLUMN_NAMES = ("time", "displacement")
 
 

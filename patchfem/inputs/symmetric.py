@@ -7,6 +7,7 @@ from ..core import PatchfemError
 from .tables import MAX_VALUE
 
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
+# End of the message about a skew-symmetric matrix
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 
 
@@ -33,6 +34,8 @@ def to_real(values, subject: str):
         numbers = values.data
     if not np.iscomplexobj(numbers):
         return values
+
+    # Imaginary parts that are exactly 0 are dropped; any others are refused, with a remedy for structural damping
     largest = max(float(np.abs(numbers.real).max(initial=0.0)), 1e-300)
     ratio = float(np.abs(numbers.imag).max(initial=0.0)) / largest
     if ratio == 0.0:
@@ -140,6 +143,8 @@ def symmetrize(values, subject: str):
         raise PatchfemError(
             f"{subject} contains values that are not finite; finite ones are needed"
         )
+
+    # A small skew part is round-off of the program that wrote the matrix
     skew = abs(values - values.T).max()
     largest = abs(values).max()
     if skew > MAX_SKEW * largest:

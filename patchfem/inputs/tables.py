@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
+# Pattern of a number in a table
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
+# Words for the numbers of cells in messages
 _NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
@@ -75,7 +77,10 @@ class TextTable(NamedTuple):
     lines: list[str]
 
     def iterate_rows(self, *, skips_blank: bool = False) -> Iterator[tuple[int, list[str]]]:
-        """Yield the number of each line, from 2 on, and its cells; an error names a line with too few or too many."""
+        """Yield the number of each line, from 2 on, and its cells.
+
+        An error names a line with too few or too many cells. Lines without any text are left out if `skips_blank`.
+        """
         for number, line in enumerate(self.lines, 2):
             if skips_blank and not line.strip(f"{self.separator} \t"):
                 continue
@@ -91,7 +96,10 @@ class TextTable(NamedTuple):
 
 
 def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
-    """Read the lines of a text file; the last one is empty if the file ends with a line break."""
+    """Read the lines of the text file `path`; the last one is empty after a final line break.
+
+    `contents` says in messages what the file is, and `remedy` what to do if there is no such file.
+    """
     try:
         with open_for_reading(path) as file:
             text = file.read(MAX_BYTES + 1)
@@ -163,7 +171,10 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
 
 
 def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
-    """Return the factor to SI of each column of numbers; raise PatchfemError if the header is not that of a format."""
+    """Return the factor to SI of each column of numbers in a table.
+
+    Raises PatchfemError if the header is not that of the format, `form`.
+    """
     names = table.names
     heads = []
     for name, unit in zip(names, table.units):
@@ -232,6 +243,17 @@ def parse_number(location: str, cell: str, factor: float) -> float:
 def read_columns(path, form: TableFormat) -> Columns:
     """Read a table of numbers; columns that ``form.units`` does not know are kept as text.
 
+    Parameters
+    ----------
+    path : path-like
+        CSV file.
+    form : TableFormat
+        Columns that the table may have.
+
+    Returns
+    -------
+    Columns
+
     Raises
     ------
     Missing
@@ -275,9 +297,10 @@ def read_columns(path, form: TableFormat) -> Columns:
 
 
 def _read_numbers(table: TextTable, factors: list[float]) -> np.ndarray | None:
-    """Return rows that contain only numbers, in SI; None if a cell is not a number, or out of range.
+    """Return the rows (k, columns) of a table that contains only numbers, in SI.
 
-    NumPy's reader takes a tenth of the time of `parse_number`, but does not say which cell is wrong.
+    It is None if a cell is not a number, or out of range. `factors` are those to SI by column. NumPy's reader takes a
+    tenth of the time of `parse_number`, but does not say which cell is wrong.
     """
     import numpy as np
 
@@ -292,7 +315,7 @@ def _read_numbers(table: TextTable, factors: list[float]) -> np.ndarray | None:
 
 
 def require_increasing_time(path, time: np.ndarray) -> None:
-    """Raise PatchfemError at the first row of a table whose time (k,) [s] does not rise."""
+    """Raise PatchfemError at the first row of the table `path` whose time (k,) [s] does not rise."""
     is_late = time[1:] <= time[:-1]
     if is_late.any():
         k = int(is_late.argmax())

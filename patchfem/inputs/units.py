@@ -10,10 +10,14 @@ from ..exceptions import PatchfemError
 from ..scene.keys import quantities
 from ..scene.keys.quantities import UNIT_FACTORS
 
+# Factors of the units of a ratio, such as a damping ratio
 RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
+# Factors to SI by unit, for each column of a prescribed slide
 SLIDE_UNITS = {"time": UNIT_FACTORS["time"], "displacement": UNIT_FACTORS["length"]}
+# Factors to SI by unit, for each column that a friction loop may be read from
 FORCE_UNITS = {"force": UNIT_FACTORS["force"], "friction_ratio": RATIO_UNITS}
-# Quantities that a record may contain besides time; a reader ignores those that it does not need.
+# Factors to SI by unit, for each quantity that a record may contain besides time; a reader ignores those that it does
+# not need
 RECORD_UNITS = {
     "displacement": UNIT_FACTORS["length"],
     "velocity": UNIT_FACTORS["velocity"],
@@ -21,9 +25,11 @@ RECORD_UNITS = {
     "base_acceleration": UNIT_FACTORS["acceleration"],
     **FORCE_UNITS,
 }
+# Factors to SI by unit, for each quantity of a channel
 CHANNEL_UNITS = {"time": UNIT_FACTORS["time"], **RECORD_UNITS}
 # The SI unit is the first one of each table that is not "".
 SI_UNITS = {name: next(filter(None, units)) for name, units in CHANNEL_UNITS.items()}
+# Spelling of a unit in the tables, by other spellings in lower case
 _UNIT_SYNONYMS = {
     "sec": "s",
     "seconds": "s",
@@ -38,7 +44,7 @@ _RATE_UNIT_PATTERNS = {
 
 
 def normalize_unit(text: str) -> str:
-    """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
+    """Spell the text of a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = quantities.normalize_unit(text)
     text = _UNIT_SYNONYMS.get(text.lower(), text)
     for ending, pattern in _RATE_UNIT_PATTERNS.items():

@@ -58,6 +58,8 @@ def read_datasets(path) -> list[Dataset]:
         raise Missing(
             "reading universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
+
+    # Only these three kinds of datasets are read; files of other programs contain many more
     path = Path(path)
     check_file(path, "export fewer channels or a part of the record")
     with refuse_damage(f"{path}: cannot be read as a universal file"):
@@ -108,7 +110,10 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
 
 
 def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
-    """Return dataset 164, whose `length` and `force` are units of the file per SI unit; None without it."""
+    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit; None without.
+
+    `path` names the file in the message.
+    """
     factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
     if factors is not None and not min(factors["length"], factors["force"]) > 0:
         raise PatchfemError(
@@ -137,6 +142,11 @@ def _make_channel(
         Unit factors of dataset 164, if the file has one.
     notes : list of str
         Receives sentences on what was not read as it stands.
+
+    Returns
+    -------
+    Channel
+        Values in the unit of the file.
     """
     location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])
@@ -180,6 +190,6 @@ def _make_channel(
 
 
 def _clean_text(value) -> str:
-    """Return the text of a label, or "" for the word NONE, which stands for an empty one."""
+    """Return the text of a label (`value`), or "" for the word NONE, which stands for an empty one."""
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

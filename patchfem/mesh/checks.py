@@ -63,7 +63,10 @@ class TaggedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PairMesh:
-    """Two pieces that share no node and whose interfaces have the same ends."""
+    """Two pieces that share no node and whose interfaces have the same ends.
+
+    `lower` and `upper` are the meshes of the pieces.
+    """
 
     lower: PieceMesh
     upper: PieceMesh
@@ -126,18 +129,18 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
 
 
 def _check_tags(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError if a required tag is missing or a cell has an unknown tag."""
+    """Raise PatchfemError if a tag that the mesh needs is missing or a cell has an unknown tag."""
     missing = [tag for tag in EDGE_TAGS if not mesh.select(None, tag)]
     missing += [
         tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
     ]
     if missing:
-        found = set()
+        known_tags = set()
         for block in mesh.blocks:
-            found |= set(np.unique(block.names).tolist()) - {""}
+            known_tags |= set(np.unique(block.names).tolist()) - {""}
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
-            f"file: {', '.join(sorted(found)[:MAX_LISTED_TAGS]) or 'none'})"
+            f"file: {', '.join(sorted(known_tags)[:MAX_LISTED_TAGS]) or 'none'})"
         )
 
     # Cells without a known tag have no material. Other elements, such as edges, may have any tag.
@@ -153,7 +156,7 @@ def _check_tags(mesh: TaggedMesh) -> None:
 
 
 def _check_numbers(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError unless the cells refer to existing nodes and all nodes lie in a plane."""
+    """Raise PatchfemError unless the cells of a mesh refer to existing nodes in one plane."""
     n_points = len(mesh.points)
     nodes = np.concatenate([block.cells.ravel() for block in mesh.blocks])
     if nodes.min() < 0 or nodes.max() >= n_points:
@@ -174,7 +177,11 @@ def _check_numbers(mesh: TaggedMesh) -> None:
 
 
 def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
-    """Build a piece from its cells and their nodes, with y converted to depth, and check it."""
+    """Build the piece "lower" or "upper" of a tagged mesh, with y converted to depth, and check it.
+
+    Only the nodes of its cells are kept, and they are numbered anew. Depths are >= 0 from the interface into the
+    piece.
+    """
     tagged = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
     used = np.unique(np.concatenate([block.cells.ravel() for block in tagged]))
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
@@ -226,7 +233,11 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
 
 
 def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
-    """Orient cells counterclockwise; raise PatchfemError if one is degenerate."""
+    """Orient cells counterclockwise; raise PatchfemError if one is degenerate.
+
+    `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their numbers in elements of a `kind` such as
+    "quad8". Returns the cells with the order of the nodes reversed where they turned clockwise.
+    """
     n = ELEMENTS[kind].n_corners
     is_clockwise = signed_areas(points[cells[:, :n]]) < 0
     # In the reversed order the middle of the edge from one corner to the next changes its place, too.
@@ -253,12 +264,16 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
 
 
 def _check_middles(points, edges: CellEdges, side: str) -> None:
-    """Raise PatchfemError unless the nodes between corners lie in the middles of their edges."""
+    """Raise PatchfemError unless the nodes between corners lie in the middles of their edges.
+
+    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`; `side` names
+    the piece in the message.
+    """
     is_quadratic = edges.middles >= 0
-    begin, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
+    start, end = np.moveaxis(points[edges.ends[is_quadratic]], 1, 0)
     middle = points[edges.middles[is_quadratic]]
-    along = end - begin
-    offset = middle - (begin + end) / 2
+    along = end - start
+    offset = middle - (start + end) / 2
 
     # Parts of the offset along and across the edge, as fractions of its length
     length_squared = (along**2).sum(axis=1)
@@ -272,7 +287,7 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
         raise PatchfemError(
             f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
             f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
-            f"{_format_place(begin[worst])}, to {_format_place(end[worst])}) away from the middle; "
+            f"{_format_place(start[worst])}, to {_format_place(end[worst])}) away from the middle; "
             f"{MAX_MIDDLE_SHIFT:.0%} along the edge and {MAX_MIDDLE_BULGE:.0%} across are permitted"
         )
 
@@ -325,7 +340,11 @@ def _check_interface(points, nodes, side: str) -> None:
 
 
 def _check_connections(mesh: PieceMesh, side: str) -> None:
-    """Raise PatchfemError unless the cells of a piece are connected through common edges."""
+    """Raise PatchfemError unless the cells of a piece are connected through common edges.
+
+    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface; `side`
+    ("lower" or "upper") names the piece in a message.
+    """
     edges = mesh.edges
     border = edges.ends[edges.is_border]
     _check_touching_nodes(mesh, border, side)
@@ -362,19 +381,22 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
 
 
 def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
-    """Raise PatchfemError if a boundary node lies on a boundary edge (e, 2) of which it is no end."""
+    """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
+
+    The rows of `border` (e, 2) are the nodes of the boundary edges; `side` names the piece in the message.
+    """
     # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)
-    begin = mesh.points[border[:, 0]]
-    along = mesh.points[border[:, 1]] - begin
+    start = mesh.points[border[:, 0]]
+    along = mesh.points[border[:, 1]] - start
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
-    nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 + 1e-9))
-    edge = np.repeat(np.arange(len(border)), [len(found) for found in nearby_nodes])
+    nearby_nodes = tree.query_ball_point(start + along / 2, length / 2 * (1 + 1e-9))
+    edge = np.repeat(np.arange(len(border)), [len(neighbours) for neighbours in nearby_nodes])
     node = nodes[np.concatenate(nearby_nodes).astype(int)]
 
     # The area that edge and node span is 0 where the node lies on the edge
-    offset = mesh.points[node] - begin[edge]
+    offset = mesh.points[node] - start[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
     is_touching = np.abs(area) <= LENGTH_TOL * mesh.length * length[edge]
     is_touching &= (border[edge] != node[:, None]).all(axis=1)

@@ -12,6 +12,7 @@ from ..core import PatchfemError
 from .checks import CELL_TAGS, EDGE_TAGS, TaggedBlock, TaggedMesh
 from .elements import ELEMENTS
 
+# How a deck contains tags, for messages
 TAG_HELP = (
     "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET, of *SURFACE of type ELEMENT or of "
     "*ELSET made of line elements"
@@ -37,6 +38,8 @@ class Deck:
     - elements: element in meshio and its node numbers, by element number
     - sets: numbers by name, for node sets and element sets
     - surfaces: data lines by name
+
+    The text of the deck is read block by block when the object is made; names of sets and surfaces are in lower case.
     """
 
     def __init__(self, text: str):
@@ -49,7 +52,11 @@ class Deck:
             self._add(keyword, parameters, lines)
 
     def _add(self, keyword: str, parameters: dict[str, str], lines: list[list[str]]) -> None:
-        """Add the contents of a keyword block to the deck."""
+        """Add the contents of a keyword block to the deck.
+
+        `parameters` are the words KEY=VALUE after the keyword, and `lines` the words of the data lines. Blocks that
+        say nothing about nodes, elements, sets or surfaces are ignored.
+        """
         if keyword in PART_KEYWORDS:
             raise PatchfemError(
                 f"*{keyword}: parts and instances are not read; in Abaqus/CAE "
@@ -59,6 +66,7 @@ class Deck:
             raise PatchfemError(
                 f"*{keyword} is not supported yet; write a flat deck (without parts and instances)"
             )
+        # Lines are words: node number and coordinates, or element number and nodes
         if keyword == "NODE":
             new = [(int(line[0]), [float(word) for word in line[1:]]) for line in lines]
             self._add_numbered(self.nodes, new, "NSET", parameters)
@@ -78,7 +86,11 @@ class Deck:
         kind: str,
         parameters: dict[str, str],
     ) -> None:
-        """Add numbered nodes or elements, and their numbers to the set of a kind that the block names."""
+        """Add numbered nodes or elements to the known ones; raise PatchfemError for a number given twice.
+
+        `new` lists number and content. If the `parameters` of the block name a set of this `kind` ("NSET" or "ELSET"),
+        the numbers become members of it.
+        """
         for number, content in new:
             if number in known:
                 name = "node" if kind == "NSET" else "element"
@@ -89,7 +101,11 @@ class Deck:
             members += [number for number, _ in new]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
-        """Return the node or element numbers of a set, which may contain other sets."""
+        """Return the node or element numbers of a set, which may contain other sets.
+
+        `kind` is "NSET" or "ELSET", and `lines` are the words of the data lines: numbers and names, or first, last and
+        step of a range if `is_range`.
+        """
         members = []
         for words in lines:
             if is_range:
@@ -102,7 +118,10 @@ class Deck:
         return members
 
     def _find_members(self, kind: str, word: str) -> list[int]:
-        """Return the numbers that a word of a set or of a surface stands for: a number or the name of a set."""
+        """Return the numbers that a word of a set or of a surface stands for.
+
+        A word is a number, or the name of a set of the `kind` NSET (nodes) or ELSET (elements), whose members are returned.
+        """
         if word.isdigit():
             return [int(word)]
         if word.lower() not in self.sets[kind]:
@@ -149,7 +168,7 @@ class Deck:
         return TaggedMesh(points, blocks, TAG_HELP)
 
     def _list_sides(self, tag: str) -> list[list[int]]:
-        """Return the corner nodes of the element sides that a surface names."""
+        """Return both corner nodes of each element side in the surface with the name `tag`."""
         sides = []
         for member, side_name, *_ in self.surfaces.get(tag, ()):
             side = int(side_name.upper().removeprefix("S"))
@@ -180,7 +199,10 @@ def read_deck(text: str) -> TaggedMesh:
 
 
 def _split_blocks(text: str):
-    """Yield (keyword, parameters, data lines) of the keyword blocks in a deck; skip comments and empty words."""
+    """Yield (keyword, parameters, data lines) of the keyword blocks in the text of a deck.
+
+    The parameters are {"KEY": "value"}, and each data line is a list of words. Comments and empty words are left out.
+    """
     blocks = [("", {}, [])]
     for line in text.splitlines():
         words = [word.strip() for word in line.split(",") if word.strip()]
@@ -196,7 +218,11 @@ def _split_blocks(text: str):
 
 
 def _read_elements(kind: str, lines) -> list[tuple[int, tuple[str, list[int]]]]:
-    """Return number, meshio name and nodes of each element of one type."""
+    """Return number, meshio name and nodes of each element of one type.
+
+    `kind` is the type in the deck, such as "CPE4", and `lines` are the words of the data lines. An element may
+    continue over several lines.
+    """
     plane = PLANE_ELEMENT.match(kind)
     n_nodes = int(plane[1]) if plane else LINE_ELEMENTS.get(kind.removesuffix("H"))
     if n_nodes is None:

@@ -10,7 +10,11 @@ import numpy as np
 
 
 class ShapeFunctions(NamedTuple):
-    """Values (g, k) of k shape functions at g points, and their derivatives (g, 2, k) along the local coordinates."""
+    """Shape functions of an element with k nodes at g points.
+
+    - values (g, k): their values.
+    - gradients (g, 2, k): their derivatives along the local coordinates.
+    """
 
     values: np.ndarray
     gradients: np.ndarray
@@ -51,7 +55,10 @@ class Element(NamedTuple):
         return ShapeFunctions(self._monomials(points, 0, 0) @ to_nodes, np.stack(slopes, axis=1))
 
     def _monomials(self, points, order_x: int, order_y: int) -> np.ndarray:
-        """Return the monomials (g, k) at points (g, 2), each differentiated once or not at all."""
+        """Return the monomials (g, k) at points (g, 2), or their derivatives.
+
+        They are differentiated once along x or y if `order_x` or `order_y` is 1, and not if it is 0.
+        """
         out = np.ones((len(points), len(self.powers)))
         for axis, order in enumerate((order_x, order_y)):
             power = self.powers[:, axis]
@@ -61,7 +68,11 @@ class Element(NamedTuple):
 
 
 def _make_element(corners, powers, rule, has_centre: bool = False) -> Element:
-    """Return an element; with more monomials than corners it has nodes in the middles of the edges."""
+    """Return an element from its corners; with more monomials than corners it has mid-edge nodes.
+
+    `powers` (k, 2) are the exponents of the monomials, `rule` the points and weights of the integration, and an
+    element with `has_centre` has one more node at the origin.
+    """
     nodes = np.array(corners, float)
     if len(powers) > len(corners):
         middles = (nodes + np.roll(nodes, -1, axis=0)) / 2

@@ -67,4 +67,5 @@ class End:
         return circle + MAX_CIRCLE_SLOPE * np.maximum(end_distance - circle_end, 0.0)
 
 
+# End of a piece without chamfer or radius
 SHARP_END = End()

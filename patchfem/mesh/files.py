@@ -72,7 +72,9 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
 
 def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
-    """Join the meshes of a pair, the lower piece at y <= 0 and first.
+    """Join the meshes `lower` and `upper` of a pair, the lower piece at y <= 0 and first.
+
+    Both are `PieceMesh`, whose second coordinate is the depth below the interface.
 
     Returns
     -------
@@ -173,7 +175,10 @@ class _Tags(NamedTuple):
 
 
 def _read_tags(path: Path, mesh) -> _Tags:
-    """Return the tags: physical names in .msh, groups in .med, the array `tag` in .vtu."""
+    """Return the tags of a meshio mesh; where a file has them depends on its format.
+
+    These are physical names in .msh, groups in .med, and the array `tag` in .vtu, by the suffix of `path`.
+    """
     if path.suffix == ".msh":
         names = {
             (int(value[1]), int(value[0])): name
@@ -189,6 +194,7 @@ def _read_tags(path: Path, mesh) -> _Tags:
             names[1, family] = names[2, family] = (known or words)[0]
         tag_help = "names of groups of faces and of edges"
         return _Tags(names, mesh.cell_data.get("cell_tags"), tag_help)
+    # A .vtu file has no names: its codes are fixed, for cells (2) and lines (1).
     names = {(2, code): name for name, code in CELL_TAGS.items()}
     names |= {(1, code): name for name, code in EDGE_TAGS.items()}
     numbers = ", ".join(f"{code} {name}" for name, code in (CELL_TAGS | EDGE_TAGS).items())
@@ -197,7 +203,10 @@ def _read_tags(path: Path, mesh) -> _Tags:
 
 
 def _convert_mesh(path: Path, mesh) -> TaggedMesh:
-    """Convert a meshio mesh: name its cells and lines by their tags."""
+    """Convert a meshio mesh to a TaggedMesh, whose cells and lines are named by their tags.
+
+    Raises PatchfemError, which names the file `path`, for cells that cannot be used.
+    """
     tags = _read_tags(path, mesh)
     blocks = []
     for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
@@ -219,7 +228,10 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
 
 
 def _read_with_meshio(path: Path):
-    """Read a file with meshio, which may print to stdout and call sys.exit."""
+    """Read the mesh file `path` with meshio, which may print to stdout and call sys.exit.
+
+    Its output is hidden, and any failure becomes a PatchfemError.
+    """
     import meshio
 
     if path.suffix == ".msh":
@@ -235,7 +247,10 @@ def _read_with_meshio(path: Path):
 
 
 def _check_counts(path: Path) -> None:
-    """Raise PatchfemError if a section of a .msh file declares more entries than fit in it."""
+    """Raise PatchfemError if a section of the .msh file `path` declares more entries than fit in it.
+
+    Otherwise meshio would reserve the memory for all of them.
+    """
     content = path.read_bytes()
     for section, min_bytes in MIN_ENTRY_BYTES.items():
         start = content.find(section)

@@ -30,7 +30,11 @@ class Layout:
     slope: float
 
     def cell_lengths(self, x) -> np.ndarray:
-        """Return the target cell lengths (k,) [m] at positions (k,) [m]."""
+        """Return the target cell lengths (k,) [m] at positions x (k,) [m].
+
+        Each is the smallest of the lengths that the bands, the loaded span and the limit allow there. Outside a band
+        or span its length grows with the distance, by `slope` per unit.
+        """
         x = np.asarray(x, float)
         out = np.full(x.shape, self.max_length)
         # The lengths are computed in place, because there may be many bands.
@@ -55,7 +59,7 @@ class Layout:
 
 
 def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
-    """Return the distances of positions (k,) from an interval."""
+    """Return the distances (k,) [m] of positions x (k,) [m] from the interval `low` to `high`; 0 inside it."""
     if low == high:
         return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))
@@ -107,7 +111,7 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
 
 
 def tributary_lengths(x) -> np.ndarray:
-    """Return the tributary lengths (m,) [m] of nodes at ascending positions (m,) [m].
+    """Return the tributary lengths (m,) [m] of nodes at ascending positions x (m,) [m].
 
     Each is half the sum of the lengths of the cells on either side of a node.
     """

@@ -166,7 +166,11 @@ class TensorGrid:
         return self._change_levels(split_levels(self.x), split_levels)
 
     def _change_levels(self, x, change) -> "TensorGrid":
-        """Return the grid with given columns, after a function is applied to its rows and its outer columns."""
+        """Return the grid with the columns x [m], after `change` is applied to its rows and outer columns.
+
+        `change` takes and returns ascending grid lines (k,) [m]. It is applied to coating and substrate separately, so
+        that a grid line stays between them.
+        """
         coating_depth = change(self.depth[: self.coating_rows + 1])
         substrate_depth = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coating_depth, substrate_depth[1:]])
@@ -294,7 +298,10 @@ def row_scale(n_columns: int) -> float:
 
 
 def merge_levels(levels) -> np.ndarray:
-    """Return every second grid line, including the first and the last."""
+    """Return every second of the grid lines `levels` (k,) [m], including the first and the last.
+
+    With an odd number of cells the lines are interpolated in their number instead.
+    """
     if levels.size % 2:
         return levels[::2]
     position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
@@ -302,7 +309,10 @@ def merge_levels(levels) -> np.ndarray:
 
 
 def split_levels(levels) -> np.ndarray:
-    """Insert a grid line into each cell so that geometric growth of the cells is preserved."""
+    """Insert a grid line into each cell so that geometric growth of the cells is preserved.
+
+    `levels` (k,) [m] are ascending grid lines; the result has 2 k - 1 of them.
+    """
     if levels.size < 2:
         return levels
     cells = np.diff(levels)

@@ -139,7 +139,11 @@ class PieceMesh:
         return tributary_lengths(self.x)
 
     def refine(self) -> "PieceMesh":
-        """Return the piece after every edge is halved and every cell is split into four of the same order."""
+        """Return the piece after every edge is halved and every cell is split into four of the same order.
+
+        In a piece of second order the nodes in the middles of the edges become corners, and the halved edges get new
+        middles.
+        """
         points = self.points
         blocks = self.blocks
         tagged = [np.isin(np.arange(len(points)), nodes) for nodes in (self.interface, self.far)]
@@ -174,7 +178,11 @@ Mesh = TensorGrid | PieceMesh  # mesh of one piece
 
 
 def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
-    """Return the edges of cells (t, k) by the names of their elements."""
+    """Return the edges of cells (t, k), which are listed by the names of their elements.
+
+    `n_points` is the number of points of the mesh. Every cell lists its own edges, so an edge inside the mesh occurs
+    twice.
+    """
     ends = []
     owners = []
     middles = []
@@ -196,7 +204,7 @@ def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
 
 
 def _tag_inner_points(tagged: list[np.ndarray], n_points: int) -> list[np.ndarray]:
-    """Return whether each of `n_points` has each tag; points beyond the known ones are inside and have none."""
+    """Extend `tagged`, a bool (N,) per tag, to `n_points`; the new points are inside and have no tag."""
     return [np.append(part, np.zeros(n_points - part.size, bool)) for part in tagged]
 
 
@@ -257,7 +265,7 @@ def signed_areas(corners) -> np.ndarray:
 
 
 def freeze_piece(mesh: PieceMesh) -> PieceMesh:
-    """Return a copy of a piece whose arrays are read-only."""
+    """Return a copy of the mesh of a piece whose arrays are read-only."""
     return PieceMesh(
         frozen_array(mesh.points),
         {kind: frozen_array(cells, np.int64) for kind, cells in mesh.blocks.items()},

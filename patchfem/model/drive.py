@@ -30,7 +30,11 @@ def build_signal(scene, modes: ModalBasis):
 
 
 def _read_recorded_drive(scene) -> tuple[np.ndarray, np.ndarray]:
-    """Read both columns (k,) of the file drive.file: time [s] and signal, or frequency [Hz] and spectral density."""
+    """Read both columns (k,) of the file drive.file of a scene.
+
+    They are time [s] and signal, or frequency [Hz] and spectral density. The signal is an acceleration [m s-2] or a
+    force [N], by the kind of the drive.
+    """
     path = scene.resolve_path(scene.drive.file)
     with name_key("drive.file"):
         if find_waveform(scene.drive).is_random:

@@ -93,10 +93,10 @@ class EarlierWear:
             )
 
     def measure_error(self, name: str, value: float) -> float | None:
-        """Return the error of a wear measure at the end of the earlier run, or None if it is unknown.
+        """Return the error of a wear measure at the end of the earlier run, or None if it is not known.
 
-        `value` is the measure on the mesh of this run; its difference from that of the earlier run is
-        added to the error of the latter.
+        `name` is that of the measure, and `value` its value on the mesh of this run; its difference from that of the
+        earlier run is added to the error of the latter.
         """
         measure = self.measures.get(name, {"error": None})
         if measure["error"] is None:
@@ -116,6 +116,15 @@ class EarlierWear:
 
 def read_end_state(path: Path) -> EarlierWear:
     """Read the state at the end of an earlier run from its result.nc.
+
+    Parameters
+    ----------
+    path : Path
+        Output file of the earlier run.
+
+    Returns
+    -------
+    EarlierWear
 
     Raises
     ------
@@ -149,7 +158,10 @@ def read_end_state(path: Path) -> EarlierWear:
 
 
 def _read_state(path: Path) -> EarlierWear:
-    """Read the last state in a result.nc file; the values are not checked."""
+    """Read the last state in the result.nc file `path`; the values are not checked.
+
+    Depth and gap are per node of the earlier mesh; the gap is that of the unworn pieces.
+    """
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -166,7 +178,10 @@ def _read_state(path: Path) -> EarlierWear:
 
 
 def _has_depth_along_patch(earlier: EarlierWear) -> bool:
-    """Return whether position, depth and gap are finite and the positions increase."""
+    """Return whether position, depth and gap of an earlier run are finite and fit together.
+
+    Each must be a list with one number per node, in which positions increase and no depth is negative.
+    """
     x = earlier.x
     for column in (x, earlier.depth, earlier.gap):
         if column.ndim != 1 or column.shape != x.shape or not np.isfinite(column).all():
@@ -175,7 +190,10 @@ def _has_depth_along_patch(earlier: EarlierWear) -> bool:
 
 
 def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
-    """Read the state at the end of an earlier run; raise PatchfemError unless both scenes have the same pieces."""
+    """Read the state at the end of an earlier run from its result.nc file `path`.
+
+    Raises PatchfemError unless that run has the pieces of the scene with these `tables`.
+    """
     earlier = read_end_state(path)
     pieces_before = _describe_pieces(earlier.scene)
     pieces_now = _describe_pieces(tomllib.loads(format_toml(tables)))

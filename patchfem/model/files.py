@@ -100,7 +100,10 @@ def _select_interface(key: str, tables) -> _FileKey:
 
 
 def _check_reduction(tables, folder: Path) -> list[Fault]:
-    """Check that the matrices of [structure.reduced] fit together; they are not reduced."""
+    """Check that the matrices of [structure.reduced] fit together; they are not reduced.
+
+    `tables` are those of the scene, and `folder` is its folder. There is nothing to check if a file does not exist.
+    """
     table = tables.structure and tables.structure.reduced
     matrices = [file for key, file in list_named_files(tables) if "reduced" in key]
     if not table or not all(file_exists(folder / file) for file in matrices):
@@ -113,7 +116,11 @@ def _check_reduction(tables, folder: Path) -> list[Fault]:
 
 
 def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a mesh file by reading it, and compare its sizes with those of the scene."""
+    """Check a mesh file by reading it, and compare its sizes with those of the scene.
+
+    `path` is the mesh file, and `tables` are those of the scene; they are compared only if `is_valid`, without
+    mistakes.
+    """
     if not is_valid:
         files.read_pieces(path)
         return
@@ -123,7 +130,11 @@ def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
-    """Check that a trace covers the interface and is not too fine; return notes about it."""
+    """Check that the trace in the file `path` covers the interface; return notes about it.
+
+    `tables` are those of the scene. Unless they are valid (`is_valid`), or if the scene has a mesh file, the trace is
+    only read.
+    """
     import numpy as np
 
     profile.read_trace(path)
@@ -146,12 +157,18 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
 
 
 def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
-    """Check the file of a prescribed slide by reading it."""
+    """Check the file of a prescribed slide by reading it.
+
+    `path` is the file; the arguments `tables` and `is_valid` of all checks have no effect here.
+    """
     slide.read_path_file(path)
 
 
 def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
-    """Check the file of a recorded drive signal, or of its spectrum, by reading it."""
+    """Check the file `path` of a recorded drive signal, or of its spectrum, by reading it.
+
+    A signal is read only if its kind of drive is known: `is_valid`, or a kind in the `tables` of the scene.
+    """
     if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif is_valid or tables.drive.kind is not None:
@@ -159,7 +176,11 @@ def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
-    """Check structure.file: compute modes from matrices, but do not fit modes to measured responses."""
+    """Check structure.file: compute modes from matrices, but only read a universal file.
+
+    `path` is the file, and `tables` are those of the scene; unless they are valid (`is_valid`), matrices are only
+    read, too.
+    """
     if structure_files.is_universal(path) or not is_valid:
         structure_files.read_content(path)
         return
@@ -168,28 +189,46 @@ def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _make_matrix_check(key: str):
-    """Return the function that checks the file of one matrix of [structure.reduced]."""
+    """Return the function that checks the file of one matrix of [structure.reduced], that of a `key`."""
 
     def check_matrix(path: Path, tables, *, is_valid: bool) -> None:
+        """Check the file of the matrix by reading it.
+
+        Parameters
+        ----------
+        path : Path
+            File of the matrix.
+        tables, is_valid
+            Tables of the scene, and whether they are free of mistakes; both have no effect.
+        """
         structure_reduced.read_matrix(path, key)
 
     return check_matrix
 
 
 def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a table of measured responses by reading it."""
+    """Check a table of measured responses by reading the file `path`.
+
+    The arguments `tables` and `is_valid` of all checks have no effect here.
+    """
     measured.read_table(path)
 
 
 def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
-    """Check that the pieces are those of the earlier run; return a note about the worn depth."""
+    """Check the result.nc file `path` of an earlier run; return a note about its worn depth.
+
+    If the `tables` of this scene are valid (`is_valid`), the pieces must be those of the earlier run.
+    """
     if is_valid:
         return (earlier_wear.read_earlier_wear(path, tables).sentence,)
     return (earlier_wear.read_end_state(path).sentence,)
 
 
 def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
-    """Check that a rough surface can have the asperity peaks found from a trace."""
+    """Check that a rough surface can have the asperity peaks found from the trace in the file `path`.
+
+    If the `tables` of the scene are valid (`is_valid`), only waves shorter than the cut-off of the scene count.
+    """
     cutoff = None
     if is_valid:
         cutoff = patch.find_shortest_wavelength(
@@ -198,6 +237,7 @@ def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
     peaks.read_spectral_moments(path, cutoff)
 
 
+# Function that checks a file, by the key that names it
 FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,

@@ -97,7 +97,10 @@ class Gap:
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list[tuple[Table, Any]]:
-        """Return (table of the shape, value) for every shape that has a property; the value is what `gaps` returns."""
+        """Return (table of the shape, value) for every shape of the gap that has a property.
+
+        `quantity` names the property, such as "edge"; its value is what the function of this name in `gaps` returns.
+        """
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)
@@ -127,7 +130,7 @@ class Gap:
         return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
     def half_step_heights(self, x) -> np.ndarray:
-        """Return half the height [m] of the step at each node, (m,), or 0 at nodes without a step edge."""
+        """Return half the height [m] of the step at each node x (m,) [m], or 0 at nodes without a step edge."""
         heights = np.zeros(x.size)
         for _, (edge, height) in self._values("edge"):
             heights += np.where(x == edge, abs(height) / 2, 0.0)
@@ -137,6 +140,11 @@ class Gap:
         """Return the gap between the unloaded pieces.
 
         `x` [m] is (m,), or (m, 1) if numbers of the shapes are arrays (n,); then the gap is (m, n).
+
+        Returns
+        -------
+        ShapedGap
+            Gap [m], notes on the profile and computing time [s] of each shape.
         """
         gap = np.zeros(x.shape)
         notes = ()
@@ -169,6 +177,8 @@ def longest_loaded_cell(x, loaded_nodes) -> float:
     """Return the length [m] of the longest cell next to a node that carries pressure.
 
     Without such nodes it is that of the longest cell.
+
+    x (m,) [m] are the ascending nodes, and `loaded_nodes` (m,) of bool tells which of them carry pressure.
     """
     beside = loaded_nodes[1:] | loaded_nodes[:-1]
     return float(np.diff(x)[beside].max(initial=0.0) or np.diff(x).max())
@@ -180,6 +190,9 @@ def list_gap_shapes(contact: Contact) -> tuple[NamedShape, ...]:
 
 
 def find_shape_side(contact: Contact) -> str:
-    """Return the piece that carries the shapes and the pressure; "upper" if both carry shapes."""
+    """Return the piece, "lower" or "upper", that carries the gap shapes of a table [contact].
+
+    It is "upper" if both or none carry shapes.
+    """
     sides = {keys.on for keys in contact.shapes.values()}
     return "lower" if sides == {"lower"} else "upper"

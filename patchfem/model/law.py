@@ -56,7 +56,7 @@ class InterfaceLaw:
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
-        """Return the friction limits under a normal load [N]."""
+        """Return the static and the kinetic friction limit [N] under a normal load [N]."""
         law = self.numbers
         kinetic = law.kinetic if law.kinetic is not None else law.static
         return FrictionLimits(law.static * load, kinetic * load)
@@ -100,7 +100,7 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
 
 
 def _scale_growth_rates(law: Friction) -> tuple[float, float]:
-    """Return the growth of bonds at rest [m s-2] and during slip [m] at the surface temperature."""
+    """Return the growth of bonds at rest [m s-2] and during slip [m] at the surface temperature of a law."""
     heat = law.temperature
     with name_key("friction.temperature"):
         return import_effect("friction.temperature").growth_at_temperature(
@@ -160,6 +160,11 @@ def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
 
     They come from [[structure.interface]], or from [friction] for the only interface.
 
+    Parameters
+    ----------
+    scene : Scene
+        Checked scene of a rig or of a bench.
+
     Returns
     -------
     tuple of InterfaceLaw
@@ -175,7 +180,7 @@ def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
 
 
 def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
-    """Build the interface that one table [[structure.interface]] describes."""
+    """Build the interface that table `number`, from 0, of [[structure.interface]] in a scene describes."""
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
@@ -186,7 +191,10 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
 
 
 def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
-    """Build the patch of one interface; a PatchfemError names the key of the file that cannot be used."""
+    """Build the patch of interface `number`, from 0, of a scene; None for an interface without one.
+
+    A PatchfemError names the key of the file that cannot be used.
+    """
     table = scene.structure.interface[number]
     if table.contact is None:
         return None
@@ -199,7 +207,7 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
 
 
 def find_normal_load(scene: Scene) -> float | None:
-    """Return the (mean) normal load [N] of [friction], or None if the approach is prescribed."""
+    """Return the (mean) normal load [N] of a scene, or None if the approach is prescribed."""
     if scene.contact is not None:
         return scene.contact.load
     return scene.normal.load if scene.normal is not None else None
@@ -213,7 +221,10 @@ def find_pad_width(scene: Scene) -> float | None:
 
 
 def make_interface_names(structure) -> list[str]:
-    """Return the names of the interfaces between masses, such as "1-2", or [] if there are no masses."""
+    """Return the names of the interfaces of [structure] between masses, such as "1-2".
+
+    Several interfaces between the same masses get a number, as in "1-2 (2)". It is [] if there are no masses.
+    """
     names = ["-".join(map(str, interface.between)) for interface in structure.interface]
     return [
         name if names.count(name) == 1 else f"{name} ({number})"

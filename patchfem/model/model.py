@@ -43,6 +43,8 @@ class MeasuredFile(NamedTuple):
     - gains: factors of the acceleration and of the displacement.
     - reading: kind of the values.
     - cutoff: cut-off frequency [Hz] of the instrument.
+
+    `path` is the file.
     """
 
     path: Path
@@ -76,6 +78,8 @@ class Model:
     - absent: effects that the scene does not name.
     - grooves: grooves that the load climbs, or None.
     - motion: features of the scene that decide which engines can compute its motion.
+    - source: scene of the model, with the line of each key.
+    - accuracy: tolerance and numerical settings.
     """
 
     source: Source
@@ -163,7 +167,7 @@ class Model:
         return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
 
     def friction_limits(self, load: float) -> FrictionLimits:
-        """Return the friction limits of the first interface of a rig under a load [N]."""
+        """Return the static and kinetic friction limit [N] of the first interface of a rig under a load [N]."""
         return self.rig.friction.interfaces[0].friction_limits(load)
 
 
@@ -192,7 +196,11 @@ def build(scene: Scene) -> Model:
 
 
 def _build(scene: Scene) -> Model:
-    """Build the model of a scene; a PatchfemError has the key at fault."""
+    """Build the model of a scene; a PatchfemError has the key at fault.
+
+    The parts are built in the order in which they need each other: patch, point load and slide, rig, law, mesh of the
+    patch, and last the source, whose text has defaults that follow from the other parts.
+    """
     if scene.sweep:
         _refuse_sweep(scene)
 
@@ -211,6 +219,8 @@ def _build(scene: Scene) -> Model:
     if scene.structure is not None:
         rig_model = rig.build_rig(scene)
         rig_model = _attach_bolted_model(scene, rig_model)
+
+    # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     law = _build_law(scene, rig_model)
     if patch_model is not None:
         edge_motion = _find_edge_motion(scene, rig_model)
@@ -250,7 +260,11 @@ def _build(scene: Scene) -> Model:
 
 
 def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
-    """Return the rig with the model of the joint that was bolted in the modal test, if it is another joint."""
+    """Return the rig of a scene with the model of the joint that was bolted in the modal test.
+
+    The rig is returned unchanged if its modes were measured free, if its own joint was bolted, or if the stiffness of
+    the joint is known.
+    """
     bolted = rig_model.structure.bolted
     bolted_scene = structure.find_bolted_scene(scene)
     if bolted is None or bolted.build_rig is None or bolted_scene is scene:
@@ -279,14 +293,21 @@ def _refuse_sweep(scene: Scene) -> None:
 
 
 def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
-    """Return what moves the edges of the contact: "wear" or "load", or "" if they do not move."""
+    """Return what moves the contact edges in a scene: "wear" or "load", or "" if they do not move.
+
+    `rig_model` is None without a rig.
+    """
     if scene.wear is not None:
         return "wear"
     return "load" if rig_model is not None and rig_model.friction.load_varies else ""
 
 
 def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
-    """Request a mesh that resolves partial slip under a prescribed slide; bond laws need no such mesh."""
+    """Request a mesh that resolves partial slip under a prescribed slide, and return the patch with it.
+
+    `model` is the patch, `path` its slide and `law` the table [friction]. Bond laws need no such mesh, nor do laws
+    without friction.
+    """
     if not model.interface.partial_slip:
         return model
     if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:
@@ -296,7 +317,10 @@ def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None)
 
 
 def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
-    """Build the law of the first interface: that of the rig, or of [friction] without a rig."""
+    """Build the law of the first interface of a scene: that of `rig_model`, or of [friction].
+
+    It is empty without friction.
+    """
     interfaces = scene.structure.interface if scene.structure is not None else ()
     law = interfaces[0] if interfaces else scene.friction
     if law is None:

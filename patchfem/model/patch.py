@@ -26,6 +26,7 @@ class PatchPiece:
     - coating: material and thickness of the coating, None if the piece is bare.
     - length: length [m] along x.
     - end: shape of both ends.
+    - substrate: elastic material below the coating.
     """
 
     height: float
@@ -50,7 +51,10 @@ class PatchPiece:
         return self.end.half_contact_length(self.length)
 
     def corner_kind(self, half_length: float) -> str:
-        """Return the kind of corner at a distance [m] from the middle, or "flat" if the face extends beyond it."""
+        """Return the kind of corner at the distance `half_length` [m] from the middle.
+
+        It is that of the end of the piece, or "flat" if the face extends further.
+        """
         if self.half_contact_length > half_length * (1 + LENGTH_TOL):
             return "flat"
         return self.end.kind
@@ -66,6 +70,7 @@ class PatchPieces:
     - substrate: substrate of a piece for which the scene gives no other.
     - pairs: number of equal patches that share the load.
     - plane: ``"strain"`` or ``"stress"``.
+    - lower, upper: the pieces.
     """
 
     lower: PatchPiece
@@ -159,6 +164,7 @@ class PatchStrips(NamedTuple):
 
     - roll: angle [rad] about the x axis.
     - offset: lateral position [m] of the load line, None if the piece cannot roll.
+    - count: number of equal strips.
     """
 
     count: int
@@ -172,6 +178,7 @@ class PatchInterface:
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
+    - skin: pressure law of the asperities on the faces, None if the faces are smooth.
     """
 
     skin: Asperities | None
@@ -305,7 +312,10 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
     def with_loading(self, **changes) -> "PatchModel":
-        """Return a copy of the patch with changed values of its loading."""
+        """Return a copy of the patch with changed values of its loading.
+
+        The keywords are fields of its `loading`, such as `load` [N].
+        """
         return replace(self, loading=replace(self.loading, **changes))
 
     def with_mesh(self, **changes) -> "PatchModel":
@@ -367,7 +377,10 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]
 
 
 def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
-    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions."""
+    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions.
+
+    `resolve_path` turns a file name in the scene into a path.
+    """
     if contact.mesh is None:
         return None
     return MeshFile(resolve_path(contact.mesh), UNIT_FACTORS["length"][contact.mesh_unit or "m"])
@@ -384,21 +397,31 @@ def build_pieces(contact: Contact) -> PatchPieces:
 
     Keys in the table of a piece take precedence over those in [contact]. The interface is as long
     as the shorter face.
+
+    Parameters
+    ----------
+    contact : Contact
+        Table [contact].
+
+    Returns
+    -------
+    PatchPieces
+        Pieces, and length, width and height [m] of the patch.
     """
     pieces = []
-    for own in (contact.lower or OnePiece(), contact.upper or OnePiece()):
+    for piece_keys in (contact.lower or OnePiece(), contact.upper or OnePiece()):
         end = SHARP_END
-        if own.chamfer:
-            end = End("chamfer", own.chamfer)
-        elif own.end_radius:
-            end = End("radius", own.end_radius)
+        if piece_keys.chamfer:
+            end = End("chamfer", piece_keys.chamfer)
+        elif piece_keys.end_radius:
+            end = End("radius", piece_keys.end_radius)
 
         # Keys of the piece come before those of [contact].
         piece = PatchPiece(
-            height=own.height or contact.height,
-            substrate=own.substrate or contact.substrate,
-            coating=None if own.coating == "none" else own.coating or contact.coating,
-            length=own.length or contact.length,
+            height=piece_keys.height or contact.height,
+            substrate=piece_keys.substrate or contact.substrate,
+            coating=None if piece_keys.coating == "none" else piece_keys.coating or contact.coating,
+            length=piece_keys.length or contact.length,
             end=end,
         )
         pieces.append(piece)
@@ -432,7 +455,11 @@ def _build_loading(contact: Contact) -> PatchLoading:
 
 
 def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
-    """Return the lengths over which a profile is averaged."""
+    """Return the lengths over which the profile of a table [contact] is averaged.
+
+    The `pieces` give the length of the interface. A profile with asperities is averaged over a fraction of the
+    cut-off, one on the nodes of a mesh file not at all, and any other over the cells.
+    """
     if contact.asperities is not None:
         cutoff = find_shortest_wavelength(contact, pieces.length)
         average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE

@@ -57,7 +57,7 @@ def complete_asperities(
 
 
 def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
-    """Read a trace from a file and return the spectral moments of its waves below a cut-off [m].
+    """Read a trace from the file `path` and return the spectral moments of its waves below a cut-off [m].
 
     Raises PatchfemError, which names the key, if no isotropic Gaussian surface has these moments.
     """
@@ -70,7 +70,10 @@ def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMomen
 
 @cache_by_file
 def _compute_spectral_moments(path: Path, cutoff: float | None) -> TraceMoments:
-    """Compute the spectral moments of a trace; raise PatchfemError if no isotropic Gaussian surface has them."""
+    """Compute the spectral moments of the trace in the file `path`, from waves below `cutoff` [m].
+
+    Raises PatchfemError if no isotropic Gaussian surface has them.
+    """
     moments = trace_moments(read_profile(path), cutoff)
     gaussian_peaks(moments.fine)
     return moments

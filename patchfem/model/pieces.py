@@ -30,7 +30,10 @@ class RoundedEdges(NamedTuple):
 
 
 def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
-    """Return the elastic layers of a piece; if it is bare, the coating has the material of the substrate."""
+    """Return the elastic layers of a piece of a patch.
+
+    The coating of a bare piece has the material of the substrate.
+    """
     coating = piece.face_material
     substrate = piece.substrate
     return Layers(
@@ -39,7 +42,7 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
 
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
-    """Generate the grid of a piece with a flat interface."""
+    """Generate the grid of a piece of a patch with a flat interface."""
     grid = graded_grid(
         patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
     )
@@ -73,6 +76,16 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
 
     The contact is that of a rounded punch on a half plane under the nominal load without tilt
     (`closed_forms.contact`); the faces are as stiff as their coatings.
+
+    Parameters
+    ----------
+    patch : PatchModel
+        Patch whose pieces may have rounded ends.
+
+    Returns
+    -------
+    RoundedEdges
+        Positions x [m]; empty if no piece is rounded or there is no load.
     """
     pieces = patch.pieces.both
     half_length = patch.pieces.length / 2

@@ -119,7 +119,7 @@ def compute_profile_gap(
 
 
 def read_trace(path: Path) -> Profile:
-    """Read the trace in a file, with its heights unchanged.
+    """Read the trace in the file `path`, with its heights unchanged.
 
     A PatchfemError names the key of the file.
     """
@@ -128,12 +128,12 @@ def read_trace(path: Path) -> Profile:
 
 
 def find_sample_spacing(path: Path) -> float:
-    """Return the median distance [m] between samples of the trace in a file."""
+    """Return the median distance [m] between samples of the trace in the file `path`."""
     return float(np.median(np.diff(read_trace(path).x)))
 
 
 def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
-    """Return the waves of a trace that are longer than a cut-off [m], extended to the ends of the trace."""
+    """Return the waves of a trace that are longer than `cutoff` [m], extended to the ends of the trace."""
     if cutoff >= trace.length:
         raise PatchfemError(
             f"{format_length(cutoff)} is longer than the patch ({format_length(trace.length)}), so no "
@@ -149,7 +149,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple[str, ...]:
-    """Return sentences about the waves shorter than a cut-off [m], or () if there are none."""
+    """Return sentences about the waves of a trace shorter than `cutoff` [m], or () if there are none."""
     fraction = wave_spectrum(trace).lost_fraction(cutoff)
     if not fraction > 0:
         return ()
@@ -229,7 +229,10 @@ def _smooth_profile(trace: Profile, nodes) -> Profile:
 
 
 def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
-    """Read a trace that covers the nodes, remove spikes and interpolate gaps up to `max_gap` [m]."""
+    """Read the trace in the file `path`, remove spikes and interpolate gaps up to `max_gap` [m].
+
+    The trace is placed over the nodes x (m,) [m], and must cover them.
+    """
     trace = read_trace(path)
     try:
         return clean(place_over_patch(trace, x), max_gap)

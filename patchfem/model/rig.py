@@ -77,6 +77,8 @@ class RigDrive:
     - frequency: frequency [Hz] of a sine or of levels.
     - cycles: drive cycles of the whole run.
     - force: amplitude [N] of a force drive.
+    - waveform: form of the signal, with what the engines must know of it.
+    - levels: amplitudes of a drive that is raised in levels.
     """
 
     signal: "DriveSignal"
@@ -309,7 +311,23 @@ def build_rig(scene, joint: float | None = None) -> Rig:
 def _build(
     scene, own_modes: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
 ) -> Rig:
-    """Build the rig of a scene from its modes without the spring of the bonded joint."""
+    """Build the rig of a scene from its modes without the spring of the bonded joint.
+
+    Parameters
+    ----------
+    scene : Scene
+        Checked scene with [structure] and [drive].
+    own_modes : ModalBasis
+        Modes without the spring of the bonded joint.
+    interfaces : tuple of InterfaceLaw
+        Friction laws of the interfaces; () without friction.
+    joint : float, optional
+        Stiffness [N/m] of a pressed patch that was subtracted from measured modes.
+
+    Returns
+    -------
+    Rig
+    """
     modes = build_modes(scene, own_modes)
     friction = RigFriction(
         interfaces=interfaces,
@@ -329,7 +347,10 @@ def _build(
 
 
 def build_drive(scene, modes: ModalBasis) -> RigDrive:
-    """Build the drive signal of a rig from [drive], and the number of drive cycles of the run."""
+    """Build the drive signal of a rig from [drive] of a scene, and the number of drive cycles.
+
+    `modes` are those of the rig.
+    """
     keys = scene.drive
     signal = build_signal(scene, modes)
     waveform = find_waveform(keys)
@@ -360,7 +381,11 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
 
 
 def _build_springs(structure, modes: ModalBasis) -> RigSprings:
-    """Build the additional springs of a rig from [structure]."""
+    """Build the springs of a rig beside its modes from the table [structure].
+
+    They are the bonded spring and the cubic spring of the output. The travel [m] limits the motion: it is that of the
+    scene, or MAX_TRAVEL if the motion of the `modes` can grow without limit, else inf.
+    """
     bonded = structure.bonded
     interlock = None
     if bonded is not None and bonded.wavelength is not None:
@@ -375,7 +400,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
 
 
 def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstMode:
-    """Build the record of the first elastic mode.
+    """Build the record of the first elastic mode of a scene.
 
     `own_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
@@ -411,7 +436,10 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
 
 
 def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
-    """Build the RigStructure of a scene from the modes of its rig."""
+    """Build the RigStructure of a scene from the modes of its rig.
+
+    `joint` is the stiffness [N/m] of a pressed patch that was bolted in the modal test, if it is known already.
+    """
     structure = scene.structure
     bolted = None
     if structure.measured == "stuck":

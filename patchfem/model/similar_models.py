@@ -48,6 +48,7 @@ class SimilarModels(Sequence):
         return len(self.values)
 
     def __getitem__(self, index: int | slice) -> Model | list[Model]:
+        """Return the model of a case, or a list of models for a slice."""
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         sets = self.sets(int(self.cases[index]))
@@ -132,6 +133,7 @@ def replace_numbers(
         if "structure" in tables:
             rig = _replace_modes(rig, scene.structure)
 
+    # What the scene contains for the engines, and its text with the new numbers
     motion = find_motion_features(scene, model.kind)
     unwritten = replace(model, source=None, rig=rig, motion=motion, **changes)
     write = partial(write_resolved, scene, unwritten)
@@ -146,7 +148,20 @@ def _replace_law(rig: Rig, law: Friction) -> Rig:
 
 
 def _replace_modes(rig: Rig, structure: Structure) -> Rig:
-    """Replace the modes of a rig without bonded spring by those of another table [structure]."""
+    """Replace the modes of a rig without bonded spring by those of another table [structure].
+
+    Parameters
+    ----------
+    rig : Rig
+        Rig whose modes the scene lists.
+    structure : Structure
+        Table [structure] whose frequencies [Hz] and damping ratios may be arrays (n,) of n cases.
+
+    Returns
+    -------
+    Rig
+        Frequencies and damping ratios have the shape (modes,), or (modes, n) if one of them differs between cases.
+    """
     columns = [mode.frequency for mode in structure.mode]
     columns += [mode.damping for mode in structure.mode]
     frequency, damping = np.split(np.array(np.broadcast_arrays(*columns)), 2)

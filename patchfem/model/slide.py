@@ -89,6 +89,16 @@ class SlidePath:
         Starts, ends, reversals and the rows of a file are samples. A constant slide, a dwell and a
         file count as one cycle.
 
+        Parameters
+        ----------
+        steps : int
+            Number of steps per cycle.
+
+        Returns
+        -------
+        SlideSamples
+            Times [s] and relative displacements [m] (k,) of the samples, and the start of the last cycle.
+
         Raises
         ------
         Missing
@@ -115,7 +125,11 @@ class SlidePath:
         )
 
     def _sample_triangle(self, index, steps: int) -> SlideSamples:
-        """Sample a triangle wave; after a run-in it starts in the opposite direction."""
+        """Sample a triangle wave with a number of steps per cycle.
+
+        `index` (k,) counts the samples from 0. After a run-in of the length `run_in` [m] the wave starts in the
+        opposite direction.
+        """
         quarter = (index % steps) / steps * 4
         falling = np.where(quarter < 3, 2 - quarter, quarter - 4)
         rel_disp = np.where(quarter < 1, quarter, falling) * self.amplitude
@@ -163,6 +177,15 @@ class SlidePath:
 def build_slide(scene) -> SlidePath:
     """Build the prescribed slide of a scene with [slide].
 
+    Parameters
+    ----------
+    scene : Scene
+        Checked scene with [slide].
+
+    Returns
+    -------
+    SlidePath
+
     Raises
     ------
     PatchfemError
@@ -193,6 +216,8 @@ def _list_corners(keys) -> tuple[np.ndarray, np.ndarray]:
     """Return time (k,) [s] and displacement (k,) [m] at the corners of a constant slide or a dwell.
 
     Legs of no duration are left out.
+
+    `keys` is the table [slide]: first leg, hold, and a second leg after a dwell.
     """
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold or 0.0, length[2] / keys.speed])
@@ -208,10 +233,12 @@ def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
-    """Sample the straight segments between corners.
+    """Sample the straight segments (legs) between corners at given times [s] and displacements [m].
 
     Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
     `STEPS_PER_HOLD` steps.
+
+    `time` and `rel_disp` (k,) are those of the corners, and `steps` is the number of steps in all.
     """
     length = np.abs(np.diff(rel_disp))
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))

@@ -20,6 +20,7 @@ class Source:
     - remarks: sentences about keys without effect.
     - sets: ``key=value`` strings that were given in addition to the text.
     - notes: sentences about what the defaults neglect.
+    - title: title of the scene.
     """
 
     path: Path
@@ -56,7 +57,10 @@ def name_key(key: str) -> Iterator[None]:
 
 @contextmanager
 def locate_errors(source: Source) -> Iterator[None]:
-    """Add file and line to each PatchfemError that is raised in the block and names a key."""
+    """Add file and line to each PatchfemError that is raised in the block and names a key.
+
+    `source` is the source of the model, which knows the line of each key.
+    """
     try:
         yield
     except PatchfemError as error:

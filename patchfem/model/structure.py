@@ -77,6 +77,11 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
     joint : float, optional
         Stiffness [N/m] of the joint; by default it follows from the friction laws. Modes that
         were measured with a pressed patch are not changed until its stiffness is given.
+
+    Returns
+    -------
+    ModalBasis
+        Modes with the participations of interfaces, drive and sensors.
     """
     modes = _build_given_modes(scene)
 
@@ -118,7 +123,10 @@ def find_bolted_scene(scene):
 
 
 def has_pressed_joint(scene) -> bool:
-    """Return whether the joint stiffness depends on a pressed patch in addition to the friction law."""
+    """Return whether the joint stiffness of a scene depends on a pressed patch, too.
+
+    Otherwise it follows from the friction law and the load alone.
+    """
     contact = scene.contact
     if scene.friction is None or contact is None:
         return False
@@ -126,7 +134,7 @@ def has_pressed_joint(scene) -> bool:
 
 
 def compute_joint_stiffnesses(scene) -> list[float]:
-    """Compute the stiffness [N/m] of each sticking interface from its law."""
+    """Compute the stiffness [N/m] of each sticking interface of a scene from its law."""
     scene_load = find_normal_load(scene)
     stiffnesses = []
     for interface in build_interface_laws(scene):
@@ -163,7 +171,10 @@ def compute_sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
 
 
 def _build_given_modes(scene) -> ModalBasis:
-    """Build the modes that [structure] describes, excluding the spring of the bonded joint."""
+    """Build the modes that [structure] of a scene describes, without the bonded spring.
+
+    They are listed, or computed from reduced matrices, from a file, or from masses and springs.
+    """
     structure = scene.structure
     if structure.mode:
         return _build_listed_modes(structure, scene.drive.kind)
@@ -183,7 +194,7 @@ def _build_given_modes(scene) -> ModalBasis:
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Add a relative displacement for each strip if some mode yaws the patch."""
+    """Return modes with a relative displacement for each strip if one of them yaws the patch of a scene."""
     if not needs_strip_displacements(scene):
         return modes
     n_strips = scene.contact.strips.count
@@ -193,19 +204,19 @@ def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
 
 
 def read_file_notes(scene) -> list[str]:
-    """Return sentences that tell the user what was neglected or changed in structure.file."""
+    """Return sentences that tell the user what was neglected or changed in structure.file of a scene."""
     if scene.structure.file is None:
         return []
     return structure_files.read_scene_modes(scene).notes
 
 
 def _find_driven_mass(scene) -> int:
-    """Return the number of the mass on which the force acts or which is released."""
+    """Return the number of the mass on which the force of a scene acts or which is released."""
     return scene.drive.mass or scene.structure.output_mass or 1
 
 
 def build_start(scene, modes: ModalBasis) -> InitialState | None:
-    """Build the initial state of a rig, or return None if it starts at rest.
+    """Build the initial state of the rig of a scene in its modes; None if it starts at rest.
 
     Raises
     ------
@@ -223,7 +234,7 @@ def build_start(scene, modes: ModalBasis) -> InitialState | None:
 
 
 def compute_initial_state(scene, modes: ModalBasis) -> InitialState:
-    """Compute displacements and velocities at t = 0 in the modal coordinates of a rig.
+    """Compute displacements and velocities at t = 0 in the modal coordinates of the rig of a scene.
 
     [structure.start] gives them for each mode or mass. A release displaces one mass, or the output in
     the shape of a static force there. A step of the base displacement leaves the masses where they
@@ -265,7 +276,10 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring; they are 0 for rigid-body modes."""
+    """Return the natural frequencies (n,) [Hz] with the bonded spring; 0 for rigid-body modes.
+
+    `structure` is the table [structure], and `modes` are the modes with the spring.
+    """
     if structure.mode and structure.bonded is None and structure.measured == "free":
         # Frequencies that the scene states are returned without the round-off of the modes.
         return np.array([mode.frequency for mode in structure.mode])
@@ -273,7 +287,10 @@ def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
 
 
 def needs_strip_displacements(scene) -> bool:
-    """Return whether a mode yaws a patch with strips, so that the strips have different displacements."""
+    """Return whether a mode of a scene yaws a patch with strips.
+
+    The strips then have different displacements.
+    """
     has_strips = scene.contact is not None and scene.contact.strips is not None
     return has_strips and scene.friction is not None and bool(find_yaw_key(scene))
 

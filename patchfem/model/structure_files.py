@@ -21,7 +21,7 @@ class FileModes(NamedTuple):
 
 
 def read_scene_modes(scene) -> FileModes:
-    """Read the modes from structure.file; the key of an error is the key at fault."""
+    """Read the modes from structure.file of a scene; an error has the key at fault."""
     path = scene.resolve_path(scene.structure.file)
     return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
 
@@ -54,7 +54,7 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
 
 @cache_by_file
 def read_content(path: Path):
-    """Read a file but build no modes: return arrays by name, or the shapes of a universal file."""
+    """Read the file `path` but build no modes: return arrays by name, or the shapes of a universal file."""
     with name_key("structure.file"):
         return universal.read_universal(path) if is_universal(path) else arrays.read_arrays(path)
 
@@ -82,6 +82,11 @@ def _build_modes(
         Number of the mass that a force drives.
     needs_interface : bool
         Whether the modes must have an interface that slides.
+
+    Returns
+    -------
+    FileModes
+        Modal basis, and sentences on what was neglected or changed.
     """
     content = read_content(path)
     is_forced = drive_kind == "force"
@@ -109,7 +114,10 @@ def _build_modes(
 
 
 def _require_slides(modes: ModalBasis, content: dict[str, np.ndarray]) -> None:
-    """Raise PatchfemError unless every interface slides, and the arrays of the file move the patch along x alone."""
+    """Raise PatchfemError unless every interface slides in some of the modes.
+
+    The `content` of the file must also move the patch along x alone: arrays such as `pitch` must be absent or 0.
+    """
     if not len(modes.interfaces):
         raise PatchfemError(
             "lacks `slide`, the motion at the patch; add `slide` to the file, or write "

@@ -50,7 +50,11 @@ class _ReducedFiles(NamedTuple):
 
 
 def build_reduced_modes(scene) -> ReducedModes:
-    """Reduce the structure of a scene; the key of a PatchfemError is the key at fault."""
+    """Reduce the structure of a scene to its boundary and its lowest modes.
+
+    Returned are the modal basis, notes, the largest number of modes that can be kept, and the bases with more and with
+    fewer modes, from which the run estimates its error. The key of a PatchfemError is the key at fault.
+    """
     structure = scene.structure
     table = structure.reduced
     is_base_driven = scene.drive.kind == "base"
@@ -80,7 +84,10 @@ def build_reduced_modes(scene) -> ReducedModes:
 
 
 def list_slide_pairs(structure) -> list[tuple[int, int]]:
-    """List the pairs of coordinates between which the interfaces slide."""
+    """List the pairs of coordinates of [structure], numbered from 1, between which interfaces slide.
+
+    The number 0 stands for the base.
+    """
     pairs = [interface.between for interface in structure.interface]
     if not pairs and structure.reduced is not None and structure.reduced.slide is not None:
         return [structure.reduced.slide]
@@ -88,7 +95,10 @@ def list_slide_pairs(structure) -> list[tuple[int, int]]:
 
 
 def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
-    """Describe what the reduction keeps; the frequencies help the user notice wrong units."""
+    """Describe what a reduction keeps; the frequencies help the user notice wrong units.
+
+    `modes` are the reduced modes, and `table` is [structure.reduced].
+    """
     n_modes = min(table.modes, reduction.modes.omega.size)
     n_boundary = len(reduction.boundary)
     kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"
@@ -107,14 +117,20 @@ def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
 
 
 def _find_files(table, locate) -> dict[str, Path]:
-    """Return the path of each matrix of [structure.reduced] by its key; `locate` turns a name into a path."""
+    """Return the path of each matrix file of the table [structure.reduced] by its key.
+
+    `locate` turns a name into a path.
+    """
     names = {key: getattr(table, key) for key in MATRIX_KEYS}
     return {key: locate(name) for key, name in names.items() if isinstance(name, str)}
 
 
 @cache_by_file
 def read_matrix(path: Path, key: str) -> matrices.Matrix:
-    """Read a matrix file; the key of a PatchfemError is the key of the file."""
+    """Read the matrix file `path`; the key of a PatchfemError is the key of the file.
+
+    `key` is "stiffness", "mass" or "damping".
+    """
     with name_key(f"structure.reduced.{key}"):
         return matrices.read_matrix(path, key)
 
@@ -122,6 +138,9 @@ def read_matrix(path: Path, key: str) -> matrices.Matrix:
 @cache_by_file
 def _reduce(paths: tuple[Path, ...], keys: tuple[str, ...], table, is_base_driven: bool):
     """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes.
+
+    `_read_files` returns the matrices by key, the rows of the boundary and the motion of all coordinates with the
+    base; `table.unit` is the length [m] of the unit in which the files are written.
 
     Parameters
     ----------
@@ -179,6 +198,11 @@ def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _Reduced
         Table [structure.reduced] of the scene.
     is_base_driven : bool
         Whether the base drives the structure.
+
+    Returns
+    -------
+    _ReducedFiles
+        Matrices, rows of the boundary and motion with the base.
     """
     read = [read_matrix(path, key) for key, path in paths.items()]
     with name_key("structure.reduced.mass"):
@@ -219,7 +243,12 @@ def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _Reduced
 
 
 def _find_moved_rows(name, n: int, places) -> np.ndarray:
-    """Find the row indices (k,) that `moved` names: as for the boundary, or a range of rows, or a direction."""
+    """Find the row indices (k,) from 0 of the coordinates that an entry of `moved` names.
+
+    `name` is the name of a coordinate as for the boundary, a range of rows such as "1..30:10", or a direction such as
+    "x". n is the number of rows, and `places` (n, 2) gives node and direction (1 to 6) of each, or is None if they are
+    not known.
+    """
     text = str(name)
     row_range = RANGE_PATTERN.fullmatch(text)
     if row_range is None:

@@ -35,10 +35,15 @@ MIN_LOG_RATIO = 10
 # Number of significant digits of a value, so that a tenth of a range is
 # 0.1 and not 0.1000000000000001.
 SIGNIFICANT_DIGITS = 15
+# Pattern of a number
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+# Pattern of a range: first..last, with :count and the spacing log or lin
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+# Pattern of a number with a unit
 _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
+# Pattern of a sign before a tolerance, which is not accepted
 _TOLERANCE_PATTERN = re.compile(r"\+/?-|±")
+# Sign that closes a list, an inline table or a text, by the sign that opens it
 _CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 
@@ -202,9 +207,11 @@ def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:
 
 
 def read_positive_values(text: str, name: str, kind: str = "length") -> list[float]:
-    """Return the lengths [m] or forces [N] of a range ``a..b:n`` or a list in rising order; all are above 0.
+    """Return the values of a range ``a..b:n`` or of a list in rising order; all are above 0.
 
     Raises PatchfemError, whose message begins with `name`, for any other text.
+
+    `kind` is "length" [m] or "force" [N].
     """
     key, example = POSITIVE_KEYS[kind]
     try:
@@ -292,7 +299,11 @@ def _append_values(
     assignment: tuple[str, str],
     form: Form,
 ) -> None:
-    """Read the values of a key, and append them to `given`, or the mistake in them after `name` to `mistakes`."""
+    """Read the values of a key, and append them to `given`, or the mistake in them to `mistakes`.
+
+    `assignment` are the key and the text of its values, and `form` is what the option accepts. `name` is the option,
+    which the text of a mistake begins with, or "".
+    """
     try:
         given.append(read_values(*assignment, form))
     except ValueError as error:
@@ -337,7 +348,10 @@ class _ValueReader:
         return number
 
     def list_values(self, piece: str) -> list[str]:
-        """Return the values that one part of a list stands for, as a scene writes them: those of a range, or one value."""
+        """Return the values that one part between the commas of a list stands for, as a scene writes them.
+
+        `piece` is such a part: a range ``1..9 mm:5`` stands for its values, any other text for itself.
+        """
         if not piece:
             raise ValueError("there is no value between two commas")
         spread = self.parse_range(piece)
@@ -350,7 +364,7 @@ class _ValueReader:
         return spread.format_values(k / (spread.count - 1) for k in range(spread.count))
 
     def parse_range(self, piece: str) -> Range | None:
-        """Parse a range such as ``1..9 mm:5``; return None for any other text."""
+        """Parse a text `piece` as a range such as ``1..9 mm:5``; return None for any other text."""
         match = _RANGE_PATTERN.fullmatch(piece) if self.is_number else None
         if match is None:
             return None
@@ -375,7 +389,10 @@ class _ValueReader:
         return Range(self.key, low, high, kind, ends, unit, int(count or 0), is_log)
 
     def check_range(self, spread: Range, form: Form) -> None:
-        """Raise ValueError for a range in which the key cannot vary."""
+        """Raise ValueError for a range, `spread`, in which the key cannot vary.
+
+        `form` is what the option accepts; without lists of values the range gives a lower and an upper bound.
+        """
         if not self.takes_float:
             raise ValueError(
                 f"{spread.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
@@ -394,7 +411,10 @@ class _ValueReader:
 
 
 def _find_value_key(key: str, texts: Sequence[str]) -> Key:
-    """Find a key; raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
+    """Find a key; raise ValueError, with suggestions, if it is not known or is a table without a value.
+
+    `texts` are the values that are assigned to it, as written.
+    """
     first = texts[0].partition("..")[0] if texts else ""
     known = require_key(key, read_set_value("", first))
     if known.accepts_value or (texts and all(text[:1] in ("{", "[", '"', "'") for text in texts)):
@@ -415,7 +435,11 @@ def _find_value_key(key: str, texts: Sequence[str]) -> Key:
 
 
 def _is_log(low: float, high: float, spacing: str | None) -> bool:
-    """Return whether the values of a range are spaced logarithmically."""
+    """Return whether the values of a range are spaced logarithmically.
+
+    `low` and `high` are the ends, and `spacing` is the word behind the range, such as "log", or None; without it a
+    range over a large ratio is logarithmic.
+    """
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:
         return _round_digits(max(low / high, high / low)) >= MIN_LOG_RATIO
@@ -455,5 +479,5 @@ def _format_with_unit(value: float, unit: str) -> str:
 
 
 def _round_digits(value: float) -> float:
-    """Return a number rounded to SIGNIFICANT_DIGITS."""
+    """Return the number `value` rounded to SIGNIFICANT_DIGITS."""
     return float(f"{value:.{SIGNIFICANT_DIGITS}g}")

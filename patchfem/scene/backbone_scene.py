@@ -13,12 +13,14 @@ from ..exceptions import PatchfemError
 from .keys.quantities import format_si, parse_quantity, read_percentage
 from .keys.values import TomlTable
 
+# Form of the option --modes, for messages
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive in place of that of the scene; no result of a backbone depends on it.
+# Drive that a rig must have in a scene; no result of a backbone depends on it
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
+# Names of modes that are given without names
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
@@ -68,7 +70,11 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Parse frequency, damping and slide of a mode; raise ValueError if one has the wrong unit."""
+    """Parse frequency, damping ratio and slide of a mode; raise ValueError if one has the wrong unit.
+
+    Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5"; the slide is the participation of the
+    interface.
+    """
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
     slide = None if slide is None else _parse_ratio(slide)
@@ -145,7 +151,7 @@ class BackboneTables:
             raw["drive"] = dict(UNUSED_DRIVE)
 
     def _write_modes(self, raw: TomlTable) -> None:
-        """Write the modes into [structure]."""
+        """Write the modes into the table [structure] of the plain values `raw` of a scene."""
         structure = raw.setdefault("structure", {})
         if not isinstance(structure, dict) or (STRUCTURES - {"mode"}) & structure.keys():
             raise PatchfemError(

@@ -14,7 +14,10 @@ from .rules.structure import default_output
 
 
 def complete_tables(scene: tables.Tables, kind: str) -> tables.Tables:
-    """Return the tables of a valid scene with defaults filled in and unused keys reset to them."""
+    """Return the tables of a valid scene with defaults filled in and unused keys reset to them.
+
+    `kind` is the kind of scene, such as "rig", by which a setting is used or not.
+    """
     unused = list(find_unused_settings(scene, kind))
     if scene.accuracy.method in list_unused_methods(kind):
         unused.append("method")
@@ -68,14 +71,20 @@ def _list_defaults(table: Table) -> dict[str, KeyValue]:
 
 
 def _list_idle_keys(table: Table) -> list[str]:
-    """Return the keys of a table without effect beside its other keys, besides those that `choices` finds."""
+    """Return the keys of a table that have no effect because of its other keys.
+
+    Keys that a selector such as `law` leaves unused are not listed; `find_choices` finds these.
+    """
     if isinstance(table, tables.Friction):
         return find_unused_law_keys(table)
     return ["element_size"] if isinstance(table, Contact) and table.mesh else []
 
 
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
-    """Return a mode whose participations are filled in; those of the first mode have other defaults."""
+    """Return a mode whose participations are filled in.
+
+    `index` counts the modes from 0; the participations of the first mode have other defaults.
+    """
     output = default_output(index) if mode.output is None else mode.output
     defaults = {
         "base": 0.0 if index else mode.slide,
@@ -88,6 +97,6 @@ def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
 
 
 def _find_default_values(table: Table, keys: list[str]) -> dict[str, KeyValue]:
-    """Return the default values of the given keys, by attribute."""
+    """Return the default values of the given keys of a table, by attribute."""
     known = [list_keys(type(table))[key] for key in keys]
     return {key.attribute: key.field.default for key in known}

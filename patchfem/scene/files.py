@@ -31,7 +31,7 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a text is the path of an existing file."""
+    """Return whether a path is that of an existing file; one that the system does not accept is not."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -39,7 +39,10 @@ def file_exists(path: Path) -> bool:
 
 
 def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
-    """List the files that a scene names and that do not exist, with a message for each."""
+    """List the files that a scene names and that do not exist, as (dotted key, message).
+
+    `tables` are those of the scene, and `folder` is the folder to which its paths are relative.
+    """
     return [
         (key, f"there is no file {folder / file}; paths are relative to the scene")
         for key, file in list_named_files(tables)

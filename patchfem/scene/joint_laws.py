@@ -47,7 +47,11 @@ WISHES: dict[str, str] = _ROWS["wishes"]
 
 
 class Choice(NamedTuple):
-    """Friction law chosen for a user: the row of JOINT_LAWS, and both answers as lists of words."""
+    """Friction law that is chosen for a user.
+
+    - row: row of JOINT_LAWS with the law.
+    - known, wanted: words of both answers: what is known of the joint, and what is to be computed.
+    """
 
     row: JointLaw
     known: list[str]
@@ -105,7 +109,7 @@ def choose_law(known: str, wanted: str) -> Choice:
     wanted_words = parse_choice(wanted, WISHES, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
-        """Return the costs by which laws are ranked; the law with the smallest tuple is chosen.
+        """Return the costs of the law in a row of the table; the law with the smallest tuple is chosen.
 
         They are minus the number of answered wishes, the number of missing inputs and that of assumed keys.
         """
@@ -127,7 +131,7 @@ def format_question(question: str, meanings: dict[str, str]) -> str:
 
 
 def describe_choice(choice: Choice) -> list[str]:
-    """Return sentences on the chosen law, its accuracy and limits, and the wishes that it does not answer."""
+    """Return sentences on a choice: the law, its limits, and the wishes that it does not answer."""
     row = choice.row
     missing = [word for word in row.known if word not in choice.known]
     unanswered = [word for word in choice.wanted if word not in row.wanted]

@@ -10,11 +10,14 @@ from pathlib import Path
 from .keys.types import KeyValue
 from .keys.values import TomlTable, TomlValue
 
+# Pattern of an item with its number from 1, such as mode[1]
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
+# Pattern of an item in a message with its number from 0, such as structure.mode.0
 _ITEM_IN_MESSAGE_PATTERN = re.compile(
     r"\b((?:structure|drive|wear)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
 )
 _BLANK_PATTERN = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
+# Pattern of one word of a dotted key in TOML, bare or in quotes
 _KEY_PART = r"""[A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*'"""
 _KEY = rf"((?:{_KEY_PART})(?:[ \t]*\.[ \t]*(?:{_KEY_PART}))*)[ \t]*"
 _KEY_PART_PATTERN = re.compile(_KEY_PART)
@@ -40,7 +43,7 @@ def split_key(key: str) -> list[str]:
 
 
 def split_assignment(text: str) -> tuple[str, str]:
-    """Split ``table.key=values`` into the key and the values; the values are "" without an equals sign."""
+    """Split a text ``table.key=values`` into key and values; these are "" without an equals sign."""
     key, _, values = text.partition("=")
     return key.strip(), values.strip()
 
@@ -51,7 +54,10 @@ def list_item_names(items: Sequence[KeyValue | TomlValue]) -> list[str | None]:
 
 
 def find_item(items: Sequence[KeyValue | TomlValue], piece: str) -> int | None:
-    """Return the index of the item with a name, or with a number counted from 0; None if there is none."""
+    """Return the index of the item that `piece` of a dotted key names; None if there is none.
+
+    An item of an array of tables is named by its key `name`, or by its number counted from 0.
+    """
     names = list_item_names(items)
     if piece in names:
         return names.index(piece)
@@ -59,7 +65,10 @@ def find_item(items: Sequence[KeyValue | TomlValue], piece: str) -> int | None:
 
 
 def find_part(holder: KeyValue | TomlValue, name: str) -> KeyValue | TomlValue:
-    """Return the value of a key of a table, read or not, or None if there is none."""
+    """Return the value of the key `name` of a table, or None if there is none.
+
+    `holder` is the table, either as plain values (a dict) or after it has been read.
+    """
     return holder.get(name) if isinstance(holder, dict) else getattr(holder, name, None)
 
 
@@ -82,7 +91,10 @@ def find_scene_value(scene: KeyValue | TomlTable, key: str) -> tuple[str, KeyVal
 
 
 def number_items_from_one(text: str) -> str:
-    """Write array items of a message in the form `structure.mode[1]`."""
+    """Return the text of a message in which array items have the form `structure.mode[1]`.
+
+    Inside the program they are `structure.mode.0`, counted from 0.
+    """
     changed = _ITEM_IN_MESSAGE_PATTERN.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
     # An item inside another item needs a second pass.
     return changed if changed == text else number_items_from_one(changed)
@@ -118,6 +130,16 @@ def find_key_lines(text: str) -> dict[str, int]:
 
     A table has the line of its header; a table without a header that of the first key in it. Items of an array of
     tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
+
+    Parameters
+    ----------
+    text : str
+        Text of a scene.
+
+    Returns
+    -------
+    dict of str to int
+        Line, from 1, by dotted key.
     """
     lines: dict[str, int] = {}
     last_item: dict[str, int] = {}  # index of the last item of each array of tables
@@ -207,4 +229,5 @@ def _split_written_key(key: str) -> list[str]:
 
 
 def _join_path(path: str, name: str) -> str:
+    """Return the dotted key of `name` in the table `path`; the outermost table has the path ""."""
     return f"{path}.{name}" if path else name

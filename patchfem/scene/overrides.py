@@ -79,7 +79,7 @@ class BaseScene:
         self._tables: dict[tuple[str, str], KeyValue] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
-        """Return a copy of the scene with further assignments `table.key=value`.
+        """Return a copy of the scene with further assignments `table.key=value`, `sets`.
 
         Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
         Raises SceneError as `scene.loads` does, and if a file that the scene names does not exist.
@@ -149,7 +149,8 @@ class PlainNumbers:
     def make_scene(self, values: Sequence, sets: Sequence[str]) -> Scene:
         """Create a scene with given values; it is neither parsed nor checked.
 
-        `values` [SI] are those of the keys; `are_plain` must hold for them.
+        `values` [SI] are those of the keys; `are_plain` must hold for them. `sets` are the same values as
+        ``key=value`` strings.
         """
         numbers = dict(zip(self.limits, values))
         if "friction.static" in numbers and self.scene.friction.kinetic is not None:
@@ -159,8 +160,8 @@ class PlainNumbers:
             name, *pieces = key.split(".")
             table = tables.get(name) or getattr(self.scene, name)
             tables[name] = _replace_number(table, pieces, value)
-        kept = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
-        return replace(self.scene, sets=(*kept, *sets), **tables)
+        other_sets = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
+        return replace(self.scene, sets=(*other_sets, *sets), **tables)
 
     def changed_tables(self) -> set[str]:
         """Return the names of the tables in which a number differs."""
@@ -170,7 +171,10 @@ class PlainNumbers:
 def _replace_number(
     holder: Table | tuple[Table, ...], pieces: list[str], value: float
 ) -> Table | tuple[Table, ...]:
-    """Return a copy of a table, or of an array of tables, with another number at the pieces of a dotted key."""
+    """Return a copy of a table, or of an array of tables, with another number at a dotted key.
+
+    `holder` is the table or array, `pieces` are the words of the dotted key, and `value` is the number in SI.
+    """
     name, *inner = pieces
     if isinstance(holder, tuple):
         items = list(holder)
@@ -181,7 +185,10 @@ def _replace_number(
 
 
 def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
-    """Return whether PLAIN_KEYS holds in a scene that is read from a draft."""
+    """Return whether the limits of PLAIN_KEYS are valid for a scene that is read from a draft.
+
+    They are valid for the kinds of scene in PLAIN_SCENES without files, except one of measured responses.
+    """
     names = [key for key, _ in list_named_files(scene)]
     if names not in ([], ["measured.file"]) or (names and scene.normal):
         return False

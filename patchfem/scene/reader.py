@@ -41,7 +41,7 @@ _PLAIN_TEXT_PATTERN = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')
 
 
 def read_tables(draft: SceneDraft) -> None:
-    """Read all tables of a scene, and collect the mistakes in them."""
+    """Read all tables of a scene draft, and collect the mistakes in them there."""
     draft.tables = _read_table(draft, Tables, draft.raw, "")
 
 
@@ -94,7 +94,11 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: TomlTable, table_key
 def _read_inner(
     draft: SceneDraft, key: Key, value: TomlValue, path: str
 ) -> Table | tuple[Table, ...] | None:
-    """Read a table or an array of tables inside a table."""
+    """Read a table or an array of tables inside a table; return None after a mistake.
+
+    `key` is the key of the inner table, `value` are its plain values, and `path` is its dotted key in the scene. The
+    mistakes are added to the `draft`.
+    """
     if not key.is_array and isinstance(value, dict):
         return _read_table(draft, key.inner, value, path)
     if not (key.is_array and isinstance(value, list) and value):
@@ -114,7 +118,10 @@ def _read_inner(
 def _validate_values(
     draft: SceneDraft, model: type[Table], values: TomlTable, table_key: str
 ) -> dict[str, KeyValue]:
-    """Return the valid values by attribute; report the first mistake of every other key."""
+    """Return the valid values of a table by attribute; report the first mistake of every other key.
+
+    `model` is the class of the table, `table_key` its dotted key, and mistakes are added to the `draft`.
+    """
     valid, errors = validate_values(model, values)
     reported = set()
     # A key may accept several types; a value that only breaks a limit of one
@@ -137,7 +144,11 @@ def _validate_values(
 def _report_unknown(
     draft: SceneDraft, model: type[Table], raw: TomlTable, key: str, table_key: str
 ) -> None:
-    """Report an unknown key with the most similar known key."""
+    """Report an unknown key of a table to the draft, with the most similar known key.
+
+    `model` is the class of the table, `raw` are its plain values, and `table_key` is its dotted key. The suggested key
+    counts as meant, and is not reported as missing.
+    """
     path = f"{table_key}.{key}" if table_key else key
     sentence, suggestion = describe_unknown_key(model, raw, table_key, key, draft.sets)
     if suggestion:
@@ -146,7 +157,10 @@ def _report_unknown(
 
 
 def apply_set(draft: SceneDraft, assignment: str) -> None:
-    """Apply one assignment of --set to a scene that is being read."""
+    """Apply one assignment ``table.key=value`` of --set to a scene draft, before it is read.
+
+    Tables on the way to the key are made if they do not exist. A mistake in the assignment is added to the `draft`.
+    """
     try:
         assignment.encode()
     except UnicodeEncodeError:
@@ -232,7 +246,10 @@ def _find_item(draft: SceneDraft, items: list[TomlValue], path: str) -> int | No
 
 
 def read_set_value(key: str, text: str) -> TomlValue:
-    """Parse the value of a --set option as TOML; return it as a string if it is not valid TOML."""
+    """Parse the text of a value in a --set option as TOML; return the text if it is not valid TOML.
+
+    A `key` that takes text keeps a number as text.
+    """
     known = find_key(key)
     is_text_key = known is not None and str in known.types
     if _PLAIN_TEXT_PATTERN.fullmatch(text):

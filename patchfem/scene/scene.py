@@ -140,6 +140,10 @@ def load(
     folder = Path(path).parent
 
     def find_file_faults(read: tables.Tables, is_valid: bool) -> Iterable[tuple[str, str]]:
+        """Return (key, message) of the files that do not exist or, if these are looked at, have faults.
+
+        `read` are the tables, and `is_valid` tells whether they are free of mistakes.
+        """
         return [
             *list_absent_files(read, folder),
             *(faults(read, folder, is_valid) if faults else ()),
@@ -237,7 +241,7 @@ def finish_scene(
 
 
 def add_sets(scene: Scene, sets: Iterable[str]) -> Scene:
-    """Return a copy of a scene of a study with further assignments `table.key=value`."""
+    """Return a copy of a scene of a study with further assignments `table.key=value`, `sets`."""
     changed = loads(scene.text, scene.path, [*scene.sets, *sets])
     return replace(changed, written=scene.written)
 
@@ -285,7 +289,10 @@ def move_scene(scene: Scene, path: Path) -> Scene:
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list[assignments.Axis], list[str]]:
-    """Return the axes of the table [sweep] in a text, and one line for each mistake in it."""
+    """Return the axes of the table [sweep] in a text, and one line for each mistake in it.
+
+    An axis is a key with its values. `path` names the file in the lines.
+    """
     raw, lines = parse_text(text, path)
     draft = SceneDraft(str(path), lines, raw)
     swept = _read_axes(draft, raw["sweep"]) if "sweep" in raw else []

@@ -41,7 +41,7 @@ def make_schema() -> dict[str, Any]:
 
 
 def _describe_table(model: type[Table]) -> dict[str, Any]:
-    """Return the schema of a table: the meaning and default of each key; null is not allowed."""
+    """Return the schema of a table class, `model`: meaning and default of each key; no null."""
     raw = model.model_json_schema(by_alias=True)
     properties = raw.get("properties", {})
     schema = {
@@ -56,7 +56,7 @@ def _describe_table(model: type[Table]) -> dict[str, Any]:
 
 
 def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a key, based on the one that pydantic makes."""
+    """Return the schema of a key, based on the one that pydantic makes, `raw`."""
     schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
     types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
     if len(types) == 1:
@@ -78,7 +78,11 @@ def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _describe_selection(model: type[Table], key: str) -> str:
-    """Return which keys each value of a selector needs, or which values need a key, or "" if neither applies."""
+    """Return which keys each value of a selector needs, or which values need a key, or "".
+
+    A selector is a key, such as `law`, whose value decides which others the table needs; `model` is the class of the
+    table.
+    """
     clauses = []
     for selector in filter(lambda one: one.key, find_selectors(model)):
         if key == selector.key:
@@ -98,7 +102,7 @@ def _describe_selection(model: type[Table], key: str) -> str:
 
 
 def _add_units(schema: dict[str, Any], kind: str) -> None:
-    """Add the pattern of quantities with units to a schema."""
+    """Add the pattern of quantities of a `kind`, such as "length", with their units to a schema."""
     if isinstance(schema.get("default"), int | float):
         schema["default"] = f"{schema['default']:g} {find_si_unit(kind)}"
     for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):

@@ -18,10 +18,12 @@ MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a 
 
 
 def format_assignments(sets: dict[str, PythonValue]) -> tuple[str, ...]:
-    """Return ``table.key=value`` for each key; raise SceneError for a value that no scene can contain.
+    """Return ``table.key=value`` for each key of `sets`.
 
     A text stands as in a scene without quotes. A number is in SI and gets the unit of its key. Booleans, lists, dicts
     and NumPy scalars and arrays are accepted too.
+
+    Raises SceneError for a value that no scene can contain.
     """
     return tuple(
         f"{key}={value if isinstance(value, str) else write_value(key, value)}"
@@ -130,7 +132,7 @@ def _find_kind(key: str) -> str | None:
 
 
 def _format_value(key: str, value: PythonValue) -> str:
-    """Return one value as a string in the form of --over."""
+    """Return one value of a key as a string in the form of the option --over."""
     if isinstance(value, str):
         is_toml = value.startswith(("[", "{", '"', "'"))
         if is_toml or not set(",\"'[{") & set(value):
@@ -168,6 +170,7 @@ def write_value(key: str, value: PythonValue, kind: str | None = None) -> str:
                 "in SI units, a boolean, or a list of such values"
             ]
         )
+    # A number gets the SI unit of its key
     kind = kind or _find_kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))

@@ -5,7 +5,9 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 from .keys.types import advise_on_name
 
+# Folder of the template scenes
 TEMPLATE_FOLDER = Path(__file__).parent / "templates"
+# Description of each template scene, by its kind
 TEMPLATE_DESCRIPTIONS = {
     "patch": "two coated pieces pressed together: contact area, pressure and stiffness",
     "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",
@@ -28,7 +30,10 @@ NEXT_VERBS = {
 
 
 def read_template(kind: str) -> str:
-    """Return a template of TEMPLATE_DESCRIPTIONS; raise PatchfemError for any other word."""
+    """Return the text of the template `kind`, a word of TEMPLATE_DESCRIPTIONS.
+
+    Raises PatchfemError for any other word.
+    """
     if kind not in TEMPLATE_DESCRIPTIONS:
         raise PatchfemError(
             f"{kind}: unknown kind of scene; {advise_on_name(kind, TEMPLATE_DESCRIPTIONS)}"

@@ -21,9 +21,10 @@ from .keys.types import (
 from .keys.values import TomlTable, TomlValue
 from .lines import split_key
 
-# Rating of a table of a similar name, of which 1 is that of a table that knows all keys inside.
+# Rating of a table whose name is similar to an unknown key; a table that knows all keys inside has 1
 SIMILAR_NAME_RATING = 0.75
-SAME_NAME_RATING = 2.0  # rating of a table of the same name, above that of all others
+# Rating of a table with the name of an unknown key, above all other ratings
+SAME_NAME_RATING = 2.0
 MIN_RATING = 0.5  # rating above which a table is suggested
 
 
@@ -35,7 +36,9 @@ class UnknownKey(NamedTuple):
 
 
 def require_key(key: str, value: TomlValue = "") -> Key:
-    """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it.
+    """Find a dotted key, and return its description; raise ValueError if no scene has it.
+
+    The error names the nearest known key. `Key.inner` is the class of the table at a key, None for a value.
 
     Parameters
     ----------
@@ -190,7 +193,11 @@ def _suggest_name(
 
 
 def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
-    """Return the table of the same or a similar name, or one that knows most of the keys inside; "" for none."""
+    """Return the inner table that an unknown key probably means; "" for none.
+
+    It has the same or a similar name, or knows most of the keys inside the `value`, a table or an array of tables.
+    `model` is the class of the table with the unknown key.
+    """
     inside = set(value[0] if isinstance(value, list) else value)
     inner = list_inner_tables(model)
     tables = {name: inner[name] for name in inner if name.count(".") <= 1}
@@ -212,7 +219,10 @@ def _list_similar(key: str, names: Collection[str]) -> list[str]:
 
 
 def _write_header(table_key: str) -> str:
-    """Return the header of a table in a scene: [[structure.mode]] for one of an array, else [contact.tilt]."""
+    """Return the header of a table by its dotted key: [[structure.mode]] for an array, or [contact.tilt].
+
+    `table_key` is the dotted key.
+    """
     return f"[[{table_key}]]" if find_key(table_key).is_array else f"[{table_key}]"
 
 
@@ -222,12 +232,15 @@ def _name_item(table_key: str) -> str:
 
 
 def _accepts_value(model: type[Table], key: str, value: TomlValue) -> bool:
-    """Return whether a key accepts a value."""
+    """Return whether a key of a table, whose class is `model`, accepts a value."""
     return list_keys(model)[key].attribute in validate_values(model, {key: value})[0]
 
 
 def _list_needed_keys(model: type[Table], raw: TomlTable) -> list[str]:
-    """Return the keys that a table needs always or by one of its selectors."""
+    """Return the keys that a table needs always, or by the value of a selector such as `law`.
+
+    `model` is the class of the table, and `raw` are its plain values.
+    """
     needed = list(list_required_keys(model))
     for selector in find_selectors(model):
         value = raw.get(selector.key, "")

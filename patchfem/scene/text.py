@@ -24,7 +24,10 @@ def format_toml(table: Table) -> str:
 
 
 def list_named_effects(tables: Any) -> list[str]:
-    """Return the names of the effects in a scene, such as ``contact.tilt``, ``slide.kind=sine``."""
+    """Return the names of the effects in the tables of a scene, such as ``slide.kind=sine``.
+
+    An effect is a part of the physics that a table or the value of a selector adds, such as ``contact.tilt``.
+    """
     named: dict[str, None] = {}
     for name in Tables.model_fields:
         table = getattr(tables, name)
@@ -35,7 +38,10 @@ def list_named_effects(tables: Any) -> list[str]:
 
 @memoize
 def _list_table_effects(table: Table, table_key: str) -> tuple[str, ...]:
-    """Return the effects of a table and of the tables inside it; those of patches of interfaces come last."""
+    """Return the effects of a table at `table_key` and of the tables inside it.
+
+    Those of patches of interfaces come last.
+    """
     named: dict[str, None] = {}
     of_patches: dict[str, None] = {}
     for key, inner in iterate_tables(table, table_key):
@@ -45,7 +51,7 @@ def _list_table_effects(table: Table, table_key: str) -> tuple[str, ...]:
 
 
 def _name_effects(key: str, table: Table) -> list[str]:
-    """Return the names of the effects that a table contains, without those of the tables inside it.
+    """Return the effects of a table, at a dotted key, without those of the tables inside it.
 
     The patch of an interface has the effects of [contact], and the item of an array only those of its selectors.
     """
@@ -66,7 +72,7 @@ def _name_effects(key: str, table: Table) -> list[str]:
 
 
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
-    """Yield the TOML lines of a table and of the tables inside it."""
+    """Yield the TOML lines of a table, at `table_key`, and of the tables inside it."""
     unused = find_choices(table).unused
     inner = []
     for name, key in list_keys(type(table)).items():

@@ -18,12 +18,16 @@ MAX_BYTES = 4 * 2**20
 MAX_QUOTED_CHARACTERS = 60
 # Key with a value that opens neither quotes nor a bracket.
 _BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
+# Pattern of a number that lacks a digit before or after its point
 _DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
+# Pattern of a number with a decimal comma
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
+# Pattern of a quantity or a word without quotes
 _QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
     r"[a-zA-Z][\w./ -]*"
 )
+# Pattern of the position in an error message of tomllib
 _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
@@ -35,7 +39,7 @@ class ParsedText(NamedTuple):
 
 
 def read_text(path: str | Path) -> str:
-    """Return the text of a scene file; raise SceneError if it cannot be read."""
+    """Return the text of the scene file `path`; raise SceneError if it cannot be read."""
     try:
         with open_for_reading(path) as file:
             content = file.read(MAX_BYTES + 1)
@@ -63,7 +67,10 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML."""
+    """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML.
+
+    `path` names the file in the message.
+    """
     try:
         values = tomllib.loads(text)
         return ParsedText(values, find_key_lines(text))
@@ -72,7 +79,7 @@ def parse_text(text: str, path: str | Path) -> ParsedText:
 
 
 def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
-    """Return the message on a TOML syntax error."""
+    """Return the message on a TOML syntax error in the text of the file `path`."""
     if isinstance(error, RecursionError):
         return f"{path}:1: not valid TOML: nested too deeply"
     message = str(error)
@@ -89,7 +96,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 
 def _advise_spelling(text: str, line: int) -> str:
-    """Return how to write a value that lacks quotes or a digit in TOML, or "" for other values."""
+    """Return how to write the value in a `line` of a text that lacks quotes or a digit; "" for others."""
     match = _BARE_VALUE_PATTERN.match([*text.split("\n"), ""][line - 1])
     if match is None:
         return ""

@@ -51,7 +51,10 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     weight = (vectors.T @ (scale * forces[is_edge])) ** 2
 
     def remaining_excess(ratio: float) -> float:
-        """Return the excess of the stiffness [N/m] for springs of a compliance relative to their nodes."""
+        """Return how much the stiffness [N/m] exceeds its target with springs of a given compliance.
+
+        `ratio` is the compliance of the springs relative to that of their nodes [1].
+        """
         return excess - float((weight * ratio / (1 + ratio * values)).sum())
 
     # The matrix is positive definite above -1/lambda_max.

@@ -9,7 +9,11 @@ from .shear_modes import N_SHEAR_MODES, find_sufficient_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
-    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] at m nodes in f states."""
+    """Fields at m nodes in f states.
+
+    - traction (f, m): shear traction [Pa].
+    - local_slip (f, m): irreversible slip [m].
+    """
 
     traction: np.ndarray
     local_slip: np.ndarray
@@ -65,10 +69,10 @@ def point_fields(patch, shear, snapshots) -> ShearFields:
     weight = patch.pieces.interface.weight[index]
     traction = np.zeros((len(snapshots), patch.x.size))
     local_slip = np.zeros_like(traction)
-    for i, one in enumerate(snapshots):
-        traction[i, index] = one.forces / weight
-        local_slip[i] = one.slide
-        local_slip[i, index] -= one.stretch + one.bend
+    for i, snapshot in enumerate(snapshots):
+        traction[i, index] = snapshot.forces / weight
+        local_slip[i] = snapshot.slide
+        local_slip[i, index] -= snapshot.stretch + snapshot.bend
     return ShearFields(traction, local_slip)
 
 

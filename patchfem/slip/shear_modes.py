@@ -157,7 +157,10 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
 
 
 def _make_single_element(stiffness: float, points, force) -> JenkinsSet:
-    """Return the element of rigid pieces in series with one spring [N/m], which slip at all nodes together."""
+    """Return one element in series with one spring [N/m], for rigid pieces that slip as a whole.
+
+    `points` (a,) are the nodes of the contact set, and `force` (a,) [N] their yield forces.
+    """
     no_nodes = np.zeros(0, np.int64)
     return JenkinsSet(
         frozen_array([stiffness]),
@@ -232,7 +235,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    """Return quotients, or inf where the denominator is not positive."""
+    """Return numerator / denominator (n,), or inf where the denominator is not positive."""
     infinite = np.full(numerator.size, np.inf)
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
@@ -270,9 +273,11 @@ def _factorise(c: np.ndarray) -> np.ndarray:
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Find the order for `_YieldOrder`: eliminate each node from the inverse of c when it yields.
+    """Find the reverse order (a,) of yielding: eliminate each node from the inverse of c when it yields.
 
     This takes n^3 products in all.
+
+    c (a, a) [m/N] is the shear compliance of the nodes, and `force` (a,) [N] their yield forces.
     """
     inverse = np.linalg.inv(c)
     remaining = force.copy()
@@ -331,7 +336,24 @@ def shear_modes(
 
 
 def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) -> ShearModes:
-    """Return all modes of the nodes that carry load, with the parameters of `shear_modes` but the number of modes."""
+    """Return all modes of the nodes that carry load; `shear_modes` selects from them.
+
+    Parameters
+    ----------
+    tangential : (m, m) ndarray
+        Shear compliance [m/N] of the interface nodes.
+    limit : (m,) ndarray
+        Friction limits [N], 0 outside the contact.
+    bond_length : float
+        Bond length [m].
+    weakening : float
+        Static / kinetic friction coefficient [1].
+
+    Raises
+    ------
+    PatchfemError
+        If the contact could slip suddenly.
+    """
     points = frozen_array(np.flatnonzero(limit > 0), np.int64)
     limit = limit[points]
     # Rigid pieces in series with one spring have only one mode.

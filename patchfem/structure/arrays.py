@@ -65,7 +65,10 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
-    """Read one array of a .npz file; its header is checked first, because NumPy reserves the memory that it states."""
+    """Read the array `name` of a .npz file, whose header is checked first.
+
+    NumPy reserves the memory that the header states, so a damaged file could exhaust it.
+    """
     readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     with file.zip.open(f"{name}.npy") as member:
         shape, _, dtype = readers[npy.read_magic(member)](member)
@@ -74,7 +77,10 @@ def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
 
 
 def _refuse_large(name: str, shape: tuple[int, ...], itemsize: int = MAX_NUMBER_BYTES) -> None:
-    """Raise PatchfemError if an array is larger than the matrices of the largest rig that is allowed."""
+    """Raise PatchfemError if an array is larger than the matrices of the largest permitted rig.
+
+    `name` and `shape` are those of the array, and `itemsize` [bytes] is the size of one number.
+    """
     if prod(shape) * itemsize > MAX_COORDINATES**2 * MAX_NUMBER_BYTES:
         raise PatchfemError(
             f"{name} of shape {'x'.join(map(str, shape))} is larger than {MAX_COORDINATES} coordinates "
@@ -112,6 +118,8 @@ def build_basis(
     PatchfemError
         If an array is missing or wrong; the message names it.
     """
+
+    # Mass and stiffness must be there; interfaces and drive must name coordinates that exist
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
@@ -139,6 +147,7 @@ def build_basis(
             "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
         )
 
+    # A force acts at a numbered coordinate, along the array `force`, or at the output
     force = None
     if is_forced:
         force = np.eye(n)[driven_mass - 1] if driven_mass else data.get("force", output)
@@ -155,7 +164,10 @@ def build_basis(
 
 
 def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
-    """Raise PatchfemError for an array that the file does not contain."""
+    """Raise PatchfemError for the array `missing_name`, which the file does not contain.
+
+    The message lists the names of the arrays in `data`, those that the file contains.
+    """
     names = ", ".join(data) or "none that patchfem knows"
     removed = ""
     if not data.keys().isdisjoint(REMOVED_ARRAYS):
@@ -164,7 +176,10 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
 
 
 def _to_matrix(values, name: str):
-    """Convert a single number to a matrix with one row; return other arrays and None unchanged."""
+    """Convert a single number to a matrix (1, 1); return matrices and None unchanged.
+
+    Raises PatchfemError, which names the array `name`, for other `values`.
+    """
     if values is None or np.ndim(values) == 2:
         return values
     if np.size(values) != 1:

@@ -11,6 +11,7 @@ from .modes import make_basis
 # Smallest squared frequency of an elastic mode relative to the largest one; a mode with a smaller
 # one is rigid
 MIN_ELASTIC_FRACTION = 1e-12
+# Fields of a modal basis that are participations
 PARTICIPATION_FIELDS = (
     "slide",
     "base",
@@ -141,9 +142,16 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
         New modes in the coordinates of `basis`; their largest entries are made positive.
     damper : (n, n) array_like
         Damping matrix [1/s] that is added.
+
+    Returns
+    -------
+    ModalBasis
+        Basis whose coordinates are those of the new modes.
     """
+    # The sign of a mode is free: its largest entry is made positive, so that equal rigs give equal modes.
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], 0)[0]
     shapes = shapes * np.where(largest < 0, -1.0, 1.0)
+    # Entries of the damping matrix within the round-off of these products count as zero.
     size = np.abs(shapes)
     D = shapes.T @ (basis.damping_matrix + damper) @ shapes
     scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size

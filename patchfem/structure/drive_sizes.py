@@ -57,7 +57,10 @@ class DriveKeys(NamedTuple):
 
 
 def count_cycles_per_level(keys) -> float:
-    """Return the integer number of drive cycles per level, so that each level begins with a new cycle."""
+    """Return the number of drive cycles per level, rounded so that each level begins with a new cycle.
+
+    `keys` is a table [drive] that gives `cycles`, or `duration` [s] and `frequency` [Hz], of a level.
+    """
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
@@ -107,6 +110,8 @@ def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
 
     It is the largest of the acceleration over omega, the initial velocities, and the initial
     displacements times omega.
+
+    `drive` is a drive signal, and `start` the initial state, None for a start at rest.
     """
     omega = find_drive_omega(drive)
     speed = find_max_acceleration(drive) / omega

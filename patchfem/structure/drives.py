@@ -28,7 +28,12 @@ from .drive_sizes import DriveKeys, count_cycles_per_level
 
 
 class DriveSignal(Protocol):
-    """Drive signal with the attributes that every drive has."""
+    """Drive signal with the attributes that every drive has.
+
+    - period: duration [s] of a cycle.
+    - moving: whether the displacements are relative to a moving base.
+    - segments: pieces of constants and sines of which the signal consists; () for other signals.
+    """
 
     period: float
     moving: bool
@@ -45,6 +50,9 @@ class PiecewiseDrive:
     - period: duration [s] of a cycle.
     - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
       as a sine need not state it.
+
+    `segments` are the pieces in the order of time; `moving` tells whether the base moves, as for a drive by its
+    acceleration.
     """
 
     segments: tuple[DriveSegment, ...]
@@ -85,7 +93,10 @@ def make_step(acceleration: float, period: float, *, moving: bool = True) -> Pie
 
 
 def make_release(period: float) -> PiecewiseDrive:
-    """Build a drive signal that is zero, for free motion after a release."""
+    """Build a drive signal that is zero, for free motion after a release.
+
+    `period` [s] serves as the length of a cycle, of which such a signal has none of its own.
+    """
     return PiecewiseDrive((DriveSegment(0.0),), period, False)
 
 
@@ -128,6 +139,8 @@ class SweepDrive:
     - acceleration: amplitude [m s-2], unless there is a displacement.
     - displacement: amplitude X [m] of the base displacement, for the acceleration X omega(t)^2.
     - logarithmic: whether the frequency changes by a constant factor, and not increment, per time.
+
+    `moving` tells whether the base moves, as for a drive by its acceleration.
     """
 
     low: float
@@ -195,6 +208,8 @@ class RecordedDrive:
     - value: acceleration, or force over the modal mass, at these times [m s-2].
     - period: duration [s] of a cycle.
     - is_periodic: whether the rows repeat after each period until the signal ends.
+
+    `moving` tells whether the base moves, as for a drive by its acceleration.
     """
 
     time: np.ndarray
@@ -267,6 +282,7 @@ def _build_recorded(drive: DriveKeys) -> RecordedDrive:
     return RecordedDrive(time, scale * value, drive.period, drive.moving)
 
 
+# Function that builds the signal of each waveform of this module
 DRIVE_BUILDERS = {
     "levels": _build_levels,
     "step": _build_step,

@@ -128,9 +128,11 @@ def build_basis(
 
 
 def split_damping(D, omega) -> tuple[np.ndarray, np.ndarray | None]:
-    """Split a modal damping matrix (n, n) [1/s] into damping ratios and the coupling of modes.
+    """Split a modal damping matrix D (n, n) [1/s] into damping ratios and the coupling of modes.
 
     Returns the damping ratios (n,), and D if it couples modes or damps a rigid one, else None.
+
+    `omega` (n,) [rad/s] are the circular frequencies.
     """
     diagonal = np.diag(D)
     zeta = np.divide(diagonal, 2 * omega, out=np.zeros_like(diagonal), where=omega > 0)
@@ -185,7 +187,11 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
 
 
 def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
-    """Compute ascending circular frequencies (n,) [rad/s] and mode shapes (n, n) for a stiffness K."""
+    """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) for a stiffness K [N/m].
+
+    `root` is the Cholesky factor (n, n) of the mass matrix, or its diagonal (n,). The columns of the shapes are
+    eigenvectors y of L^-1 K L^-T; L^-T y is the mode shape of unit modal mass.
+    """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
     min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
@@ -200,7 +206,7 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _require_finite(per_mass) -> np.ndarray:
-    """Raise PatchfemError if the stiffness divided by the mass has overflowed."""
+    """Return the stiffness `per_mass` (n, n) [1/s2]; raise PatchfemError if it has overflowed."""
     if not np.isfinite(per_mass).all():
         raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
     return per_mass
@@ -230,7 +236,10 @@ def _factor_mass(M):
 
 
 def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
-    """Solve a triangular system with the Cholesky factor of the mass matrix."""
+    """Solve L X = right with the Cholesky factor L of the mass matrix, or L^T X = right if `transpose`.
+
+    `root` is L (n, n), or its diagonal (n,) if the mass matrix is diagonal.
+    """
     if root.ndim == 2:
         return solve_triangular(
             root, right, lower=True, trans="T" if transpose else "N", check_finite=False
@@ -240,7 +249,10 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
-    """Return a matrix in full that is symmetric and has the shape of the mass matrix."""
+    """Return a symmetric matrix as a dense array; raise PatchfemError if it is not symmetric.
+
+    `name`, such as "K", stands in the message; `shape` is that of the mass matrix, with which it must agree.
+    """
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
     matrix = symmetrize(matrix, f"{name}")
@@ -252,7 +264,10 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
 
 
 def _project_damping_matrix(phi, C) -> np.ndarray:
-    """Project a damping matrix C on mode shapes; raise PatchfemError if C adds energy."""
+    """Project a damping matrix C [N s/m] on mode shapes phi; raise PatchfemError if C adds energy.
+
+    The columns of phi (n, n) are shapes of unit modal mass, so the result (n, n) is in 1/s.
+    """
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
     values = eigh(D, eigvals_only=True)
@@ -265,7 +280,11 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
 
 
 def _project_damper_rows(phi, damper_rows) -> np.ndarray:
-    """Return the modal damping matrix of individual dampers, which never adds energy."""
+    """Return the modal damping matrix (n, n) [1/s] of individual dampers, which never adds energy.
+
+    The columns of phi (n, n) are shapes of unit modal mass. Each row of `damper_rows` (d, n) is the elongation of a
+    damper per unit of each coordinate, times the square root of its coefficient [N s/m].
+    """
     rates = damper_rows @ phi
     size = np.abs(damper_rows) @ np.abs(phi)
     return trim_round_off(rates.T @ rates, size.T @ size)
@@ -275,6 +294,8 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
     """Rotate mode shapes phi (n, n) of equal frequency so that the damping matrix D does not couple them.
 
     Returns the shapes and D (n, n) in these coordinates.
+
+    `omega` (n,) [rad/s] are the ascending circular frequencies.
     """
     first = 0
     for last in range(1, len(omega) + 1):
@@ -292,7 +313,10 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_row(row, n: int, name: str) -> np.ndarray:
-    """Check that a row has n finite real numbers; `slide` may have several rows."""
+    """Check that a row of numbers has n finite real entries; `slide` may have several rows.
+
+    `name` is that of the row, such as "output", for the message.
+    """
     if name == "slide":
         return read_numbers(row, name, (n,), (None, n))
     is_column = np.ndim(row) == 2 and 1 in np.shape(row)
@@ -303,6 +327,9 @@ def _find_shape_signs(phi, output) -> np.ndarray:
     """Return the sign (n,) of each mode shape that makes the output move in the positive direction.
 
     At a node of the shape the largest entry is made positive instead.
+
+    The columns of phi (n, n) are the shapes, and `output` (n,) is the motion of the output per unit of each
+    coordinate.
     """
     motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]

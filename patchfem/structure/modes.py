@@ -54,6 +54,7 @@ def build_basis(structure, drive_kind: str) -> ModalBasis:
     """
 
     def column(key: str) -> np.ndarray:
+        """Return the value (n,) of one key in the tables of all modes."""
         return np.array([getattr(mode, key) for mode in structure.mode], float)
 
     output = column("accelerometer")

@@ -145,4 +145,5 @@ def _cut_spectrum(
     )
 
 
+# Function that builds the signal of the waveform of this module
 DRIVE_BUILDERS = {"random": _build_random}

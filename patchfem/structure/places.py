@@ -59,6 +59,8 @@ class MeasuredModes:
         PatchfemError
             If the text names no node and direction, or one that the file does not contain.
         """
+
+        # Sum of the motions at all directions that the text names, with their signs
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
             match = DIRECTION_PATTERN.fullmatch(part.strip())
@@ -82,7 +84,10 @@ class MeasuredModes:
 
 
 def _list_directions(motion: Motions) -> str:
-    """Return the first nodes and directions in a file as text for a message."""
+    """Return the first nodes and directions of the shapes in a file as text, such as "3:x, 7:y".
+
+    `motion` has the keys (node, axis).
+    """
     names = [f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)]
     text = ", ".join(names[:MAX_LISTED_NODES])
     n_more = len(names) - MAX_LISTED_NODES
@@ -154,7 +159,10 @@ def build_basis(
 
 
 def note_missing_mass(basis: ModalBasis) -> list[str]:
-    """Return a note if the modes in a file represent too small a part of the moving mass."""
+    """Return a note if the modes of a basis represent too small a part of the moving mass, else [].
+
+    The squares of `basis.base`, the participations of the base, add up to the fraction of the mass that they move [1].
+    """
     mass_fraction = float(np.sum(basis.base**2))
     if mass_fraction >= MIN_MASS_FRACTION:
         return []

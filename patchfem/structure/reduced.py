@@ -45,6 +45,7 @@ MIN_STRAIN = 1e-12
 # Smallest reciprocal condition number of the residual flexibility at the boundary that is not
 # round-off
 MIN_RESIDUAL_FLEXIBILITY = 1e-8
+# Name of the method with fixed-interface modes
 CRAIG_BAMPTON = "craig-bampton"
 
 
@@ -182,7 +183,10 @@ def _project(matrix, shapes, round_off: float) -> np.ndarray:
 
 
 def _refuse_indefinite(matrix, name: str) -> None:
-    """Raise PatchfemError if a principal minor of a matrix is negative."""
+    """Raise PatchfemError if a diagonal entry or a 2 x 2 principal minor of a sparse matrix is negative.
+
+    `name` is "stiffness", "mass" or "damping", for the message.
+    """
     diagonal = matrix.diagonal()
     if (diagonal < 0).any():
         k = int(np.argmin(diagonal))
@@ -221,10 +225,10 @@ def _factorize(K) -> SparseFactor | None:
 def _compute_lowest_modes(
     K, M, count: int, factor: SparseFactor, shift: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the lowest modes of a structure, normalized to unit modal mass.
+    """Compute the `count` lowest modes of a structure, normalized to unit modal mass.
 
-    `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]
-    and shapes (n, m).
+    K (n, n) [N/m] and M [kg] are sparse; `factor` is that of K + shift M, with the shift in 1/s^2. Returns the
+    circular frequencies (m,) [rad/s] and shapes (n, m).
     """
     n = K.shape[0]
     count = min(count, n)
@@ -261,6 +265,9 @@ def _compute_craig_bampton_shapes(
     """Compute fixed-interface modes, constraint modes and the residual static shape for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
+
+    `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of fixed-interface modes,
+    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
     """
     n = K.shape[0]
     n_boundary = boundary.size
@@ -304,6 +311,9 @@ def _compute_free_interface_shapes(
     """Compute free-interface modes, and residual attachment modes for the boundary and for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
+
+    `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of free-interface modes,
+    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
     """
     n = K.shape[0]
     shift = 0.0

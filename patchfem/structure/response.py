@@ -33,6 +33,7 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
     rows_out = np.atleast_2d(rows_out)
     rows_in = np.atleast_2d(rows_in)
     n = basis.omega.size
+    # Uncoupled modes: a sum over the modes
     if basis.damping is None:
         stiffness = basis.omega**2 - omega[:, None] ** 2
         stiffness = stiffness + 2j * omega[:, None] * basis.zeta * basis.omega
@@ -40,6 +41,8 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
         if is_singular.any():
             _refuse_infinite(omega[is_singular][0])
         return np.einsum("on,kn,in->koi", rows_out, 1 / stiffness, rows_in) / basis.mass
+
+    # Coupled modes: one system of equations for each frequency
     each_omega = omega[:, None, None]
     stiffness = np.diag(basis.omega**2) + 1j * each_omega * basis.damping
     stiffness = stiffness - each_omega**2 * np.eye(n)
@@ -52,7 +55,7 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
 
 
 def _refuse_infinite(omega: float) -> None:
-    """Raise PatchfemError if the response is infinite at a circular frequency [rad/s]."""
+    """Raise PatchfemError that the response is infinite at the circular frequency omega [rad/s]."""
     raise PatchfemError(
         f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
         "neither damping nor stiffness there"

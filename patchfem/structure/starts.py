@@ -6,7 +6,7 @@ from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 
 def start_at_rest(basis: ModalBasis) -> InitialState:
-    """Return the initial state at rest without displacement."""
+    """Return the initial state of a modal basis at rest without displacement."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return InitialState(zero, zero)
 
@@ -55,10 +55,10 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
 
 
 def start_from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
-    """Return the state at rest in which a static force at the output displaces the output by a value [m].
+    """Return the state at rest in which a static force displaces the output by `displacement` [m].
 
-    The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
-    moves only these, in proportion to output_i.
+    The force acts there. The coordinates of the modal `basis` are proportional to output_i / omega_i^2. If rigid modes
+    move the output, a force moves only these, in proportion to output_i.
 
     Raises
     ------
@@ -88,6 +88,8 @@ def start_from_base_step(basis: ModalBasis, displacement: float) -> InitialState
     """Return the initial state right after the base has jumped by a displacement X [m]: z = -X base.
 
     The masses have not moved yet, and displacements are relative to the base.
+
+    z are the coordinates of the modal `basis` [m], and base their participations in the motion of the base.
     """
     return InitialState(
         frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size))

@@ -74,7 +74,11 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
 
 
 def count_beat_cycles(frequencies) -> float:
-    """Return the number of cycles of the first tone after which all tones repeat: f_1 / greatest common divisor."""
+    """Return the number of cycles of the first tone after which all tones repeat.
+
+    It is f_1 over the greatest common divisor of the `frequencies` [Hz], which are taken as fractions with a limited
+    denominator.
+    """
     fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]
@@ -89,4 +93,5 @@ def _build_tones(drive: DriveKeys) -> TonesRecord:
     return make_tones(keys.frequencies, keys.accelerations, phases, duration)
 
 
+# Function that builds the signal of the waveform of this module
 DRIVE_BUILDERS = {"tones": _build_tones}

@@ -15,7 +15,12 @@ COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
 
 
 class _ModalNumbers(NamedTuple):
-    """Natural frequency [Hz], damping ratio and modal mass, in the units of the file, of a mode."""
+    """Numbers of a mode.
+
+    - frequency: natural frequency [Hz].
+    - zeta: damping ratio.
+    - modal_mass: modal mass in the units of the file.
+    """
 
     frequency: float
     zeta: float
@@ -102,7 +107,10 @@ def read_universal(path: Path) -> MeasuredModes:
 
 
 def _collect_motion(dataset: Dataset) -> dict[tuple[int, int], float]:
-    """Return the component of a mode shape in each direction (node, axis)."""
+    """Return the components of the mode shape in a dataset 55 by direction (node, axis).
+
+    They have the scale of the file. Axes are 0 to 5: translations along x, y, z and rotations about them.
+    """
     motion = {}
     for axis in range(len(DIRECTION_NAMES)):
         column = dataset.get(f"r{axis + 1}")
@@ -113,9 +121,11 @@ def _collect_motion(dataset: Dataset) -> dict[tuple[int, int], float]:
 
 
 def _read_normal_mode(name: str, dataset: Dataset, notes: list[str]) -> _ModalNumbers:
-    """Return the numbers of a real mode.
+    """Return frequency [Hz], damping ratio and modal mass [kg] of a real mode.
 
     If the viscous damping ratio is missing, it is half the hysteretic damping, and `notes` says so.
+
+    `name` names the mode in notes, and `dataset` has its numbers.
     """
     zeta = dataset["modal_damp_vis"]
     if not zeta and dataset["modal_damp_his"]:
@@ -125,10 +135,12 @@ def _read_normal_mode(name: str, dataset: Dataset, notes: list[str]) -> _ModalNu
 
 
 def _read_complex_mode(name: str, dataset: Dataset) -> _ModalNumbers:
-    """Return the numbers of the real mode nearest to a complex one.
+    """Return frequency [Hz], damping ratio and modal mass [kg] of the real mode nearest to a complex one.
 
     With the eigenvalue s, the circular frequency is |s|, the damping ratio -Re s/|s| and the modal mass
     |modal A|/(2 |Im s|).
+
+    `name` names the mode in messages, and `dataset` has the numbers of the complex one.
     """
     eigenvalue = dataset["eig"]
     if not eigenvalue.imag:
@@ -142,5 +154,5 @@ def _read_complex_mode(name: str, dataset: Dataset) -> _ModalNumbers:
 
 
 def _rotate_to_real(values):
-    """Rotate the phase of a complex mode shape so that the sum of its squares is real and positive."""
+    """Rotate the phase of complex values (k,) of a mode shape so that the sum of their squares is positive."""
     return values * np.exp(-0.5j * np.angle(np.sum(values**2)))

@@ -10,9 +10,9 @@ from .profile import Profile, robust_deviation
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
 SPIKE_WINDOW = 5  # side of the square of the median
-PLACES_RANK_TOL = (
-    1e-6  # singular value of the places relative to the largest one, below which it is round-off
-)
+# Singular value of the places of heights, relative to the largest one, below which it is round-off and they lie in one
+# line
+PLACES_RANK_TOL = 1e-6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,7 +38,7 @@ class Areal:
 
 
 def fill_nearest(z) -> np.ndarray:
-    """Give missing heights (NaN) of a map (m, n) the value of the nearest measured point."""
+    """Give missing heights (NaN) of a map z (m, n) the value of the nearest measured point."""
     from scipy.ndimage import distance_transform_edt
 
     missing = np.isnan(z)
@@ -49,7 +49,7 @@ def fill_nearest(z) -> np.ndarray:
 
 
 def find_scan_spikes(scan: Areal) -> np.ndarray:
-    """Return a mask (m, n) of heights far from the median of the 5 x 5 around them, in small groups.
+    """Return a mask (m, n) of spikes of a scan: small groups far from the median of the 5 x 5 around.
 
     A larger group is a feature of the surface; the threshold rises until the groups are small.
     """
@@ -69,7 +69,7 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
 
 
 def level(surface: Profile | Areal) -> Profile | Areal:
-    """Subtract the least-squares line from the measured heights of a trace, or the plane from those of a scan.
+    """Subtract the least-squares line (trace) or plane (scan) from the heights of a surface.
 
     Raises PatchfemError if the measured heights do not determine it, such as all of them in one line.
     """

@@ -18,7 +18,7 @@ MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
 
 
 def is_note(text: str) -> bool:
-    """Return whether a sentence on a trace is a note rather than a warning."""
+    """Return whether the text of a sentence on a trace is a note rather than a warning."""
     return any(words in text for words in NOTES)
 
 
@@ -59,9 +59,9 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     first = max(int(np.searchsorted(known, x[0], "right")) - 1, 0)
     last = min(int(np.searchsorted(known, x[-1], "left")), known.size - 1)
     places = profile.x + shift
-    kept = (places >= known[first]) & (places <= known[last])
+    is_kept = (places >= known[first]) & (places <= known[last])
 
-    step = float(np.median(np.diff(places[kept])))
+    step = float(np.median(np.diff(places[is_kept])))
     element = float(np.diff(x).max())
     if step > MAX_STEP_ELEMENTS * element:
         notes += (
@@ -69,7 +69,7 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
             f"{format_length(element)} long; the surface between samples is interpolated",
         )
     return replace(
-        profile, x=frozen_array(places[kept]), z=frozen_array(profile.z[kept]), notes=notes
+        profile, x=frozen_array(places[is_kept]), z=frozen_array(profile.z[is_kept]), notes=notes
     )
 
 
@@ -114,14 +114,20 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
 
 
 def _covers(places, x) -> bool:
-    """Return whether a trace ends at most half an element inside the patch."""
+    """Return whether a trace ends at most half an element inside the patch.
+
+    `places` [m] are the samples of the trace, and x (m,) [m] the nodes of the patch.
+    """
     first = x[0] + MAX_MISSING_ELEMENTS * (x[1] - x[0])
     last = x[-1] - MAX_MISSING_ELEMENTS * (x[-1] - x[-2])
     return bool(places[0] <= first and places[-1] >= last)
 
 
 def _require_cover(source: str, places, x) -> None:
-    """Raise PatchfemError if a trace does not cover the patch."""
+    """Raise PatchfemError if a trace does not cover the patch.
+
+    `source` names the trace, `places` [m] are its samples, and x (m,) [m] are the nodes of the patch.
+    """
     if _covers(places, x):
         return
     if np.ptp(places) < np.ptp(x):

@@ -18,7 +18,9 @@ SPIKE_DEVIATIONS = 8.0
 FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
-CHUNK = 131_072  # number of medians that are computed at a time, which limits the memory
+MEDIANS_PER_CHUNK = (
+    131_072  # number of medians that are computed at a time, which limits the memory
+)
 MAX_TRACE_SAMPLES = (
     2_097_152  # largest number of samples in a resampled trace, which limits the memory
 )
@@ -57,12 +59,12 @@ class Profile:
 
 
 def measure_step(axis: np.ndarray) -> float:
-    """Return the mean distance [m] of neighbouring positions (n,) [m]."""
+    """Return the mean distance [m] of neighbouring positions (n,) [m] along an axis."""
     return float(axis[-1] - axis[0]) / (axis.size - 1)
 
 
 def resample_evenly(profile: Profile) -> Profile:
-    """Resample a trace to a constant sampling interval, with gaps closed, for filters and spectra.
+    """Resample a profile to a constant sampling interval, with gaps closed, for filters and spectra.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
@@ -84,9 +86,11 @@ def resample_evenly(profile: Profile) -> Profile:
 
 
 def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
-    """Replace all but the usable heights by straight lines, and cut off such ends; a note counts missing heights.
+    """Replace all but the usable heights of a profile by straight lines, and cut off such ends.
 
     Raises PatchfemError for fewer than two usable heights, and if a line is longer than `max_gap` [m].
+
+    `usable` (n,) is a mask. A note of the returned profile counts the missing heights.
     """
     places = profile.x[usable]
     if places.size < 2:
@@ -153,6 +157,7 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
     Parameters
     ----------
     z : (n,) array [m]
+        Heights without gaps.
     window : int
         Number of samples of the median; those at an end have the first or the last window.
     floor : float
@@ -167,8 +172,8 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
     windows = np.lib.stride_tricks.sliding_window_view(z, window)
     median = np.empty(len(windows))
     spread = np.empty(len(windows))
-    for start in range(0, len(windows), CHUNK):
-        part = slice(start, start + CHUNK)
+    for start in range(0, len(windows), MEDIANS_PER_CHUNK):
+        part = slice(start, start + MEDIANS_PER_CHUNK)
         median[part] = np.median(windows[part], axis=1)
         spread[part] = np.median(np.abs(windows[part] - median[part, None]), axis=1)
     place = np.clip(np.arange(z.size) - window // 2, 0, z.size - window)
@@ -177,7 +182,7 @@ def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.nda
 
 
 def find_spikes(profile: Profile) -> np.ndarray:
-    """Return a mask (n,) of heights that deviate too much from the median of their neighbours.
+    """Return a mask (n,) of heights of a profile far from the median of their neighbours.
 
     The standard deviation is 1.4826 times the largest of the median absolute deviation in the
     window, its median over all windows, and the smallest step between two heights (coarse digits).
@@ -195,7 +200,7 @@ def find_spikes(profile: Profile) -> np.ndarray:
 
 
 def remove_spikes(profile: Profile) -> Profile:
-    """Mark spikes, dropouts and specks of dust as not measured.
+    """Mark spikes, dropouts and specks of dust of a profile as not measured.
 
     Spikes and dropouts are those of `find_spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A
@@ -234,6 +239,6 @@ def robust_deviation(values) -> float:
 
 
 def find_runs(flags) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of true values."""
+    """Return the first and the last index of each run of true values in `flags` (n,)."""
     changes = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(first, stop - 1) for first, stop in changes.reshape(-1, 2).tolist()]

@@ -22,7 +22,11 @@ ELEMENTS_PER_CURVE = (
 
 
 class WaveSpectrum(NamedTuple):
-    """Mean squares (n,) [m2] of the waves (n,) [m] of a trace, longest first; waves[0] is twice its length."""
+    """Spectrum of a trace.
+
+    - waves (n,): wavelengths [m], longest first; the first one is twice the length of the trace.
+    - power (n,): mean square [m2] of each wave.
+    """
 
     waves: np.ndarray
     power: np.ndarray
@@ -46,7 +50,7 @@ class WaveSpectrum(NamedTuple):
         return float(np.sqrt(lost / total)) if total > 0 else 0.0
 
     def element_length(self, kept: float) -> float:
-        """Return the longest element [m] that resolves a given fraction of the rms height."""
+        """Return the longest element [m] that resolves the fraction `kept` of the rms height."""
         lost = (
             np.cumsum(self.power[::-1])[::-1] / self.power.sum()
         )  # in this wave and all shorter ones
@@ -63,6 +67,7 @@ class WaveSpectrum(NamedTuple):
         Parameters
         ----------
         element : float [m]
+            Length of an element of the mesh.
         strain : float
             Mean pressure over combined modulus, p/E*.
 
@@ -81,12 +86,13 @@ class WaveSpectrum(NamedTuple):
 
 
 def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum:
-    """Compute the spectrum of a levelled trace by a discrete cosine transform.
+    """Compute the spectrum of a levelled profile by a discrete cosine transform.
 
-    The mirror image of the trace continues it without a jump, so the ends add no false short waves,
-    as those of a Fourier series do. The mean squares add up to that of the trace by the trapezoidal
-    rule. With the window of Hann, whose mean square is 3/8, the ends have no kinks either, which blur a single wave, but
-    count less than the middle. Uneven samples are first resampled. Raises PatchfemError for missing heights.
+    The mirror image of the trace continues it without a jump, so the ends add no false short waves, as those of a
+    Fourier series do. The mean squares add up to that of the trace by the trapezoidal rule. If it is tapered
+    (`is_tapered`) with the window of Hann, whose mean square is 3/8, the ends have no kinks either, which blur a
+    single wave, but count less than the middle. Uneven samples are first resampled. Raises PatchfemError for missing
+    heights.
     """
     from scipy.fft import dct
 
@@ -104,7 +110,7 @@ def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum
 
 
 def describe_lost_waves(profile: Profile, element: float) -> str | None:
-    """Return a warning that elements [m] are too long to resolve a trace, or None if they are not."""
+    """Return a warning that elements [m] are too long to resolve a profile, or None if they are not."""
     spectrum = wave_spectrum(profile)
     length = ELEMENTS_PER_WAVE * element
     lost = spectrum.lost_fraction(length)

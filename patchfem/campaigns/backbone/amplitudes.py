@@ -33,7 +33,10 @@ MAX_FORCE_STEPS = 8  # largest number of interpolations towards the amplitude of
 
 
 def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
-    """Return amplitudes (k,) [m] from full stick to nearly free motion of all modes, closer where a curve changes fast."""
+    """Return amplitudes (k,) [m] at the output from full stick to nearly free motion of modes.
+
+    `joints` are the modes with their contact. The amplitudes lie closer where a curve changes fast.
+    """
     ends = np.array([_default_range(joint) for joint in joints])
     low, high = ends[:, 0].min(), ends[:, 1].max()
     high = min(high, *(joint.model.rig.springs.travel for joint in joints))
@@ -47,7 +50,7 @@ def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
 
 
 def _default_range(joint: JointMode) -> tuple[float, float]:
-    """Return the smallest and largest default amplitude [m] of a mode."""
+    """Return the smallest and largest default amplitude [m] at the output of a mode (`joint`)."""
     travel = joint.model.rig.springs.travel
     if joint.is_linear:
         high = min(MAX_LINEAR_AMPLITUDE, travel)
@@ -58,7 +61,7 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
 
 
 def _default_slides(joint: JointMode) -> tuple[float, float]:
-    """Return the smallest and largest relative displacement [m] of the default amplitudes."""
+    """Return the smallest and largest relative displacement [m] of the default amplitudes of a joint."""
     stiffness = joint.stiffness[joint.face]
     deflection = joint.deflection if joint.friction_limit else 0.0
     if 0 < stiffness < np.inf or not deflection:
@@ -68,7 +71,7 @@ def _default_slides(joint: JointMode) -> tuple[float, float]:
 
 
 def _max_amplitude(joint: JointMode) -> float:
-    """Return the largest default amplitude [m], limited by the stop and by a cubic spring."""
+    """Return the largest default amplitude [m] of a joint, limited by the stop and by a cubic spring."""
     springs = joint.model.rig.springs
     travel = springs.travel / TRAVEL_FACTOR
     if not springs.cubic:
@@ -80,7 +83,11 @@ def _max_amplitude(joint: JointMode) -> float:
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
-    """Return the curve of the recommended method without errors, with few harmonics; None if there is none."""
+    """Return the curve of a joint by the first method that has one, without errors; None without one.
+
+    `amplitudes` (k,) [m] are those at the output. The methods are harmonic balance with few harmonics, then
+    quasi-static loops.
+    """
     joint = joint._replace(has_errors=False)
     few_harmonics = balance.HARMONIC_COUNTS[:1]
     for compute in (
@@ -137,7 +144,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
 
 
 def _join(curve: Curve, other: Curve) -> Curve:
-    """Return two curves as one with increasing amplitudes."""
+    """Return a curve and the other one as one with increasing amplitudes."""
     joined = Curve(*(np.concatenate(pair) for pair in zip(curve, other)))
     return joined.at(np.argsort(joined.amplitude))
 
@@ -185,19 +192,19 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     # interpolation in logarithms; each step adds the points that it found
     tolerance = 1e-2 * joint.model.accuracy.tolerance
     for _ in range(MAX_FORCE_STEPS):
-        found = np.array([_interpolate_amplitude(known, force) for force in forces])
-        new = _estimate_forces(joint, np.unique(found))
-        reached = np.interp(found, new.amplitude, new.force)
+        amplitudes_of_forces = np.array([_interpolate_amplitude(known, force) for force in forces])
+        new = _estimate_forces(joint, np.unique(amplitudes_of_forces))
+        reached = np.interp(amplitudes_of_forces, new.amplitude, new.force)
         if np.all(np.abs(reached - forces) <= tolerance * forces):
             break
         known = _join(known, new)
-    return found
+    return amplitudes_of_forces
 
 
 def _estimate_forces(joint: JointMode, amplitudes) -> Curve:
-    """Return the points of `estimate_curve` that have a positive force.
+    """Return the estimated curve of a joint at amplitudes (k,) [m], where its force is above 0.
 
-    Raises PatchfemError if there are none.
+    Raises PatchfemError if there are no such points.
     """
     curve = estimate_curve(joint, amplitudes)
     if curve is not None:

@@ -26,7 +26,9 @@ N_LINEAR_STEPS = 200
 # MAX_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
 MIN_MODE_ENERGY = 0.5
 MAX_DEVIATION = 0.6
+# Reason why a mode has no curve
 NO_FREE_MOTION = "no free motion of these amplitudes was found"
+# Reason why an overdamped mode has no curve
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
 
@@ -45,6 +47,11 @@ def compute_balance_curve(
         At the output [m], increasing.
     counts : tuple of int
         Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
+
+    Returns
+    -------
+    Curve
+        Frequency, damping ratio, loss and force with their errors, at the amplitudes at which the mode oscillates.
     """
     if joint.is_linear:
         return compute_constant_curve(joint, amplitudes)
@@ -222,9 +229,21 @@ def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> boo
 
 
 def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
-    """Compute the backbone of a mode under rigid friction in closed form.
+    """Compute the backbone of a mode under rigid friction (set-valued, without stick stiffness).
 
     It begins at the amplitude above which the motion does not stop within a cycle.
+
+    Parameters
+    ----------
+    joint : JointMode
+        Mode with a contact of one interface.
+    amplitudes : (k,) array
+        Amplitudes at the output [m].
+
+    Returns
+    -------
+    Curve
+        Only the amplitudes above which the motion does not stop within a cycle.
     """
     model = joint.model
     modes = joint.modes
@@ -282,7 +301,10 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
 
 
 def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:
-    """Return frequency and damping of a mode of a linear rig, the same at all amplitudes (k,) [m]."""
+    """Return the backbone of a mode of a linear rig, the same at all amplitudes (k,) [m].
+
+    `joint` is the mode. The force of phase resonance grows in proportion to the amplitude.
+    """
     modes = joint.modes
     omega, zeta = _sustain_linear_motion(joint, np.eye(modes.omega.size))
     if omega is None:
@@ -305,6 +327,9 @@ def _sustain_linear_motion(
     """Return the frequency omega [rad/s] and zeta of a linear motion z'' + (D - 2 zeta omega E) z' + Omega^2 z = 0.
 
     Both are None if the mode does not oscillate, or if no such motion of the mode is found. excitation: E (n, n).
+
+    E is the distribution of a negative damping that sustains the motion of the mode of the `joint`; D and Omega are
+    the damping matrix and the natural frequencies.
     """
     rate = 0.0
     for _ in range(N_LINEAR_STEPS):
@@ -322,7 +347,7 @@ def _sustain_linear_motion(
 def _find_mode_eigenvalue(joint: JointMode, negative_damping: np.ndarray) -> complex:
     """Return the eigenvalue of z'' + (D - G) z' + Omega^2 z = 0 that belongs to the mode.
 
-    Its eigenvector has the largest component of the mode. negative_damping: G (n, n) [1/s].
+    `joint` tells the mode, whose component is largest in the eigenvector. negative_damping: G (n, n) [1/s].
     """
     modes = joint.modes
     n = modes.omega.size

@@ -13,6 +13,7 @@ from ...runs.rig import decays
 FIRST_CYCLES = 3.0
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
 MAX_LOOP_CYCLES = 192.0
+# Measures of a friction loop from which a backbone follows
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
@@ -44,6 +45,11 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
         Amplitude of the sinusoidal displacement [m].
     frequency : float
         Frequency of the displacement [Hz].
+
+    Returns
+    -------
+    SteadyLoop
+        The last run, its settings, and the change by the later half of the cycles.
     """
     tolerance = model.accuracy.tolerance
     rested = replace(decays.with_automatic_method(model), kind="bench", rig=None)

@@ -31,7 +31,7 @@ from .records import (
     make_band,
 )
 
-CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
+CURVE_FUNCTIONS = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_RATIO = 4.0
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
@@ -54,6 +54,7 @@ class Levels(NamedTuple):
     forces: Sequence[float] = ()
 
 
+# Levels of a backbone for which the user gives neither amplitudes nor forces
 DEFAULT_LEVELS = Levels()
 
 
@@ -143,6 +144,11 @@ def compute_backbones(
     levels : Levels
         Amplitudes, or forces at the output, of the points.
 
+    Returns
+    -------
+    list of Backbone
+        One for each model, in their order.
+
     Raises
     ------
     PatchfemError
@@ -175,7 +181,26 @@ def _merge(amplitudes) -> np.ndarray:
 
 
 def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Backbone:
-    """Compute the backbone of a joint at amplitudes (k,) [m] by given methods."""
+    """Compute the backbone of a joint at amplitudes (k,) [m] by given methods.
+
+    Parameters
+    ----------
+    joint : JointMode
+        Mode with its contact.
+    mode : str
+        Name of the mode.
+    amplitudes : (k,) array
+        Amplitudes at the output [m].
+    methods : iterable of str
+        Keys of CURVE_FUNCTIONS.
+    progress : callable or None
+        Called with the name of each method before it begins.
+
+    Returns
+    -------
+    Backbone
+        A method that fails has its reason in `missing`.
+    """
     model = joint.model
     if amplitudes[-1] > model.rig.springs.travel:
         raise PatchfemError(
@@ -189,19 +214,21 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
     if joint.has_errors and model.rig.structure.richer_rig is not None:
         richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
 
+    # A method that fails leaves its reason in place of a curve
     curves = {}
     missing = {}
     for method in methods:
         if progress is not None:
             progress(method)
         try:
-            curve = CURVES[method](joint, amplitudes)
+            curve = CURVE_FUNCTIONS[method](joint, amplitudes)
             if richer is not None:
-                curve = _widen_by_missing_modes(curve, CURVES[method](richer, amplitudes))
+                curve = _widen_by_missing_modes(curve, CURVE_FUNCTIONS[method](richer, amplitudes))
             curves[method] = curve
         except (NotConverged, PatchfemError) as reason:
             missing[method] = str(reason).removeprefix("backbone: ")
 
+    # What follows from the curves: exponents of the loss, the amplitude of flutter, the band of both methods
     exponents = LossExponents()
     if not joint.is_linear:
         exponents = _fit_exponents(joint, curves.get("quasi-static", curves.get("balance")))
@@ -243,7 +270,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
 
 
 def _main_mode_name(joint: JointMode) -> str:
-    """Return the name of the structural mode with the largest component in the coordinate."""
+    """Return the name of the structural mode with the largest component in the mode of a joint."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
         return f"{joint.mode + 1}"
@@ -252,7 +279,7 @@ def _main_mode_name(joint: JointMode) -> str:
 
 
 def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
-    """Return the frequencies [Hz] of a mode without its contact and with a sticking contact.
+    """Return the frequencies [Hz] of the mode of a joint without its contact and with it stuck.
 
     The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
     uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
@@ -262,7 +289,10 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     modes = joint.modes
 
     def find(rows, stiffness: float) -> float:
-        """Return the frequency [Hz] of the mode `joint.mode` if springs [N/m] hold the interfaces of the given rows."""
+        """Return the frequency [Hz] of the mode if springs of a stiffness [N/m] hold given interfaces.
+
+        `rows` (i, n) are their relative displacements per unit of each modal coordinate.
+        """
         return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
 
     free = modes.omega[joint.mode] / (2 * np.pi)
@@ -286,11 +316,13 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
 
 
 def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
-    """Fit the exponents of energy loss over amplitude in micro-slip and in gross slip.
+    """Fit the exponents of energy loss over amplitude of a curve in micro-slip and in gross slip.
 
     In micro-slip it is the slope from the first to the last point, in gross slip that of the last
     two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
     energy.
+
+    `joint` gives the amplitude at which the whole contact slips.
     """
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
         return LossExponents()
@@ -319,7 +351,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:
-    """Find the largest amplitude [m] at which the damping changes from positive to negative.
+    """Find the largest amplitude [m] at which the damping of a joint changes from positive to negative.
 
     A curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
     which is a straight line under Coulomb friction, computes further points of the same curve. It
@@ -339,7 +371,7 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
 
     def net_loss(log_amplitude: float) -> float:
         """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
-        point = CURVES[method](joint, np.exp([log_amplitude]))
+        point = CURVE_FUNCTIONS[method](joint, np.exp([log_amplitude]))
         return point.damping[0] * point.amplitude[0]
 
     try:

@@ -15,10 +15,13 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
-MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
+# Largest sum, over all modes, of the fractions of stiffness that a joint is assumed to contribute
+MAX_JOINT_FRACTION = 0.5
+# Note on a table of the scene that a backbone ignores
 IGNORED_TABLE_NOTE = (
     "[{table}] is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
 )
+# Note on modes whose `slide` is not given
 ASSUMED_SIGNS_NOTE = (
     "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
     "move the output in the same direction; the curves of all methods depend on this assumption, so give the signs of "
@@ -51,6 +54,11 @@ def prepare_model(
         the scene.
     sets : tuple of str
         Assignments "table.key=value" that change the scene.
+
+    Returns
+    -------
+    PreparedModel
+        Model, and notes on what was assumed and ignored.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, sets)
@@ -81,7 +89,10 @@ def prepare_model(
 
 
 def _find_sticking_stiffness(model: Model) -> float | None:
-    """Return the stiffness [N/m] of the sticking contact of a rig with a single interface; None if it is rigid."""
+    """Return the stiffness [N/m] of the sticking contact of a model with a single interface.
+
+    It is None if the contact is rigid, or if there is not exactly one interface.
+    """
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
         return None
@@ -121,7 +132,11 @@ def _assumed_fraction(n_modes: int) -> float:
 def _note_modes(
     modes: tuple[GivenMode, ...], *, is_assumed: bool, is_stuck: bool
 ) -> tuple[str, ...]:
-    """Return notes on modes that are not given in the scene."""
+    """Return notes on modes that are not given in the scene.
+
+    The modes stand for a scene without mode if `is_assumed`, else they were given beside it; `is_stuck` tells whether
+    their frequencies are those with a stuck contact.
+    """
     names = ", ".join(_describe_mode(mode) for mode in modes)
     place = "with the contact stuck" if is_stuck else "without the contact"
     if not is_assumed:

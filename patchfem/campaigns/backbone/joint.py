@@ -24,7 +24,9 @@ from .bench_loops import compute_steady_loop
 MIN_AMPLITUDE_FACTOR = 1e-2
 # Fraction of the gross-slip amplitude at which there is no slip at all.
 STUCK_FRACTION = 1e-5
+# End of the message where another method has a curve
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
+# Reason why the friction loop of a law has no closed form
 NO_CLOSED_FORM = (
     "the friction loop of bonds has a closed form only with reading = "
     '"stretch", order = 1, a constant bond length and pieces that are rigid in shear'
@@ -48,6 +50,7 @@ class JointMode(NamedTuple):
     Attributes
     ----------
     model : Model
+        Model with the rig and its contact.
     patch : Patch or None
         Pressed patch of [contact].
     coarser : tuple
@@ -55,6 +58,7 @@ class JointMode(NamedTuple):
     mode : int
         Index of the coordinate of the mode.
     stuck_mode : StuckMode
+        Frequency and shape of the mode while nothing slips.
     stiffness : (i,) array
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
@@ -182,7 +186,7 @@ class JointMode(NamedTuple):
         return self.friction_limit / stiffness if stiffness else self.deflection
 
     def output_amplitude(self, slide):
-        """Return the amplitude at the output [m] for a relative displacement amplitude [m]."""
+        """Return the amplitude at the output [m] for a relative displacement amplitude `slide` [m]."""
         return self.reach / (abs(self.face_slide) or 1.0) * slide
 
     @property
@@ -208,7 +212,10 @@ class JointMode(NamedTuple):
             raise PatchfemError(NO_CLOSED_FORM + advice) from None
 
     def require_steady_loops(self, method: str) -> None:
-        """Raise PatchfemError if the free motion does not follow from steady friction loops."""
+        """Raise PatchfemError if the free motion does not follow from steady friction loops.
+
+        `method` names what cannot be computed, in the message.
+        """
         model = self.model
         reason = ""
         if model.grooves is not None:
@@ -242,6 +249,8 @@ class JointMode(NamedTuple):
         error = 0.0
         if not self.has_errors or not (self.has_cells or self.has_partial_slip):
             return error
+
+        # Change of the quantity on a coarser mesh, and with neighbouring cells of sliders joined
         group = self.steady_laws()
         if self.has_partial_slip:
             error = error + decays.estimate_mesh_error(
@@ -276,6 +285,11 @@ def build_joint(model: Model, name: str) -> JointMode:
         Of a rig.
     name : str
         Name of the mode, or its number from 1 in a rig of masses; "" for the first mode.
+
+    Returns
+    -------
+    JointMode
+        Mode, pressed patch on several meshes, and stiffness of the stuck contact.
 
     Raises
     ------
@@ -314,7 +328,7 @@ def build_joint(model: Model, name: str) -> JointMode:
 
 
 def _check_mode(joint: JointMode) -> None:
-    """Raise PatchfemError if a mode has no backbone."""
+    """Raise PatchfemError if the mode of a joint has no backbone."""
     model = joint.model
     modes = joint.modes
     rig = model.rig
@@ -348,10 +362,11 @@ def _check_mode(joint: JointMode) -> None:
 
 
 def _find_mode(rig, name: str) -> int:
-    """Return the index of the coordinate of a mode; "" is the first mode of the scene."""
+    """Return the index of the coordinate of the mode `name` of a rig; "" is the first mode."""
     modes = rig.modes
     names = list(rig.modes.names)
     count = modes.omega.size
+    # Computed modes have numbers, listed ones have names.
     if not rig.structure.lists_modes:
         if not name:
             return int(np.argmax(modes.omega > 0))

@@ -21,9 +21,10 @@ MIN_FLOOR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
-    """Compute the quasi-static backbone of a mode at amplitudes (k,) [m] from the loops of its contact.
+    """Compute the quasi-static backbone of the mode of a joint at amplitudes (k,) [m].
 
-    Loops without a closed form are computed on a bench. Raises NotConverged or PatchfemError if there is no curve.
+    It follows from the steady friction loops of the contact; loops without a closed form are computed on a bench, that
+    is, under a prescribed slide. Raises NotConverged or PatchfemError if there is no curve.
     """
     if joint.is_linear:
         return compute_constant_curve(joint, amplitudes)
@@ -46,7 +47,10 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
         return _compute_from_bench_loops(joint, amplitudes)
 
     def tabulate(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup."""
+        """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup.
+
+        `samples` is the number of samples of a loop.
+        """
         return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)
 
     # The sampling error is the change from half the samples.
@@ -80,7 +84,10 @@ def _select_rising_part(best, error) -> Curve:
 
 
 def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
-    """Compute the curve of a single interface in closed form; None if its law has no closed form."""
+    """Compute the curve of a joint with one interface at amplitudes (k,) [m] in closed form.
+
+    It is None if the law has no closed form.
+    """
     model = joint.model
     modes = joint.modes
     is_soft = (
@@ -116,7 +123,7 @@ def _compute_from_loops(
 ) -> np.ndarray:
     """Compute amplitude, frequency, damping, loss and force (5, k) from hysteresis loops.
 
-    The loops have displacement amplitudes (k,) [m].
+    The loops have displacement amplitudes `slides` (k,) [m], and `joint` is the mode.
     """
     modes = joint.modes
     statics = quasi_static.find_static_motions_from_loops(
@@ -126,7 +133,10 @@ def _compute_from_loops(
 
 
 def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
-    """Compute the curve from steady bench loops of the contact at the frequency of the mode."""
+    """Compute the curve of a joint at amplitudes (k,) [m] from steady loops on a bench.
+
+    On a bench the slide of the contact is prescribed, here as a sine with the frequency of the mode.
+    """
     slides = joint.slides(amplitudes)
     patches = [joint.patch]
     if joint.coarse is not None:

@@ -50,7 +50,7 @@ class Curve(NamedTuple):
 
 
 def make_curve(amplitude, values, errors) -> Curve:
-    """Make a curve from values and errors (4, k) or (5, k).
+    """Make a curve over amplitudes (k,) [m] from values and errors (4, k) or (5, k).
 
     The rows are frequency [Hz], damping ratio, loss [J], force [N] and, if it differs, the frequency of the force [Hz].
     """
@@ -60,7 +60,7 @@ def make_curve(amplitude, values, errors) -> Curve:
 
 
 def match_amplitudes(curve: Curve, other: Curve) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the common amplitudes of two curves, for each of them."""
+    """Return the indices of the common amplitudes of a curve and another one, for each of them."""
     distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
     return np.nonzero(distance < EQUAL_AMPLITUDE_TOL)
 
@@ -98,11 +98,11 @@ def make_band(curves: dict[str, Curve]) -> Band | None:
         low = getattr(curve, name) - getattr(curve, f"{name}_error")
         high = getattr(curve, name) + getattr(curve, f"{name}_error")
         for other in curves.values():
-            here, there = match_amplitudes(curve, other)
-            value = getattr(other, name)[there]
-            error = getattr(other, f"{name}_error")[there]
-            low[here] = np.fmin(low[here], value - error)
-            high[here] = np.fmax(high[here], value + error)
+            indices, other_indices = match_amplitudes(curve, other)
+            value = getattr(other, name)[other_indices]
+            error = getattr(other, f"{name}_error")[other_indices]
+            low[indices] = np.fmin(low[indices], value - error)
+            high[indices] = np.fmax(high[indices], value + error)
         limits += low, high
     return Band(method, curve.amplitude, *limits)
 
@@ -145,14 +145,17 @@ class Backbone(NamedTuple):
     mode : str
         Name of the mode.
     frequencies : ModeFrequencies
+        Frequencies [Hz] without the contact, and with a sticking one.
     curves : dict of Curve
         By method.
     missing : dict of str
         By method, the reason why it has no curve.
     exponents : LossExponents
+        Exponents of the energy loss in micro-slip and in gross slip.
     flutter : float or None
         Amplitude [m] above which the mode gains energy.
     notes : tuple of str
+        Sentences for the user, such as on what the curves leave out.
     band : Band or None
         None without a curve, or without errors.
     advice : tuple of str

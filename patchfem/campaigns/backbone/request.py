@@ -67,6 +67,11 @@ def compute_cases(
     progress : callable, optional
         Takes the name of a method that begins.
 
+    Returns
+    -------
+    BackboneCases
+        Backbones, one for each value of the key `over`.
+
     Raises
     ------
     PatchfemError
@@ -74,6 +79,8 @@ def compute_cases(
     SceneError
         If the scene is invalid with a value of the key.
     """
+
+    # Amplitudes or forces at which curves are wanted, and the values of another key
     methods = choose_methods(request.method)
     if request.amplitudes and request.forces:
         raise PatchfemError("--amplitudes and --forces: give only one of them")
@@ -90,6 +97,7 @@ def compute_cases(
         axis = axes[0]
         changes = [(f"{axis.key}={text}",) for text in axis.texts]
 
+    # A model for each value of the other key
     prepared = []
     for sets in changes:
         try:
@@ -105,6 +113,8 @@ def compute_cases(
                 prefix = "--over: " if key_end in text else "--set: "
                 mistakes.append(text.replace("--set: ", prefix, 1))
             raise SceneError(mistakes) from None
+
+    # All curves at common amplitudes
     models = [case.model for case in prepared]
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
     for k, case in enumerate(prepared):

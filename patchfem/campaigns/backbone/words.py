@@ -10,18 +10,22 @@ from .records import ROUND_OFF_ERROR, Backbone, Curve
 MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 # Smallest shift of the phase resonance by other modes that is reported, in half-widths of the resonance.
 MIN_REPORTED_RATIO = 0.05
+# Beginning of a note on a curve without error of the mesh
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
+# Reason why a curve has no value at some amplitudes, by method
 REASONS_OF_GAPS = {
     "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
     "smaller amplitudes, or the mode may stop oscillating",
     "quasi-static": "the static curve does not reach these amplitudes",
 }
-PURPOSES = {
+# What the curve of each method is for
+METHOD_PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
 }
+# Advice if no method has a curve
 NO_CURVE = (
     "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
     'drive.kind = "free".'
@@ -29,7 +33,7 @@ NO_CURVE = (
 
 
 def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, ...]:
-    """Write notes on the removed joint, on gaps and differences of the curves, and on what the errors leave out.
+    """Write notes on a backbone: removed joint, gaps of the curves, what the errors leave out.
 
     amplitudes: requested ones (k,) [m].
     """
@@ -50,7 +54,7 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
 
 
 def _note_missing_mesh(joint: JointMode) -> list[str]:
-    """Return a list of notes on a contact with partial slip and without a coarser mesh."""
+    """Return a list of notes on a joint with partial slip and without a coarser mesh."""
     model = joint.model
     if not model.partial_slip or joint.coarse is not None:
         if not model.rig.friction.has_partial_slip or faces.has_error_meshes(model):
@@ -62,7 +66,10 @@ def _note_missing_mesh(joint: JointMode) -> list[str]:
 
 
 def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[str]:
-    """Return a list of notes on the amplitudes of a curve whose force in phase resonance is not known."""
+    """Return a list of notes on amplitudes of a curve whose force in phase resonance is not known.
+
+    `joint` is the mode, and `method` the name of the method of the curve.
+    """
     missing = curve.amplitude[np.isnan(curve.force)]
     if not missing.size:
         return []
@@ -78,7 +85,7 @@ def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[st
 
 
 def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
-    """Return a list of notes on the amplitudes (k,) [m] at which a curve has no value."""
+    """Return a list of notes on amplitudes (k,) [m] at which the curve of a method has no value."""
     missing = amplitudes[~np.isin(amplitudes, curve.amplitude)]
     count = curve.amplitude.size
     if not missing.size or count == amplitudes.size:
@@ -96,7 +103,10 @@ def describe_span(amplitudes) -> str:
 
 
 def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
-    """Write the advice on which curve to use, its band, and the ranges of validity of the methods."""
+    """Write the advice on which curve of a backbone to use, its band, and where methods are valid.
+
+    `joint` is the mode with its contact.
+    """
     band = backbone.band
     if band is None:
         return (NO_CURVE,)
@@ -104,7 +114,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = backbone.best
     sentences = [
-        f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
+        f"Use the curve of method {band.method}: {METHOD_PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
         describe_band_width(backbone),
         *_describe_coupling(joint, curve),
@@ -124,9 +134,10 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
 
 
 def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
-    """Describe at which amplitude friction reaches its limit, and below which it dissipates nothing.
+    """Describe at which amplitudes of a curve the friction of a joint reaches its limit.
 
-    The first amplitude follows from the stiffness of the sticking contact.
+    That amplitude follows from the stiffness of the sticking contact. Another sentence says up to which amplitude
+    friction dissipates nothing.
     """
     if not joint.friction_limit or joint.is_rigid:
         return []
@@ -148,7 +159,10 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
 
 
 def describe_band_width(backbone: Backbone) -> str:
-    """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
+    """Describe where the band of the damping ratio of a backbone is widest.
+
+    A second clause has the largest deviation of the frequency.
+    """
     band = backbone.band
     curve = backbone.best
     deviations = {}
@@ -167,9 +181,10 @@ def describe_band_width(backbone: Backbone) -> str:
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:
-    """Describe how far the phase resonance of a force at the output lies beside the curve.
+    """Describe how far the phase resonance of a joint under a force lies beside its curve.
 
-    The force moves other modes, too. A shift counts in relation to the half-width of the resonance, the damping ratio.
+    The force acts at the output and moves other modes, too. A shift counts in relation to the half-width of the
+    resonance, the damping ratio.
     """
     shift = np.abs(curve.force_frequency / curve.frequency - 1)
     if joint.modes.omega.size == 1 or not np.nanmax(shift, initial=0.0) > 0:

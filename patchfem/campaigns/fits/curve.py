@@ -29,27 +29,31 @@ from ..backbone.words import describe_span
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
-UNITS = {
+# Factors to SI by unit, for each column of a measured curve
+CURVE_UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "frequency": {"Hz": 1.0},
     "damping": RATIO_UNITS,
 }
-HEADER = "amplitude [um],frequency [Hz],damping [%]"
+# Header of the table of a measured curve, for messages
+CURVE_HEADER = "amplitude [um],frequency [Hz],damping [%]"
 FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
 # First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
-FIRST_ERROR = 5e-2
+FIRST_RELATIVE_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
-SAME_ERROR = 0.1  # relative change of an error at which it is known
+# Relative change of an assumed error from one fit to the next below which it is known
+SAME_ERROR_TOL = 0.1
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 # Largest relative difference of a measured amplitude and that of its computed point.
-SAME_AMPLITUDE = 1e-6
+SAME_AMPLITUDE_TOL = 1e-6
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
+# Warning about what the intervals of a fit leave out
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
@@ -110,9 +114,11 @@ class FittedCurve:
     Attributes
     ----------
     keys : FittedKeys
+        Fitted values of the free keys, with intervals.
     path : Path
         File of the measured curve.
     measured : MeasuredCurve
+        Frequency and damping to which the keys are fitted.
     model : (2, k) array
         Computed frequency [Hz] and damping ratio.
     method : {"balance", "quasi-static"}
@@ -140,14 +146,23 @@ def read_damping_curve(path) -> MeasuredCurve:
     """Read a measured curve from a table that `import --decay` or `backbone` wrote.
 
     Raises PatchfemError with all validation errors.
+
+    Parameters
+    ----------
+    path : path-like
+        CSV file.
+
+    Returns
+    -------
+    MeasuredCurve
     """
     # names may have the prefix "decay_"
     units = {}
-    for name, unit in UNITS.items():
+    for name, unit in CURVE_UNITS.items():
         for prefix in ("decay_", ""):
             units |= dict.fromkeys((f"{prefix}{name}", f"{prefix}{name}_error"), unit)
-    required = tuple(f"{name} decay_{name}" for name in UNITS)
-    form = TableFormat(units, required, HEADER, "a decay")
+    required = tuple(f"{name} decay_{name}" for name in CURVE_UNITS)
+    form = TableFormat(units, required, CURVE_HEADER, "a decay")
     table = read_columns(path, form)
     columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
     methods = table.labels.get("method", ("decay",))
@@ -165,7 +180,7 @@ def read_damping_curve(path) -> MeasuredCurve:
         if f"{name}_error" in columns:
             error[row] = columns[f"{name}_error"]
         else:
-            error[row] = FIRST_ERROR * np.abs(value[row])
+            error[row] = FIRST_RELATIVE_ERROR * np.abs(value[row])
             assumed[row] = True
     if (error < 0).any():
         raise PatchfemError(
@@ -190,6 +205,7 @@ class CurveModel(FreeKeys):
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     ranges : sequence of Range
         Bounds of the free keys.
     amplitude : (k,) array
@@ -204,12 +220,12 @@ class CurveModel(FreeKeys):
         self._compute_once = lru_cache(8)(self._compute)
 
     def _compute(self, values: tuple[float, ...], method: str) -> np.ndarray:
-        """Compute frequency and damping for values (n,) of the keys."""
+        """Compute frequency [Hz] and damping ratio (2, k) for values (n,) of the keys by a method."""
         self.n_computed += 1
         return compute_points(self.build_model(values), self.amplitude, method)
 
     def compute(self, values: Sequence[float], method: str) -> np.ndarray:
-        """Compute frequency and damping (2, k) by one of the methods.
+        """Compute frequency [Hz] and damping ratio (2, k) for values (n,) of the keys by a method.
 
         Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
         """
@@ -239,10 +255,15 @@ class CurveModel(FreeKeys):
             Value of `IntervalKind`.
         start : (n,) array, optional
             First starting point in place of that of the scene.
+
+        Returns
+        -------
+        Fit
+            Values of the keys with their intervals.
         """
 
         def residual(values: np.ndarray) -> np.ndarray:
-            """Return the residual (2k,) of the computed curve, divided by the standard deviations."""
+            """Return the residual (2k,) of the curve for values of the keys, over the standard deviations."""
             return ((self.compute(values, method) - measured.value) / measured.error).ravel()
 
         problem = self.make_problem(residual)
@@ -280,7 +301,7 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
     curve = backbone.curves[method]
     distance = np.abs(np.log(curve.amplitude[:, None] / amplitudes))
     points = np.array([curve.frequency, curve.damping])[:, distance.argmin(axis=0)]
-    return np.where(distance.min(axis=0) <= SAME_AMPLITUDE, points, np.nan)
+    return np.where(distance.min(axis=0) <= SAME_AMPLITUDE_TOL, points, np.nan)
 
 
 def fit_curve(
@@ -304,6 +325,11 @@ def fit_curve(
         Bounds of the free keys.
     options : FitOptions
         `starts` is the number of starting points of the search by the fast method.
+
+    Returns
+    -------
+    FittedCurve
+        Fitted keys, curve of the model and its band.
 
     Raises
     ------
@@ -335,11 +361,12 @@ def fit_curve(
     for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
         before = measured.error
         measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
-        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR:
+        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR_TOL:
             break
         again = curves.solve(measured, method, start=first.values)
         first = again.count_earlier_search(first)
 
+    # The search by the reference method begins at this result; the other method takes its place where it has no curve
     reference = METHODS[0]
     try:
         fit = curves.solve(measured, reference, kind="series", start=first.values)
@@ -349,6 +376,7 @@ def fit_curve(
         fit = curves.solve(measured, reference, kind="series", start=first.values)
     fit = fit.count_earlier_search(first)
 
+    # The curve of the fit, the effect of modes that the model neglects, and the band beyond the measured amplitudes
     fitted = curves.compute(fit.values, reference)
     widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
     beyond, advice = extrapolate_curve(curves, measured, widened, reference)
@@ -376,6 +404,17 @@ def extrapolate_curve(
 
     The band is the linear propagation of the intervals and of the correlation of the parameters. Amplitudes at which the
     mode does not oscillate are left out.
+
+    Parameters
+    ----------
+    curves : CurveModel
+        Model of the curve as a function of the free keys.
+    measured : MeasuredCurve
+        Measured curve, whose errors a further measurement would have.
+    fit : Fit
+        Fitted values with their intervals.
+    method : str
+        Method of the curve, one of METHODS.
 
     Returns
     -------

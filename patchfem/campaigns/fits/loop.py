@@ -45,6 +45,7 @@ class FittedLoop:
     Attributes
     ----------
     keys : FittedKeys
+        Fitted values of the free keys, with intervals.
     loop : Loop
         Measured loop.
     held_out : (k,) bool
@@ -116,13 +117,15 @@ class BenchModel:
         """Compute the reading (k,) at the rows for values (n,) [SI] of the keys.
 
         Raises PatchfemError if the scene is invalid for these values, or if nothing presses the pieces together.
+
+        `values` (n,) are those of the free keys.
         """
         model = self.keys.build_model(values)
         with locate_errors(model.source):
             return self._compute_reading(model)
 
     def _compute_reading(self, model: Model) -> np.ndarray:
-        """Compute the force or the friction ratio (k,) along the measured displacement."""
+        """Compute the force [N] or the friction ratio [1] (k,) of a model along the measured displacement."""
         patch = self._solve_patch(model)
         corner = np.arange(self.time.size) * self.steps_per_row
         number = np.arange(corner[-1] + 1)
@@ -166,7 +169,10 @@ class BenchModel:
         return SharedMeshes(models, False)
 
     def measure_step_error(self, values: np.ndarray) -> float:
-        """Return the largest change of the computed reading when the time steps are halved; 0 if they have no effect."""
+        """Return the largest change of the computed reading when the time steps are halved.
+
+        `values` (n,) are those of the free keys; the change is 0 if the steps have no effect.
+        """
         if self.is_exact:
             return 0.0
         coarse = self(values)
@@ -196,7 +202,7 @@ class BenchModel:
 
 
 def _is_step_independent(scene: Scene) -> bool:
-    """Return whether the computed force at the rows does not depend on the time steps."""
+    """Return whether the computed force of a scene at the rows does not depend on the time steps."""
     law = scene.friction
     contact = scene.contact
     bonds = law_has_trait(law.law, "bonds")
@@ -286,9 +292,9 @@ def fit_hysteresis_loop(
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
-    """Return the times (k,) [s] of the rows, and a note on times that the record does not give.
+    """Return the times (k,) [s] of the rows of a loop, and a note if the record does not give them.
 
-    Raises PatchfemError if the force depends on times that the record does not give.
+    Raises PatchfemError if the force under the law of the scene depends on such times.
     """
     if loop.time is not None:
         return loop.time, []
@@ -309,9 +315,10 @@ def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
 def _set_rest_speed(
     scene: Scene, ranges: Sequence[Range], loop: Loop, time: np.ndarray
 ) -> list[str]:
-    """Return the assignment of the rest speed of growing bonds from the largest measured speed.
+    """Return the assignment of the rest speed of growing bonds from the largest speed in a loop.
 
-    The list is empty if the scene sets the rest speed or frees it, or if the bonds do not grow. time (k,) [s].
+    It is a list of one `table.key=value` string, which is empty if the scene sets the rest speed, if it is one of the
+    free keys (`ranges`), or if the bonds do not grow. time (k,) [s] is that of the rows.
     """
     law = scene.friction
     grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
@@ -323,7 +330,7 @@ def _set_rest_speed(
 
 
 def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
-    """Return warnings about correlated residuals, a first row with force, and coarse time steps."""
+    """Return warnings about a fitted loop: correlated residuals, force at the start, coarse steps."""
     loop = fitted.loop
     scene = fitted.keys.scene
     peak = np.abs(loop.reading).max()

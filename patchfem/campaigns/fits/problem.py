@@ -38,8 +38,10 @@ class Listener:
     progress: Callable | None = None
 
 
+# Options of a fit for which the user gives none
 DEFAULT_OPTIONS = FitOptions()
-SILENT = Listener()
+# Listener that reports nothing
+SILENT_LISTENER = Listener()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,6 +59,7 @@ class FittedKeys:
     sets : list of str
         The ``table.key=value`` strings of the fitted scene.
     warnings : list of str
+        Sentences for the user on the fit and its assumptions.
     seconds : float
         Elapsed time of the fit.
     """
@@ -175,7 +178,7 @@ class FreeKeys:
 
 
 def parse_ranges(texts: Iterable[str]) -> list[Range]:
-    """Parse the ranges of free keys from "table.key=low..high" strings.
+    """Parse the ranges of free keys from "table.key=low..high" texts.
 
     Raises SceneError with all validation errors.
     """
@@ -186,7 +189,10 @@ def parse_ranges(texts: Iterable[str]) -> list[Range]:
 
 
 def warn_of_bolted_joint(scene: Scene, ranges: Iterable[Range]) -> list[str]:
-    """Return a list with a warning if a free key changes a joint that was bolted in the modal test, or []."""
+    """Return a list with a warning if a free key changes a joint that was bolted in the modal test.
+
+    `ranges` are those of the free keys of the scene. The list is empty otherwise.
+    """
     structure = scene.structure
     if structure is None or structure.measured == "free" or structure.measured_joint == "case":
         return []

@@ -9,7 +9,7 @@ from ...inputs.tables import read_text
 from ...model.model import build
 from ...scene.scene import Scene
 from ..rows.fit import FittedRows, fit_rows
-from .curve import HEADER, UNITS, FittedCurve, fit_curve
+from .curve import CURVE_HEADER, CURVE_UNITS, FittedCurve, fit_curve
 from .loop import FittedLoop, fit_hysteresis_loop
 from .options import FitOptions
 from .problem import Listener, parse_ranges
@@ -87,18 +87,18 @@ def choose_kind(scene: Scene, to: str) -> str:
         return "rows"
     names = read_text(path, "a measured table").names
     columns = {name.lower().removeprefix("decay_") for name in names}
-    if columns & (UNITS.keys() - COLUMN_UNITS.keys()):
+    if columns & (CURVE_UNITS.keys() - COLUMN_UNITS.keys()):
         return "curve"
     if columns & {*COLUMN_UNITS, "time"}:
         return "rows"
     raise PatchfemError(
-        f"{path}:1: a header like `{HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
+        f"{path}:1: a header like `{CURVE_HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
         f"(response to a sine) is needed, not '{','.join(names)[:80]}'"
     )
 
 
 def check_options(kind: str, options: FitOptions) -> None:
-    """Raise PatchfemError if an option is invalid or belongs to another kind of fit than a key of KINDS."""
+    """Raise PatchfemError if an option is invalid or does not belong to this kind of fit, a key of KINDS."""
     for name, target in TARGETS.items():
         if getattr(options, name) and name not in KINDS[kind]:
             raise PatchfemError(

@@ -27,6 +27,7 @@ QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
+# Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
 
@@ -56,6 +57,7 @@ class FittedCoefficient:
     value, low, high : float
         Coefficient and its interval [m2/N].
     measured : MeasuredDepth
+        Wear depth to which the coefficient is fitted.
     model : float
         Wear depth that is computed with the fitted coefficient [m].
     bounds : Range
@@ -84,9 +86,9 @@ class WearCurve(NamedTuple):
 
 
 def read_measured_depth(text: str) -> MeasuredDepth:
-    """Read a measured depth from a string, or from a JSON file written by `compare`.
+    """Read a measured depth from a text, or from a JSON file written by `compare`.
 
-    A string has the form "worn_depth_max=2.5 um..3.5 um", or contains a single value. Raises
+    The text has the form "worn_depth_max=2.5 um..3.5 um", or gives a single value, or is the name of the file. Raises
     PatchfemError for an invalid depth and Missing for a missing file.
     """
     name, equals, value = (part.strip() for part in text.partition("="))
@@ -109,7 +111,7 @@ def read_measured_depth(text: str) -> MeasuredDepth:
 
 
 def _read_depth_file(path: Path) -> MeasuredDepth:
-    """Read a measured depth from a JSON file written by `compare`."""
+    """Read a measured depth from the JSON file `path`, written by `compare`."""
     try:
         content = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
@@ -173,6 +175,7 @@ def fit_wear(
         )
 
     bounds = ranges[0]
+    # The measured depth needs a patch without earlier wear
     target = read_measured_depth(measured_depth)
     if model.patch is None:
         raise PatchfemError(
@@ -228,6 +231,8 @@ def fit_wear(
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
 
+    # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth into that
+    # of the coefficient
     low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
     return FittedCoefficient(
         value=float(value),
@@ -242,9 +247,10 @@ def fit_wear(
 
 
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
-    """Compute the wear depth over the cycles for a wear coefficient [m2/N].
+    """Compute the wear depth of a model over the cycles for a wear coefficient [m2/N].
 
-    `patch` is the solved contact of the unworn pieces, and `name` one of QUANTITIES.
+    `patch` is the solved contact of the unworn pieces, `name` one of QUANTITIES, and `progress` is called with the
+    progress, or None.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     worn = evolve.compute_wear(model, patch, (None, None), progress)

@@ -15,6 +15,7 @@ MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
 EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
+# Kind of quantity of each column that belongs to a condition
 CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
@@ -27,6 +28,7 @@ class Readings:
     Attributes
     ----------
     path : Path
+        File of the response table.
     rows : tuple of MeasuredRow
         All rows, including those without a reading (`inputs.measured`).
     row : (n,) array
@@ -63,7 +65,7 @@ class Readings:
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
     def column_values(self, name: str) -> list[float | str]:
-        """Return the value (n,) of a table column for each reading.
+        """Return the value (n,) of the table column `name` for each reading.
 
         Raises PatchfemError for a column other than "frequency", "input", "flag" and "run".
         """
@@ -101,7 +103,7 @@ class Readings:
         return selected
 
     def group_by_column(self, name: str, selected: np.ndarray) -> dict[str, np.ndarray]:
-        """Group the readings of a mask `selected` (n,) by the values of a table column.
+        """Group the readings of a mask `selected` (n,) by the values of the table column `name`.
 
         Returns masks (n,) by the text of the value, in the order of the rows.
         """
@@ -132,7 +134,10 @@ class Readings:
 
 
 def _cell_matches(name: str, value, text: str) -> bool:
-    """Return whether a table cell matches the value of a selector."""
+    """Return whether the value of a cell in the column `name` matches a text of the option --hold.
+
+    A flag matches if it contains the text, a frequency or an input if it is equal but for round-off.
+    """
     if name not in CONDITION_COLUMNS:
         return text in value if name == "flag" else text == value
     try:
@@ -143,7 +148,7 @@ def _cell_matches(name: str, value, text: str) -> bool:
 
 
 def _format_cell(name: str, value) -> str:
-    """Format a table cell with its unit."""
+    """Format the value of a cell in the column `name` with its unit."""
     unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
@@ -160,6 +165,16 @@ def read_response_table(path: Path) -> Readings:
 
     Repeated measurements of a condition remain separate readings. Raises PatchfemError if the
     table is invalid.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file.
+
+    Returns
+    -------
+    Readings
+        A row with both acceleration and displacement has two readings.
     """
     rows = tuple(read_table(path))
     row_numbers = []

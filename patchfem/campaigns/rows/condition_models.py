@@ -15,6 +15,7 @@ from ..fits.problem import FreeKeys
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
+# Assignment of the method that computes steady motions, for scenes that set no method
 STEADY_METHOD = "accuracy.method=harmonic"
 
 
@@ -27,6 +28,7 @@ class ConditionModels(FreeKeys):
     Parameters
     ----------
     scene : Scene
+        Scene of a rig under sinusoidal base motion.
     conditions : (c, 2) array
         Frequency [Hz] and input [m s-2].
     ranges : sequence of Range
@@ -84,7 +86,10 @@ class ConditionModels(FreeKeys):
 
 
 def _require_sines_of_base(scene: Scene, ranges: Sequence[Range], measured: Path) -> None:
-    """Raise PatchfemError if a scene or a free key cannot be fitted to a table of responses to a sine of the base."""
+    """Raise PatchfemError unless scene and free keys fit to responses to a sine of the base.
+
+    `ranges` are those of the free keys, and `measured` is the file of the responses.
+    """
     drive = scene.drive
     location = f"{scene.path}: fit --to {measured.name}: "
     if scene.kind not in ("rig", "linear"):

@@ -18,7 +18,7 @@ from ...identify.least_squares import Fit, Search
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..fits.options import FitOptions
-from ..fits.problem import SILENT, FittedKeys, Listener
+from ..fits.problem import SILENT_LISTENER, FittedKeys, Listener
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels
 from .model_readings import ModelReadings
@@ -92,7 +92,7 @@ def fit_rows(
     measured: Path,
     ranges: Sequence[Range],
     options: FitOptions,
-    listener: Listener = SILENT,
+    listener: Listener = SILENT_LISTENER,
     seed: int = 0,
 ) -> FittedRows:
     """Fit free keys of a rig to a table of measured responses.
@@ -112,6 +112,11 @@ def fit_rows(
     seed : int
         Seed of the random starting points.
 
+    Returns
+    -------
+    FittedRows
+        Fitted keys, and the readings that the model predicts.
+
     Raises
     ------
     SceneError, PatchfemError
@@ -119,6 +124,8 @@ def fit_rows(
     NotConverged
         If all descents of a search fail.
     """
+
+    # Measured readings; some rows are held out, and groups of the others are left out in turn
     cells = read_response_table(measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
@@ -130,6 +137,8 @@ def fit_rows(
             "in this column, so leaving this value out leaves no rows for the fit; choose another "
             "column"
         )
+
+    # A rig for each measured frequency and input, and the readings that it would give, as functions of the free keys
     models = ConditionModels(scene, cells.conditions, ranges, measured)
     for left_out in (np.zeros(held_out.size, bool), *groups.values()):
         models.require_enough_rows(measured, np.count_nonzero(~held_out & ~left_out), "readings")
@@ -146,7 +155,7 @@ def fit_rows(
             listener.progress(n_finished / (n_starts * (1 + len(groups))))
 
     def fit(training: np.ndarray, interval_kind: str) -> Fit:
-        """Fit the keys to the readings of a mask (n,), with intervals of a kind of `IntervalKind`.
+        """Fit the keys to the readings of a mask `training` (n,), with intervals of this kind.
 
         The first motions of each descent start from rest, so that its result depends only on its starting point and on
         these readings.
@@ -155,6 +164,7 @@ def fit_rows(
         search = Search(n_starts, seed, computed.reset_motions, report)
         return problem.search(search, interval_kind)
 
+    # The fit to all rows that are not held out, which also predicts the others
     best = fit(~held_out, "rows")
     prediction = computed.predict(best.values, range(len(cells.conditions)))
     logs = cells.compute_log_ratios(*prediction)

@@ -24,6 +24,7 @@ class ModelReadings:
     Parameters
     ----------
     models : ConditionModels
+        Models of the rig at the measured conditions.
     say : callable, optional
         Called with a line of text before code is compiled.
     """
@@ -50,12 +51,19 @@ class ModelReadings:
         self.last_readings: dict[int, tuple[float, float]] = {}
 
     def predict(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
-        """Predict the readings (2, c) with motions that start from rest."""
+        """Predict the readings (2, c) for values of the free keys with motions that start from rest.
+
+        `conditions` are the indices of those that are computed; others are NaN.
+        """
         self.reset_motions()
         return self(values, conditions)
 
     def __call__(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
         # the gains do not change the motion
+        """Return acceleration [m s-2] and displacement [m] readings (2, c) for values of the free keys.
+
+        `conditions` are the indices of those that are computed; others are NaN. Readings of the last values are kept.
+        """
         key_values = tuple(float(values[k]) for k in self.models.model_parameters)
         if key_values != self.last_values:
             self.last_values = key_values
@@ -71,7 +79,11 @@ class ModelReadings:
         return out
 
     def _compute_readings(self, values, conditions) -> dict[int, tuple[float, float]]:
-        """Return the acceleration reading without gain [m s-2] and the displacement [m] by condition."""
+        """Return the acceleration reading without gain [m s-2] and the displacement [m] by condition.
+
+        `values` are those of the free keys, and `conditions` the indices of the conditions. A motion that is not
+        bounded has infinite readings.
+        """
         model = self.models.build_model(values)
         needs_cycle = self.reading[0] not in ("peak", "fundamental")
         readings = {}

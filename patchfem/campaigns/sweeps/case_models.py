@@ -36,6 +36,7 @@ class SweepScene:
     path : Path
         File of the scene, whose folder is the base of relative file names.
     text : str
+        Content of the scene file.
     sets : tuple of str
         --set strings of all cases.
     n_written : int
@@ -49,12 +50,12 @@ class SweepScene:
     n_written: int = 0
 
     def read_scene(self, sets: Sequence[str]) -> Scene:
-        """Return the scene with additional `table.key=value` strings."""
+        """Return the scene with additional `table.key=value` strings, `sets`."""
         base = _get_cached_base(self).scene
         return base.override(sets) if base is not None else self._parse_scene(sets)
 
     def _parse_scene(self, sets: Sequence[str]) -> Scene:
-        """Parse the scene text with additional `table.key=value` strings."""
+        """Parse the scene text with additional `table.key=value` strings, `sets`."""
         scene = require_files(loads(self.text, self.path, (*self.sets, *sets)))
         return remember_written(replace(scene, sweep=()), self.n_written)
 
@@ -116,7 +117,10 @@ class SweepScene:
         return SimilarModels(*models[keys], values, sets, cases)
 
     def find_errors(self, sets: Sequence[str]) -> list[str]:
-        """Return the validation errors of the scene of a case; [] if it is valid."""
+        """Return the validation errors of the scene of a case; [] if it is valid.
+
+        `sets` are the `table.key=value` strings of the case.
+        """
         try:
             self.read_scene(sets)
         except SceneError as error:
@@ -189,7 +193,10 @@ class _SweepBase(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _get_cached_base(sweep_scene: SweepScene) -> _SweepBase:
-    """Return the base of the cases of a sweep, which is cached for the last two sweeps."""
+    """Return the scene from which the scenes of the cases of a sweep are made.
+
+    It belongs to this `sweep_scene`, and is cached for the last two sweeps.
+    """
     try:
         return _SweepBase(BaseScene(sweep_scene._parse_scene(())), {})
     except SceneError:

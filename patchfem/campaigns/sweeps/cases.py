@@ -66,21 +66,27 @@ class Cases:
         return (len(self),) if self.is_table else tuple(len(axis.texts) for axis in self.axes)
 
     def axis_indices(self, numbers: int | Sequence[int]) -> tuple[int | np.ndarray, ...]:
-        """Return for each axis the index of the value of a case, or the indices of several cases."""
+        """Return for each axis the index of the value in a case, or in several cases.
+
+        `numbers` are those of the cases, from 0.
+        """
         if self.is_table:
             return (np.asarray(numbers),) * len(self.axes)
         return np.unravel_index(numbers, self.shape)
 
     def texts(self, number: int) -> tuple[str, ...]:
-        """Return the values of a case as strings from the request, one per axis."""
+        """Return the values of a case, by its number, as strings from the request, one per axis."""
         return tuple(axis.texts[k] for axis, k in zip(self.axes, self.axis_indices(number)))
 
     def assignments(self, number: int) -> tuple[str, ...]:
-        """Return the `table.key=value` strings of a case."""
+        """Return the `table.key=value` strings of a case, by its number."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
     def make_columns(self, numbers: Sequence[int]) -> list[np.ndarray]:
-        """Return the values (n,) of each axis in several cases: floats in SI, or strings."""
+        """Return the values (n,) of each axis in several cases: floats in SI, or strings.
+
+        `numbers` (n,) are those of the cases.
+        """
         columns = []
         for axis, indices in zip(self.axes, self.axis_indices(numbers)):
             kind = float if isinstance(axis.values[0], float) else str
@@ -137,7 +143,10 @@ class Cases:
 
 
 def _describe_values(axis: Axis, folder: Path) -> list[str]:
-    """Return key and value of each value of a swept key as JSON, with the hash of the files in a folder that it names."""
+    """Return key and value as JSON for each value of a swept key, an axis.
+
+    A value that names files has their hashes; the names are relative to the folder.
+    """
     texts = []
     for value in axis.values:
         is_number = isinstance(value, float) and isfinite(value)
@@ -152,7 +161,7 @@ def _hash_to_integer(content: bytes) -> int:
 
 
 def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
-    """Return a swept key with the values at some indices."""
+    """Return a swept key, an axis, with the values at some indices."""
     return replace(
         axis,
         texts=tuple(axis.texts[index] for index in indices),
@@ -161,7 +170,7 @@ def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
 
 
 def combine_cases(parts: Sequence[Cases]) -> Cases:
-    """Return the Cartesian product of several sets of cases; the last set varies fastest.
+    """Return the Cartesian product of several sets of cases, `parts`; the last one varies fastest.
 
     The result is a table if one of the sets is a table.
     """

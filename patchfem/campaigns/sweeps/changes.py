@@ -20,6 +20,7 @@ class MeasureRange(NamedTuple):
     Attributes
     ----------
     measure : str
+        Name of the measure.
     low_case, high_case : int
         Indices of the cases with the smallest and the largest value.
     relative : float
@@ -44,7 +45,9 @@ class SweepAnalysis:
     ranges : list of MeasureRange
         Ranges of the main measures that vary by more than their errors, largest change first.
     limits : list of KeyLimit
+        Values of the keys up to which measures stay within limits.
     peaks : list of PeakOnLine
+        Peaks of the measures over a swept frequency.
     ranking : dict
         List of SobolIndex by measure.
     quantiles : dict
@@ -60,7 +63,7 @@ class SweepAnalysis:
 
 
 def analyse(table: SweepTable) -> SweepAnalysis:
-    """Analyse the results of a sweep; a single settled case has no range and no limit."""
+    """Analyse the table of results of a sweep; a single settled case has no range and no limit."""
     ranges = []
     is_comparable = np.count_nonzero(table.has_settled) != 1
     for name in MAIN_MEASURES if is_comparable else ():
@@ -78,7 +81,7 @@ def analyse(table: SweepTable) -> SweepAnalysis:
 
 
 def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
-    """Return the range of a measure; [] if it does not vary by more than its errors and floors."""
+    """Return the range of the measure `name` in a table; [] if it varies no more than its errors."""
     values = table.select_trusted(name)
     if not np.isfinite(values).any():
         return []

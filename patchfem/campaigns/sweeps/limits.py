@@ -13,7 +13,9 @@ import numpy as np
 from .sweep_table import SweepTable, SweptKey
 
 NEGLIGIBLE_CHANGE = 0.05  # relative change that is commonly called negligible
-DOUBLING = 1.0  # relative change of a measure that doubles
+# Relative change of a measure at twice its value
+DOUBLING = 1.0
+# Measures of a motion whose change has a limit
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -23,6 +25,7 @@ MOTION_MEASURES = (
     "friction_ratio_peak",
     "onset_level",
 )
+# Relative change of each measure up to which a swept key counts as harmless
 CHANGE_AT_LIMIT = {
     **dict.fromkeys(MOTION_MEASURES, NEGLIGIBLE_CHANGE),
     "normal_stiffness": NEGLIGIBLE_CHANGE,
@@ -64,9 +67,12 @@ class KeyLimit(NamedTuple):
 
 
 def find_limits(table: SweepTable) -> list[KeyLimit]:
-    """Find the limits of the numerical key with the most values, as `_choose_axis` chooses it.
+    """Find the limits in a table of the numerical key with the most values.
 
     If other keys are swept too, a limit is the smallest one over the values of these keys whose first case counts.
+
+    A limit is the value of the key above, or below, which a measure changes, such as that at which the contact begins
+    to slip.
     """
     axis = _choose_axis(table)
     if axis is None:
@@ -98,7 +104,10 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
 
 
 def _choose_axis(table: SweepTable) -> int | None:
-    """Return the index of the key with the most values among the numerical ones of a grid that can have a limit."""
+    """Return the index of the numerical key with the most values in a table; None if there is none.
+
+    The cases must be a grid, and the key must be one that can have a limit.
+    """
     if not table.is_grid:
         return None
     axes = []

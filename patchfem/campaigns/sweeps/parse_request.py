@@ -40,6 +40,7 @@ class Request:
     sobol : bool
         Whether the random cases form a Sobol sequence.
     seed : int
+        Seed of the random cases.
     """
 
     over: Sequence[str] = ()
@@ -102,6 +103,18 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
 
     If it names no values, those of the table [sweep] are used.
 
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+        Scene of the sweep.
+    request : Request
+        Values, ranges and tables of cases that the user asks for.
+
+    Returns
+    -------
+    Cases
+        With a warning if some of the checked cases are invalid.
+
     Raises
     ------
     SceneError
@@ -149,6 +162,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
         raise SceneError([*sweep_scene.find_errors(first_case), *errors])
 
+    # All combinations of the cases of a file and of the values of the axes, or random cases in place of the latter
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_SWEEP_CASES:
@@ -169,9 +183,11 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
 
 
 def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
-    """Return a validation error for each swept key that is equivalent to an earlier key.
+    """Return a validation error for each of the swept keys that is equivalent to an earlier one.
 
     Two keys are equivalent if they denote a mode by its name and by its index.
+
+    `sweep_scene` knows the modes by name.
     """
     first_keys: dict[str, str] = {}
     errors = []
@@ -186,6 +202,13 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
 
 def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     """Validate the representative cases of a sweep.
+
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+        Scene of the sweep.
+    cases : Cases
+        All cases, of which some are checked.
 
     Returns
     -------

@@ -13,6 +13,7 @@ from scipy.interpolate import PPoly, make_interp_spline
 from .sweep_table import SweepTable
 
 FREQUENCY_KEY = "drive.frequency"
+# Measures in which a resonance peak is sought; the first one that a sweep has is used
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
 DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating curves
@@ -55,7 +56,7 @@ class PeakOnLine(NamedTuple):
 
 
 def find_peaks(table: SweepTable) -> list[PeakOnLine]:
-    """Find the peak over a swept drive frequency for each combination of the other keys.
+    """Find the peak over a swept drive frequency in a table for each combination of other keys.
 
     Combinations without a peak between two cases that count have no entry.
     """
@@ -76,9 +77,10 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
 
 
 def _find_heights(table: SweepTable, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights (n,) of a response with their errors (n,); NaN where a case does not count.
+    """Return the heights (n,) of the measure `name` in a table with their errors (n,).
 
-    For a case that did not settle it is the steady estimate if that is exact enough.
+    They are NaN where a case does not count. For a case that did not settle it is the steady estimate if that is exact
+    enough.
     """
     heights = table.select_trusted(name)
     errors = np.nan_to_num(table.measures[name].errors)

@@ -14,6 +14,7 @@ import numpy as np
 
 from .sweep_table import SweepTable
 
+# Measures for which the swept keys are ranked
 RANKED_MEASURES = (
     "relative_displacement_amplitude",
     "loop_area",
@@ -60,7 +61,9 @@ class SobolIndex(NamedTuple):
 
 
 def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
-    """Compute the Sobol indices of the swept keys for each ranked measure that varies by more than its error.
+    """Compute the Sobol indices of the swept keys for each ranked measure of a table.
+
+    A measure must vary by more than its error.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
     if table.is_grid:
         names = [name for name in names if np.isfinite(columns[name]).all()]
         grids = [columns[name].reshape(table.shape) for name in names]
-        found = [compute_grid_indices(grid)[:, varied] for grid in grids]
+        index_arrays = [compute_grid_indices(grid)[:, varied] for grid in grids]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
         if known.sum() < MIN_CASES_PER_KEY * len(varied):
@@ -87,10 +90,10 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
         ranks = [rankdata(table.keys[axis].values)[known] for axis in varied]
         coordinates = (np.stack(ranks, axis=1) - 0.5) / len(table)
         values = np.stack([column[known] for column in columns.values()], axis=1)
-        found = estimate_random_indices(coordinates, values)
+        index_arrays = estimate_random_indices(coordinates, values)
 
     ranking = {}
-    for name, array in zip(names, found):
+    for name, array in zip(names, index_arrays):
         if array is not None:
             keys = [table.keys[axis].key for axis in varied]
             indices = [SobolIndex(key, *numbers) for key, numbers in zip(keys, array.T.tolist())]
@@ -99,7 +102,7 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
 
 
 def _varies(table: SweepTable, name: str) -> bool:
-    """Return whether a measure varies over the cases by more than its errors and round-off."""
+    """Return whether the measure `name` of a table varies by more than its errors and round-off."""
     column = table.measures.get(name)
     if column is None:
         return False
@@ -112,7 +115,11 @@ def _varies(table: SweepTable, name: str) -> bool:
 
 
 def compute_grid_indices(values: np.ndarray) -> np.ndarray:
-    """Return first and total index and its (equal) limits (4, keys) of values on a full grid."""
+    """Return Sobol indices (4, keys) of values on a full grid with one axis per key.
+
+    The rows are the first-order index, the total index, and the lower and upper limit of the latter, which are equal
+    to it.
+    """
     first = []
     total = []
     for axis in range(values.ndim):
@@ -140,27 +147,32 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     """
     from scipy.interpolate import RBFInterpolator
 
+    # The cases are divided into folds: each is predicted by a response surface through the others
     rng = np.random.default_rng(0)
     every = rng.permutation(len(coordinates))[:MAX_SURFACE_CASES]
     folds = [(np.setdiff1d(every, fold), fold) for fold in np.array_split(every, N_FOLDS)]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
-        """Return the surface through some of the cases."""
+        """Return the response surface through some of the cases; with smoothing it may miss them."""
         return RBFInterpolator(
             coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
         )
 
     def find_unexplained(smoothing: float) -> np.ndarray:
-        """Return the fraction (measures,) of the variance of each fold that a surface through the others leaves."""
-        left = []
+        """Return the fraction (measures,) of the variance that a surface with this smoothing leaves.
+
+        It is the mean over the folds of the deviation from a surface through the cases of the other folds
+        (cross-validation).
+        """
+        unexplained = []
         for others, fold in folds:
             deviation = fit(others, smoothing)(coordinates[fold]) - scaled[fold]
-            left.append(
+            unexplained.append(
                 np.mean(deviation**2, axis=0)
                 / np.maximum(scaled[fold].var(axis=0), SPREAD_ROUND_OFF)
             )
-        return np.mean(left, axis=0)
+        return np.mean(unexplained, axis=0)
 
     # The smoothing is that with the smallest median over the measures (cross-validation).
     fractions = [find_unexplained(smoothing) for smoothing in SMOOTHING_PARAMETERS]
@@ -170,6 +182,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     surfaces = [fit(cases, SMOOTHING_PARAMETERS[best]) for cases in fitted]
     first, total = np.transpose([_compute_surface_indices(one) for one in surfaces], (1, 0, 2, 3))
 
+    # Limits of the total index: the smallest and largest of all surfaces, widened by what they leave unexplained
     margin = unexplained[:, None] + INDEX_ERROR
     limits = [total.min(axis=0) - margin, total.max(axis=0) + margin]
     arrays = np.clip([first[0], total[0], *limits], 0.0, 1.0).transpose(1, 0, 2)
@@ -178,7 +191,10 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
 
 
 def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return first-order and total Sobol indices (measures, keys) of a surface over the unit cube."""
+    """Return first-order and total Sobol indices (measures, keys) of a response surface.
+
+    The surface is an interpolator of the measures over the unit cube of the keys.
+    """
     from scipy.stats import sobol_indices, uniform
 
     with warnings.catch_warnings():
@@ -193,7 +209,7 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
-    """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
+    """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure of a table of random cases.
 
     Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
     ones.

@@ -41,7 +41,7 @@ def draw_cases(
 
 
 def _draw_sobol_points(n_axes: int, count: int, seed: int) -> np.ndarray:
-    """Return `count` points (count, n_axes) of a scrambled Sobol sequence."""
+    """Return `count` points (count, n_axes) in [0, 1) of a Sobol sequence, scrambled by the seed."""
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
@@ -51,7 +51,7 @@ def _draw_sobol_points(n_axes: int, count: int, seed: int) -> np.ndarray:
 
 
 def _map_to_values(axis: Axis | Range, fractions: np.ndarray) -> Axis:
-    """Map uniform random numbers (n,) in [0, 1) to values of a swept key."""
+    """Map uniform random fractions (n,) in [0, 1) to values of a swept key, an axis or a range."""
     if isinstance(axis, Range):
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)

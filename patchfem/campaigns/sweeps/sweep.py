@@ -38,7 +38,9 @@ class WorkerData:
     Attributes
     ----------
     sweep_scene : SweepScene
+        Scene and the settings that all cases share.
     cases : Cases
+        Values of the swept keys in each case.
     extract : callable, optional
         extract(number, model or error, results, index) returns additional data of the case at an
         index of the CaseResults.
@@ -125,7 +127,10 @@ def _build_similar_models(work: WorkerData, numbers: Sequence[int]) -> SimilarMo
 
 
 def _build_case_model(work: WorkerData, number: int):
-    """Return the model of a case with the shared meshes, or the validation error of its scene."""
+    """Return the model of a case, by its number, with the shared meshes, or the error of its scene.
+
+    `work` is the data of the sweep.
+    """
     try:
         model = work.sweep_scene.build_model(work.cases.assignments(number))
     except PatchfemError as error:
@@ -134,7 +139,7 @@ def _build_case_model(work: WorkerData, number: int):
 
 
 def choose_shared_meshes(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep with meshes that are chosen for all its cases.
+    """Return the data of a sweep, `work`, with meshes that are chosen for all its cases.
 
     Cases that are already computed are included in this choice.
     """
@@ -150,9 +155,11 @@ def choose_shared_meshes(work: WorkerData) -> WorkerData:
 
 
 def _find_min_chunk_size(work: WorkerData) -> int:
-    """Return the smallest number of cases per chunk, for which computing them together is efficient.
+    """Return the smallest number of cases per chunk for which computing them together is efficient.
 
     The time of a smaller chunk does not predict the time of a large one.
+
+    `work` is the data of the sweep.
     """
     model = _build_case_model(work, 0)
     if work.keep is not None or not isinstance(
@@ -170,6 +177,7 @@ class ChunkQueue:
     numbers : sequence of int
         Numbers of the cases.
     workers : int
+        Number of workers that take chunks.
     min_size : int
         Smallest number of cases per chunk, used with a single worker.
     """
@@ -205,7 +213,10 @@ class ChunkQueue:
         return [self.remaining.popleft() for _ in range(size)]
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
-        """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
+        """Record that the worker of a chunk died; return the cases to abandon.
+
+        `numbers` are those of the chunk. A chunk of several cases is queued to be repeated case by case.
+        """
         if self.repeated.issuperset(numbers):
             return list(numbers)
         self.suspects += numbers

@@ -79,7 +79,7 @@ class MeasureColumn:
 
     @classmethod
     def blank(cls, unit: str, count: int) -> "MeasureColumn":
-        """Return the column of `count` cases without a value."""
+        """Return the column of `count` cases without a value; the unit is that of the measure."""
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
 
@@ -96,6 +96,7 @@ class SweepTable:
     Attributes
     ----------
     keys : tuple of SweptKey
+        Swept keys with their values in the cases.
     shape : tuple of int
         Number of values of each key, of which the last one varies fastest; (n,) if the cases are
         rows of a table.
@@ -144,7 +145,10 @@ class SweepTable:
         return len(self.shape) == len(self.keys) and not self.is_random
 
     def split_lines(self, axis: int) -> np.ndarray:
-        """Return the numbers of the cases of a grid as lines along one key, (lines, values of the key)."""
+        """Return the numbers of the cases of a grid as lines along one key.
+
+        `axis` is the index of the key. The result has the shape (lines, values of the key).
+        """
         numbers = np.moveaxis(np.arange(len(self)).reshape(self.shape), axis, -1)
         return numbers.reshape(-1, self.shape[axis])
 
@@ -154,7 +158,7 @@ class SweepTable:
         return np.isin(self.outcome.astype(str), FINAL_OUTCOMES)
 
     def insert(self, numbers: Sequence[int], part: CaseResults) -> None:
-        """Store the results of the cases with these numbers."""
+        """Store the results of the cases with these numbers; `part` has them in the same order."""
         numbers = np.asarray(numbers, int)
         self.outcome[numbers] = part.outcome
         for name, unit in part.units.items():
@@ -168,7 +172,7 @@ class SweepTable:
         self.faults.update(dict.fromkeys(part.faults))
 
     def select_trusted(self, name: str) -> np.ndarray:
-        """Return the values (n,) of a measure that count for statements on it; NaN for others.
+        """Return the values (n,) of the measure `name` that count for statements on it; NaN for others.
 
         A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. The
         case need not have settled if no settled case has a value, or if the measure is a steady estimate.

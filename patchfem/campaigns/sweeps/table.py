@@ -15,11 +15,17 @@ from .cases import Cases
 
 # Name of the first result column of a sweep.csv; this and all later columns are ignored.
 OUTCOME_COLUMN = "outcome"
+# Header of a table of cases, for messages
 CASE_HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
 def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     """Read the cases of a CSV table, and its validation errors.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file.
 
     Returns
     -------
@@ -51,6 +57,15 @@ def _parse_column(
     key: str, unit: str | None, cells: list[str]
 ) -> tuple[Axis | None, list[tuple[int | None, str]]]:
     """Parse the cells of a column.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key in the header of the column.
+    unit : str or None
+        Unit in the header.
+    cells : list of str
+        Values.
 
     Returns
     -------

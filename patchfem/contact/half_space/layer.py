@@ -21,7 +21,11 @@ MAX_WAVE_DEPTH = 40.0
 
 
 class WaveCompliance(NamedTuple):
-    """Displacement of the face per traction [m/Pa]: inwards under a pressure, along x under a shear traction."""
+    """Displacement of the face per traction [m/Pa] at n wave numbers.
+
+    - normal (n,): displacement inwards under a pressure.
+    - shear (n,): displacement along x under a shear traction.
+    """
 
     normal: np.ndarray
     shear: np.ndarray
@@ -72,6 +76,11 @@ def _solve_waves(k, depths: list[float], moduli: list[tuple[float, float]]) -> W
         Thickness [m] of each layer from the face down.
     moduli : list of tuple
         Lamé constants [Pa] of each layer.
+
+    Returns
+    -------
+    WaveCompliance
+        Displacement of the face per traction [m/Pa] at each wavenumber.
     """
     n_unknowns = 4 * len(depths)
     scale = moduli[0][1]
@@ -112,6 +121,22 @@ def _layer_states(
     """Return displacements and tractions (n, 4, 4) of the four wave solutions at depth z [m].
 
     A state is k scale u_x, k scale u_z, tension and shear.
+
+    Parameters
+    ----------
+    k : (n,) ndarray
+        Wave numbers [rad/m].
+    z, depth : float
+        Depth in the layer, and thickness of the layer [m].
+    moduli : tuple of float
+        Lame's constants lambda and mu [Pa] of the layer.
+    scale : float
+        Pressure [Pa] by which the displacements are made comparable to the tractions.
+
+    Returns
+    -------
+    (n, 4, 4) ndarray
+        Component of the state in rows, wave solution in columns.
     """
     lam, mu = moduli
     nu = lam / (2 * (lam + mu))

@@ -86,6 +86,9 @@ class PointCompliance:
         NotConverged
             After `max_iterations` steps.
         """
+
+        # Conjugate gradients; the inverse of the compliance without contact edges (by cosine transforms) is the
+        # preconditioner
         residual = np.where(active, motion, 0.0)
         tolerance = EQUATION_TOL * np.abs(residual).max()
         force = np.zeros(residual.size)
@@ -109,7 +112,11 @@ class PointCompliance:
 
 
 class SmoothModes(NamedTuple):
-    """Eigenfunctions (n, r) of a smooth compliance, with their compliances (r,) [m2/N]."""
+    """Eigenfunctions of a smooth compliance.
+
+    - modes (n, r): eigenfunctions in columns.
+    - mode_compliances (r,): compliance [m2/N] of each.
+    """
 
     modes: np.ndarray
     mode_compliances: np.ndarray
@@ -208,7 +215,10 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list[Conta
 
 
 def _contact_length(active: np.ndarray, edge: ContactEdge) -> int:
-    """Count the points of the contact interval that ends at a given edge."""
+    """Count the points of the contact interval that ends at a given edge.
+
+    `active` (n,) is True at points in contact. At most `MAX_REFERENCE_POINTS` are counted.
+    """
     if edge.side > 0:
         first = max(edge.node - MAX_REFERENCE_POINTS + 1, 0)
         points = active[first : edge.node + 1][::-1]

@@ -133,7 +133,11 @@ class Need(NamedTuple):
 
 @cache
 def parse_needs(words: str) -> tuple[Need, ...]:
-    """Parse the required or optional keys of a selector."""
+    """Parse the keys that a value of a selector needs or may have.
+
+    `words` separates the needs by blanks: "a+b" are keys that are given together, "a|b" are keys of which exactly one
+    is given, and "a/b" keys of which one or several are given.
+    """
     return tuple(
         Need(tuple(tuple(part.split("+")) for part in re.split("[|/]", word)), "/" not in word)
         for word in words.split()
@@ -141,18 +145,22 @@ def parse_needs(words: str) -> tuple[Need, ...]:
 
 
 def split_keys(words: str) -> list[str]:
-    """Return all keys of a text of required or optional keys."""
+    """Return all keys of a text `words` of required or optional keys, such as "a+b c|d"."""
     return re.findall(r"\w+", words)
 
 
 def format_keys(words: str) -> str:
-    """Return a text of required or optional keys in words."""
+    """Return a text of keys such as "a+b c|d" in words: "a and b, c or d"."""
     return re.sub("[|/]", " or ", words.replace(" ", ", ").replace("+", " and "))
 
 
 @cache
 def find_selectors(model: type[Table]) -> tuple[Selector, ...]:
-    """Return the selectors of a table, in the order in which they count."""
+    """Return the selectors of a table, in the order in which they count.
+
+    A selector is a key whose value decides which other keys the table needs, such as `law` or `waveform`; `model` is
+    the class of the table.
+    """
     return tuple(selector for selector in SELECTORS if issubclass(model, selector.model))
 
 
@@ -176,7 +184,10 @@ class TableChoices(NamedTuple):
 
 
 def find_choices(table: Table) -> TableChoices:
-    """Return what a table needs and does not use."""
+    """Return the keys that a table needs, and the keys in it that have no meaning.
+
+    Both follow from its selectors, keys such as `law` whose value decides which other keys are used.
+    """
     choices = TableChoices([], {})
     for selector in find_selectors(type(table)):
         value = getattr(table, selector.key, "")

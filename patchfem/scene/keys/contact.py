@@ -36,6 +36,7 @@ MAX_STRIPS = 10_000
 # Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
 MAX_SMALL_ANGLE = 0.1
 SmallAngle = quantity("angle", ge=-MAX_SMALL_ANGLE, le=MAX_SMALL_ANGLE)
+# What a key for a material needs, for messages
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )

@@ -23,7 +23,7 @@ _UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "t
 
 
 class Limit(NamedTuple):
-    """Name and sign of a bound of a number."""
+    """Bound of a number: `name` is the word of pydantic, such as "ge", and `sign` its sign, such as ">="."""
 
     name: str
     sign: str
@@ -88,7 +88,10 @@ def validate_value(key: str, value: TomlValue, ignored: Iterable[str] = ()) -> d
 def validate_values(
     model: type[Table], values: TomlTable
 ) -> tuple[dict[str, KeyValue], Sequence[ErrorDetails]]:
-    """Return the valid ones of the plain values of a table by attribute, and the errors of pydantic on the others."""
+    """Return the valid ones of the plain values of a table by attribute, and the errors on the others.
+
+    `model` is the class of the table; the errors are those of pydantic.
+    """
     valid: dict[str, KeyValue] = {}
     try:
         model.model_validate(values, context=valid)
@@ -140,14 +143,20 @@ def describe_requirement(key: Key | None, path: str) -> str:
 
 
 def _describe_other_type(key: Key, path: str) -> str:
-    """Return what a key accepts in place of one of its words: a table, a whole number, or "" for nothing else."""
+    """Return what the key at a dotted `path` accepts in place of one of its words, "" for nothing.
+
+    It is a table or a whole number.
+    """
     if key.inner is not None:
         return f"a table [{path}]"
     return "a whole number" if int in key.types else ""
 
 
 def describe_missing_key(key: Key | None, path: str) -> str:
-    """Describe the value that a missing key needs; the meaning of the key follows where its type says too little."""
+    """Describe the value that the missing key at a dotted `path` needs.
+
+    The meaning of the key follows where its type says too little. `key` is None if the path is not known.
+    """
     if key is not None and key.is_array and key.inner is not None:
         return ""
     needed = describe_requirement(key, path)
@@ -157,7 +166,7 @@ def describe_missing_key(key: Key | None, path: str) -> str:
 
 
 def _describe_array_requirement(types: tuple[KeyType, ...]) -> str:
-    """Return what an array of numbers without unit requires."""
+    """Return what an array of numbers without unit requires, by the `types` of its items."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
     if str in types:

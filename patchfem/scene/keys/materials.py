@@ -59,6 +59,7 @@ def _read_materials() -> dict[str, MaterialRecord]:
     return materials
 
 
+# Materials of the package by name
 MATERIALS = _read_materials()
 
 
@@ -92,7 +93,10 @@ def is_case_sensitive(spelling: str) -> bool:
 
 
 def advise_on_material(written_name: str) -> str:
-    """Return a hint for an unknown material name: the most similar names and the list of all names."""
+    """Return a hint for an unknown material name: the most similar names and all names.
+
+    `written_name` is the name as the scene has it.
+    """
     spellings = list_spellings()
     written = normalise_material_name(written_name)
     near_spellings = get_close_matches(written, spellings, len(spellings), MIN_SIMILARITY)

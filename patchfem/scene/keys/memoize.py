@@ -18,6 +18,7 @@ def memoize(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def call_cached(frozen, *others):
+        """Return the cached result for this very object `frozen` and equal other arguments."""
         entry = results.get((id(frozen), *others))
         if entry is None:
             if len(results) >= MAX_CACHED_QUANTITIES:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from .values import TomlValue
 
+# Tables of units.toml by kind of quantity: the factors of its units, and an example
 _KINDS = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # Factors to SI by unit for each kind of quantity; the first unit of each kind is its SI unit.
 UNIT_FACTORS: dict[str, dict[str, float]] = {kind: row["units"] for kind, row in _KINDS.items()}
@@ -34,10 +35,12 @@ _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 
 def parse_quantity(text: TomlValue, kind: str) -> float:
-    """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
+    """Return the SI value of a text ``"<number> <unit>"``, correctly rounded.
 
-    Raises ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
-    anything but one number and one unit, and a value that is not finite.
+    Raises ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another
+    kind, anything but one number and one unit, and a value that is not finite.
+
+    `kind` is the kind of quantity, such as "length", a key of UNIT_FACTORS.
     """
     if not isinstance(text, str):
         raise ValueError(_describe_non_text(text, kind))
@@ -63,7 +66,7 @@ def read_percentage(value: TomlValue) -> TomlValue:
 
 
 def split_quantity(text: str) -> tuple[str, str]:
-    """Return number and unit, as written, of a quantity that `parse_quantity` accepts."""
+    """Return number and unit, as written, of a `text` that `parse_quantity` accepts."""
     return _QUANTITY_PATTERN.fullmatch(text).groups()
 
 
@@ -73,7 +76,10 @@ def find_si_unit(kind: str | None) -> str:
 
 
 def format_si(value: float, kind: str) -> str:
-    """Return a value with its SI unit, as ``"0.0127 m"``; `parse_quantity` gives back the same float."""
+    """Return a value with its SI unit, as ``"0.0127 m"``; `parse_quantity` gives back the same float.
+
+    `kind` is the kind of quantity, such as "length".
+    """
     return f"{float(value)!r} {find_si_unit(kind)}"
 
 
@@ -83,7 +89,10 @@ def describe_requirement(kind: str) -> str:
 
 
 def _multiply(number: str, factor: float, kind: str) -> float:
-    """Return number times factor; raise ValueError if the product is out of range."""
+    """Return number times factor, correctly rounded; raise ValueError if it is out of range.
+
+    The lower limit depends on the `kind` of quantity: a temperature is not below 0 K.
+    """
     rounded = float(number)
     if rounded == 0.0:
         if re.search("[1-9]", re.split("[eE]", number)[0]):
@@ -103,6 +112,7 @@ def _multiply(number: str, factor: float, kind: str) -> float:
 
 @cache
 def _exact_factor(factor: float) -> Decimal:
+    """Return the decimal number that a unit factor such as 0.0254 is written as."""
     return Decimal(repr(factor))
 
 
@@ -115,14 +125,17 @@ def normalize_unit(unit: str) -> str:
 
 
 def _describe_non_text(value: TomlValue, kind: str) -> str:
-    """Return the message about a value that is not a string."""
+    """Return the message about a value that is not a string where a `kind` of quantity is needed."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     reason = "a bare number without a unit" if is_number else "not a quantity"
     return f"{reason}; {describe_requirement(kind)}"
 
 
 def _describe_malformed_text(words: str, kind: str) -> str:
-    """Return the message about a string that does not consist of a number, a blank and a unit."""
+    """Return the message about a text that does not consist of a number, a blank and a unit.
+
+    `words` is the text, and `kind` is the kind of quantity that is needed.
+    """
     displayed_text = (
         words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
     )
@@ -150,7 +163,7 @@ def _describe_malformed_text(words: str, kind: str) -> str:
 
 
 def _describe_wrong_unit(number: str, unit: str, kind: str) -> str:
-    """Return the message about a unit that does not belong to this kind of quantity."""
+    """Return the message about a unit, behind a `number`, that does not belong to this kind of quantity."""
     plain = normalize_unit(unit)
     advice = f"use one of {_list_units(kind)}, such as '{EXAMPLE_QUANTITIES[kind]}'"
     other_kinds = [other for other, units in UNIT_FACTORS.items() if plain in units]
@@ -169,8 +182,10 @@ def _describe_wrong_unit(number: str, unit: str, kind: str) -> str:
 
 
 def _add_article(kind: str) -> str:
+    """Return the name of a kind of quantity with "a" or "an" before it."""
     return ("an " if kind[0] in "aeiou" else "a ") + kind
 
 
 def _list_units(kind: str) -> str:
+    """Return the units of a kind of quantity as text for a message."""
     return ", ".join(UNIT_FACTORS[kind])

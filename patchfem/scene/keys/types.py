@@ -71,6 +71,10 @@ class Check:
     def __get_pydantic_core_schema__(
         self, source: KeyType, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
+        """Return the schema of the annotated type `source`, to which this check is added.
+
+        `handler` makes the schema of the type itself; pydantic calls this method.
+        """
         return self.make_schema(self.function, handler(source))
 
 
@@ -265,6 +269,10 @@ class Table(BaseModel):
     def __get_pydantic_core_schema__(
         cls, source: KeyType, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
+        """Return the schema of a table, in which the tables inside it are validated by their own class.
+
+        pydantic calls this method with the class (`source`) and with `handler`, which makes its usual schema.
+        """
         if _OUTER_TABLE.get() is not None:
             return core_schema.no_info_plain_validator_function(cls._validate_inner)
         token = _OUTER_TABLE.set(cls)
@@ -277,16 +285,25 @@ class Table(BaseModel):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
+        """Return the JSON schema of a table; inside another table it is only the name of its class.
+
+        pydantic calls this method with the inner `schema` and with `handler`, which converts it.
+        """
         is_inner = schema["type"] == "function-plain"
         return {TABLE_WORD: cls.__name__} if is_inner else handler(schema)
 
     @classmethod
     def _validate_inner(cls, value: TomlValue | Table) -> Table:
+        """Return a table from plain values; a `value` that is such a table already is returned unchanged."""
         return value if isinstance(value, cls) else cls.model_validate(value)
 
     @field_validator("*", mode="after")
     @classmethod
     def _collect_value(cls, value: KeyValue, info: ValidationInfo) -> KeyValue:
+        """Put each valid value into the context of the validation, if there is one, and return it unchanged.
+
+        So the valid `value` of a key, whose name `info` has, is known even if another key is wrong.
+        """
         if info.context is not None:
             info.context[info.field_name] = value
         return value
@@ -310,12 +327,13 @@ def build_table(model: type[Table], values: dict[str, KeyValue]) -> Table:
 
 @cache
 def _find_default_values(model: type[Table]) -> dict[str, KeyValue]:
+    """Return the default of each optional key of a table `model`, by attribute."""
     optional = {name: key for name, key in model.model_fields.items() if not key.is_required()}
     return {name: key.get_default(call_default_factory=True) for name, key in optional.items()}
 
 
 def advise_on_name(written_name: str, names: Iterable[str]) -> str:
-    """Return a hint for a wrong name: ``did you mean 'x'? use one of x, y``."""
+    """Return a hint for a wrong name, `written_name`: ``did you mean 'x'? use one of x, y``."""
     known = list(names)
     near = get_close_matches(written_name, known, 1, MIN_NAME_SIMILARITY)
     near = near or [name for name in known if name.lower() == written_name.lower()]
@@ -370,7 +388,7 @@ class Key:
 
 @cache
 def list_keys(model: type[Table]) -> dict[str, Key]:
-    """Return the keys of a table, by their names in a scene."""
+    """Return the keys of a table, whose class is `model`, by their names in a scene."""
     keys = [Key(model, attribute) for attribute in model.model_fields]
     return {key.name: key for key in keys}
 

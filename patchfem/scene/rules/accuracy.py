@@ -76,7 +76,10 @@ def check_quadrature(draft: SceneDraft, kind: str) -> None:
 
 
 def check_settings(draft: SceneDraft, kind: str) -> None:
-    """Add a remark on each numerical setting that is fixed but has no effect in this scene."""
+    """Add a remark to the draft on each numerical setting that is fixed but has no effect.
+
+    `kind` is the kind of scene, such as "rig".
+    """
     if kind and draft.tables.accuracy is not None:
         for setting, where in find_unused_settings(draft.tables, kind).items():
             draft.add_remark(
@@ -115,7 +118,7 @@ def list_repeated_axes(
 
 
 def _is_repeated(draft: SceneDraft, kind: str) -> bool:
-    """Return whether a run that misses its tolerance may be repeated."""
+    """Return whether a run of the draft, of this kind of scene, that misses its tolerance may be repeated."""
     tables = draft.tables
     patches = [patch for _, patch in iterate_patches(draft)]
     axes = list_repeated_axes(
@@ -128,7 +131,10 @@ def _is_repeated(draft: SceneDraft, kind: str) -> bool:
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
-    """Return the numerical settings that have no effect, with the reason for each."""
+    """Return the numerical settings of the tables of a scene that have no effect, with the reason for each.
+
+    Only settings that the scene fixes count. `kind` is the kind of scene, such as "rig".
+    """
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}
@@ -146,7 +152,10 @@ def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
 
 
 def _find_reason_without_effect(setting: str, accuracy: Accuracy, motion: MotionFeatures) -> str:
-    """Return why a setting has no effect on the laws and patches of a motion, or "" if it has an effect."""
+    """Return why a setting has no effect on the laws and patches of a motion, or "" if it has an effect.
+
+    `setting` is a key of the table `accuracy`.
+    """
     trait = SETTING_SCOPES[setting].trait
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):

@@ -15,11 +15,15 @@ from .structure import check_energy_gain, check_structure
 from .together import check_together
 from .wear import check_wear
 
+# Tables that decide the kind of a scene
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
 
 def check_scene(draft: SceneDraft) -> str:
-    """Report all mistakes of a scene; return the kind of scene, or "" if the tables define none."""
+    """Report all mistakes of a scene draft to it; return the kind of scene.
+
+    The kind is "patch", "bench", "rig" or "linear", or "" if the tables define none.
+    """
     check_needed_keys(draft)
     check_patches(draft)
     check_laws(draft)
@@ -42,7 +46,7 @@ def check_scene(draft: SceneDraft) -> str:
 
 
 def _check_slide(draft: SceneDraft) -> None:
-    """Report mistakes inside [slide]."""
+    """Report mistakes inside [slide] of a scene draft."""
     scene = draft.values
     slide = scene.slide
     if slide.kind in ("constant", "dwell") and slide.distance == 0:
@@ -58,7 +62,10 @@ def _check_slide(draft: SceneDraft) -> None:
 
 
 def find_kind(draft: SceneDraft) -> str:
-    """Return the kind of run that the tables define, "" if they define none."""
+    """Return the kind of run that the tables of a draft define, "" if they define none.
+
+    It is "patch" for [contact] alone, "bench" with [slide], "linear" for a structure without friction, and else "rig".
+    """
     tables = {name for name in RUN_TABLES if draft.has(name)}
     if draft.has("structure.interface"):
         # Each interface holds a law and a load, which count here as the tables [friction] and [normal].
@@ -76,7 +83,7 @@ def find_kind(draft: SceneDraft) -> str:
 
 
 def _check_sliding(draft: SceneDraft, kind: str) -> None:
-    """Report a rig in which no mode moves the patch."""
+    """Report a draft, of the kind "rig", in which no mode moves the patch."""
     modes = tuple(draft.values.structure.mode) if kind == "rig" else ()
     if modes and all(mode.slide == 0 for mode in modes):
         draft.add_mistake(

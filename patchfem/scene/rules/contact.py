@@ -19,13 +19,16 @@ MAX_ELEMENTS = 100_000
 
 
 def find_max_load(patch: TableView) -> float:
-    """Return the load [N] at which the mean pressure is the lower Young's modulus of the two substrates."""
+    """Return the load [N] of a patch at which the mean pressure is Young's modulus.
+
+    It is that of the softer substrate.
+    """
     moduli = [(patch[name].substrate or patch.substrate).young for name in PIECE_NAMES]
     return min(moduli) * find_flat_length(patch) * patch.width * patch.pairs
 
 
 def iterate_patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
-    """Yield the dotted keys and tables of all patches: [contact] and those of interfaces."""
+    """Yield dotted key and table of all patches of a draft: [contact] and those of interfaces."""
     if draft.tables.contact is not None:
         yield "contact", draft.tables.contact
     for index, interface in enumerate(draft.values.structure.interface):
@@ -34,7 +37,7 @@ def iterate_patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
 
 
 def check_patches(draft: SceneDraft) -> None:
-    """Report mistakes inside [contact] and inside the patches of interfaces."""
+    """Report mistakes inside [contact] of a draft and inside the patches of its interfaces."""
     for table_key, contact in iterate_patches(draft):
         patch = TableFacts(draft, table_key, contact)
         check_outlines(patch)
@@ -48,7 +51,10 @@ def check_patches(draft: SceneDraft) -> None:
 
 
 def _check_sizes(patch: TableFacts, flat_length: float) -> None:
-    """Report a load or a height that no elastic piece has, and a step outside the patch."""
+    """Report a load or a height of a patch that no elastic piece has, and a step outside it.
+
+    `flat_length` [m] is the length over which both faces are flat.
+    """
     max_load = find_max_load(patch)
     if patch.load >= max_load:
         patch.add_mistake(
@@ -71,7 +77,10 @@ def _check_sizes(patch: TableFacts, flat_length: float) -> None:
 
 
 def _check_mesh(patch: TableFacts, flat_length: float) -> None:
-    """Report elements of an impossible size."""
+    """Report elements of a patch that are longer than its face, or too many.
+
+    `flat_length` [m] is the length over which both faces are flat.
+    """
     size = patch.element_size
     if size > flat_length:
         name = "contact.length =" if flat_length == patch.length else "the interface length of"
@@ -85,7 +94,7 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
 
 
 def _check_strips(patch: TableFacts) -> None:
-    """Report a load line over the width that the strips cannot carry."""
+    """Report an offset of the load across the width that the strips of a patch cannot carry."""
     if not (patch.strips and patch.has("strips.offset")):
         return
     if patch.strips.count < 2:
@@ -104,7 +113,10 @@ def _check_strips(patch: TableFacts) -> None:
 
 
 def _check_load_line(patch: TableFacts, half_length: float) -> None:
-    """Report a load line outside the patch, and an approach of a piece that can rotate."""
+    """Report a load line outside the patch, and an approach of a piece that can rotate.
+
+    `half_length` [m] is half the length over which both faces are flat.
+    """
     if patch.approach and (patch.has("load_line") or patch.holder.rotational_stiffness):
         name = "approach of a piece that can rotate"
         patch.add_mistake("approach", describe_removed(name, f"an {name}"))
@@ -123,7 +135,7 @@ def _check_load_line(patch: TableFacts, half_length: float) -> None:
 
 
 def _check_coatings(patch: TableFacts) -> None:
-    """Report coatings that are not thinner than their piece."""
+    """Report coatings of a patch that are not thinner than their piece."""
     layers = [("coating.thickness", patch.coating, patch.height)]
     for name in PIECE_NAMES:
         piece = patch[name]
@@ -140,7 +152,7 @@ def _check_coatings(patch: TableFacts) -> None:
 
 
 def _check_shapes_have_a_piece(patch: TableFacts) -> None:
-    """Report gap shapes whose table lacks the key `on`, because `Contact.shapes` would leave them out.
+    """Report gap shapes of a patch whose table lacks the key `on`; `Contact.shapes` leaves them out.
 
     Only a shape that somebody adds to the package can lack this key.
     """

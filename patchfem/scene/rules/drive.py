@@ -9,7 +9,7 @@ MIN_DRIVE_CYCLES = 0.25
 
 
 def check_drive(draft: SceneDraft) -> None:
-    """Report mistakes inside [drive]."""
+    """Report mistakes inside [drive] of a scene draft."""
     drive = TableFacts(draft, "drive", draft.tables.drive)
     if drive.kind in ("base", "force"):
         _check_waveform(drive)
@@ -45,7 +45,10 @@ def _check_waveform(drive: TableFacts) -> None:
 
 
 def check_length(draft: SceneDraft, kind: str) -> None:
-    """Report a run that is shorter than a quarter of a cycle."""
+    """Report a draft whose run is shorter than a quarter of a drive cycle.
+
+    `kind` is the kind of scene; only "rig" and "linear" have a drive.
+    """
     if kind not in ("rig", "linear"):
         return
     drive = TableFacts(draft, "drive", draft.tables.drive)

@@ -14,6 +14,7 @@ class TableFacts(TableView):
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read, to which mistakes are added.
     table_key : str
         Dotted key of the table, such as "contact" or "structure.interface.0.contact".
     table : Table or None
@@ -46,11 +47,11 @@ class TableFacts(TableView):
         return any(find_value(self._written, name) is not None for name in names)
 
     def add_mistake(self, key: str, sentence: str) -> None:
-        """Add a mistake at a key of the table."""
+        """Add a mistake at a key of the table; the sentence says what is wrong, and what to do."""
         self.draft.add_mistake(f"{self.table_key}.{key}", sentence)
 
     def add_missing(self, key: str, reason: str = "") -> None:
-        """Add a missing key of the table as a mistake."""
+        """Add a missing key of the table as a mistake; the reason says what needs it."""
         self.draft.add_missing(f"{self.table_key}.{key}", reason)
 
     def add_remark(self, key: str, sentence: str) -> None:

@@ -8,7 +8,7 @@ from .view import TableView
 
 
 def check_laws(draft: SceneDraft) -> None:
-    """Report mistakes inside [friction] and inside the laws of interfaces."""
+    """Report mistakes inside [friction] of a draft and inside the laws of its interfaces."""
     laws = {"friction": draft.tables.friction}
     for index, interface in enumerate(draft.values.structure.interface):
         laws[f"structure.interface.{index}"] = interface.table
@@ -21,7 +21,10 @@ def check_laws(draft: SceneDraft) -> None:
 
 
 def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
-    """Report coefficients of friction that exclude each other or the other keys of the law."""
+    """Report coefficients of friction that exclude each other or the other keys of the law.
+
+    `unused` are the keys that have no meaning for this law.
+    """
     # A kinetic coefficient of a law that has none is reported as a key without meaning.
     if law_takes_key(law.table.law, "kinetic") or not law.has("kinetic"):
         if law.kinetic > law.static:
@@ -37,11 +40,15 @@ def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
         )
 
 
+# Remark on a key that has no effect
 CONSTANT_LENGTH = "has no effect while the bond length is constant; add rest_growth and slip_growth"
 
 
 def _check_bonds(law: TableFacts, unused: list[str]) -> None:
-    """Report keys of bonds that are impossible, missing or without effect."""
+    """Report keys of the bonds of a law that are impossible, missing or without effect.
+
+    `unused` are the keys that have no meaning for this law.
+    """
     if "rest_speed" in unused:
         law.add_remark("rest_speed", CONSTANT_LENGTH)
     if "temperature" in unused:

@@ -8,7 +8,7 @@ from .view import TableView
 
 
 def find_grooves(draft: SceneDraft) -> TableFacts | None:
-    """Return the table of the grooves of a scene, or None if it has none."""
+    """Return the table of the grooves of a scene draft, or None if it has none."""
     for name in ("contact", "normal"):
         if draft.values[name].grooves:
             return TableFacts(draft, f"{name}.grooves", draft.values[name].grooves.table)
@@ -21,7 +21,7 @@ def find_steepest_slope(grooves: TableView) -> float:
 
 
 def check_grooves(draft: SceneDraft) -> None:
-    """Report mistakes in the grooves of a scene."""
+    """Report grooves of a scene draft that are so steep that the pieces lock on them."""
     grooves = find_grooves(draft)
     static = draft.values.friction.static
     if grooves is None or not draft.values.friction.law:

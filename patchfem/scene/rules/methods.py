@@ -63,7 +63,10 @@ class MotionFeatures(NamedTuple):
         return self.spring.endswith("grooves]")
 
     def describe_features(self) -> dict[str, str]:
-        """Return the end of a message on each feature that an engine may lack, "" if the motion does not have it."""
+        """Return features of the motion that an engine may lack, by name, as the end of a message.
+
+        A feature that the motion does not have is "".
+        """
         words = {
             "no-law": "" if self.joints else "for law 'none'",
             "load": self.load_change,
@@ -108,6 +111,7 @@ ENGINE_SUPPORT = {
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
+# Key of the engine that computes the motion
 METHOD_KEY = "accuracy.method"
 
 
@@ -161,7 +165,11 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
 
 
 def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
-    """Return whether the engine `hybrid` has the law of an interface."""
+    """Return whether the engine `hybrid` has the law of an interface (`joint`).
+
+    `motion` tells what the scene has beside: grooves, a varying load, a shaped lower piece. The engine needs a state
+    of a fixed number of values.
+    """
     law = joint.law.law
     if motion.has_grooves:
         return law_has_trait(law, "memoryless") and not joint.compliance
@@ -175,7 +183,10 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
-    """Report an accuracy.method that cannot solve the scene; add a remark on a method that is not used."""
+    """Report an accuracy.method that cannot solve the scene of a draft.
+
+    A method that is not used in this `kind` of scene gets a remark.
+    """
     method = draft.values.accuracy.method
     if method in list_unused_methods(kind):
         draft.add_remark(
@@ -193,7 +204,10 @@ def list_unused_methods(kind: str) -> tuple[str, ...]:
 
 
 def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
-    """Return the features of a scene, as far as its tables could be read."""
+    """Return the features of a scene, as far as its tables could be read.
+
+    `kind` is the kind of scene; only a "rig" has interfaces.
+    """
     scene = TableView(tables)
     if kind != "rig":
         return MotionFeatures(
@@ -215,19 +229,22 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
 
 
 def find_compliance_key(law: Friction, tables: Tables) -> str:
-    """Return the key that allows partial slip of the patch under a law, or "" if there is none."""
+    """Return the key in the tables that allows partial slip under a law, or "" if there is none."""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
 
 
 def list_lower_shapes(contact: Contact | None, table_key: str = "contact") -> list[str]:
-    """List the keys that place a gap shape on the lower piece, such as `contact.crown.on`."""
+    """List the keys that place a gap shape of a patch on the lower piece, such as `contact.crown.on`.
+
+    `table_key` is the dotted key of the patch.
+    """
     shapes = contact.shapes if contact is not None else {}
     return [f"{table_key}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
 
 
 def find_nonlinear_spring(tables: Tables) -> str:
-    """Return the key of the nonlinear spring of the rig, or "" if it has none."""
+    """Return the key in the tables of the nonlinear spring of the rig, or "" if it has none."""
     structure = TableView(tables).structure
     if structure.stiffening:
         return "[structure.stiffening]"
@@ -235,7 +252,10 @@ def find_nonlinear_spring(tables: Tables) -> str:
 
 
 def find_climbed_grooves(tables: Tables) -> str:
-    """Return the key of the grooves that the upper piece climbs, or "" if there are none or they are flat."""
+    """Return the key in the tables of the grooves that the upper piece climbs.
+
+    It is "" if there are none or they are flat.
+    """
     for name in ("contact", "normal"):
         if TableView(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
@@ -243,12 +263,12 @@ def find_climbed_grooves(tables: Tables) -> str:
 
 
 def find_yaw_key(tables: Tables) -> str:
-    """Return the key of the yaw of the first mode that yaws the patch, or "" if no mode does."""
+    """Return the key in the tables by which a mode yaws the patch, or "" if no mode does."""
     return _find_mode_key(tables, "yaw")
 
 
 def find_heave_key(tables: Tables) -> str:
-    """Return the key by which a mode heaves or pitches the patch, or "" if no mode does."""
+    """Return the key in the tables by which a mode heaves or pitches the patch, "" if none does."""
     structure = TableView(tables).structure
     keys = ("normal_at", "pitch_at") if structure.file else ()
     places = (f"structure.{key}" for key in keys if structure[key])
@@ -256,13 +276,13 @@ def find_heave_key(tables: Tables) -> str:
 
 
 def find_load_change_key(tables: Tables) -> str:
-    """Return the key that makes the load of a rig vary, or "" if the load is constant."""
+    """Return the key in the tables that makes the load of a rig vary, or "" if it is constant."""
     is_varied = TableView(tables).normal.amplitude
     return "normal.amplitude" if is_varied else find_heave_key(tables)
 
 
 def _find_mode_key(tables: Tables, *names: str) -> str:
-    """Return the first of some keys of the modes that is not 0, or "" if all are."""
+    """Return the first of the keys `names` of the modes in the tables that is not 0, or ""."""
     for index, mode in enumerate(TableView(tables).structure.mode):
         for name in names:
             if mode[name]:
@@ -271,13 +291,26 @@ def _find_mode_key(tables: Tables, *names: str) -> str:
 
 
 def describe_load_change(key: str) -> str:
-    """Return the cause of a changing load, such as normal.amplitude or "a mode's pitch"."""
+    """Return the cause of a changing load by its key: normal.amplitude, or "a mode's pitch"."""
     motion = key.rpartition(".")[2].removesuffix("_at")
     return key if key == "normal.amplitude" else f"a mode's {motion}"
 
 
 def _find_obstacle(method: str, motion: MotionFeatures) -> str:
-    """Return why a value of accuracy.method cannot compute a motion, or "" if it can."""
+    """Return why a value of accuracy.method cannot compute a motion, or "" if it can.
+
+    Parameters
+    ----------
+    method : str
+        Value of accuracy.method.
+    motion : MotionFeatures
+        What the scene contains that engines may not support.
+
+    Returns
+    -------
+    str
+        Reason and remedy, for a message.
+    """
     limits = {name: find_unsupported_feature(row, motion) for name, row in ENGINE_SUPPORT.items()}
     if method == "harmonic":
         return _find_harmonic_obstacle(motion, limits)
@@ -306,7 +339,10 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> str:
-    """Return why harmonic balance cannot find the steady motion, or "" if it can."""
+    """Return why harmonic balance cannot find the steady motion of a scene, or "" if it can.
+
+    `limits` has, for each engine, the feature of the `motion` that it does not support, or "".
+    """
     wave = motion.waveform
     drive = TableView(motion.drive)
     if drive.kind == "free" or (wave.name and not wave.has_steady_motion):

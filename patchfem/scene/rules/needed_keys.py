@@ -23,7 +23,11 @@ HINTS = {  # what else a user should know about a missing key
 
 
 def check_needed_keys(draft: SceneDraft) -> None:
-    """Report the keys that the tables of a scene lack or exclude; add a remark on each key without meaning."""
+    """Report the keys that the tables of a draft lack or exclude; add a remark on each key without meaning.
+
+    Which keys a table needs follows from its selectors, such as `law` or `waveform`, from other keys (NEEDS), and from
+    lists that must have equal lengths.
+    """
     for table_key, model_table in iterate_tables(draft.tables):
         table = TableFacts(draft, table_key, model_table)
         choices = find_choices(model_table)
@@ -59,9 +63,14 @@ def check_needed_keys(draft: SceneDraft) -> None:
 
 
 def _check_need(table: TableFacts, need: Need, reason: str, *, is_required: bool) -> None:
-    """Report keys of which none is given, or too many."""
+    """Report keys of a table of which none is given, or too many.
+
+    A `need` lists bundles of keys: one bundle must be given if it `is_required`, and only one if they exclude each
+    other. `reason` says, in the message, what needs them.
+    """
 
     def is_written(key: str) -> bool:
+        """Return whether a key is given, or probably meant by a misspelt one."""
         return table.has(key) or f"{table.table_key}.{key}" in table.draft.suggested_keys
 
     used = [bundle for bundle in need.bundles if any(map(is_written, bundle))]

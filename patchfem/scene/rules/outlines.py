@@ -3,7 +3,9 @@
 from .facts import TableFacts
 from .view import UNKNOWN_VALUE, TableView
 
+# Keys of a patch that hold its two pieces
 PIECE_NAMES = ("upper", "lower")
+# Keys of a piece for the lengths [m] of its shaped ends
 END_KEYS = ("chamfer", "end_radius")
 # Smallest end, or difference of lengths, as a fraction of the length of a piece; a smaller
 # one is smaller than any element.
@@ -11,12 +13,15 @@ MIN_PIECE_END_FRACTION = 1e-5
 
 
 def find_piece_length(contact: TableView, name: str) -> float:
-    """Return the length [m] of the piece "upper" or "lower"."""
+    """Return the length [m] of the piece `name`, "upper" or "lower", of a table [contact]."""
     return contact[name].length or contact.length
 
 
 def find_flat_length(patch: TableView) -> float:
-    """Return the length [m] over which both faces are flat and opposite, or UNKNOWN_VALUE if there is none."""
+    """Return the length [m] over which both faces of a patch are flat and opposite.
+
+    It is UNKNOWN_VALUE if there is none.
+    """
     lengths = []
     for name in PIECE_NAMES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS)
@@ -42,7 +47,7 @@ def check_outlines(patch: TableFacts) -> None:
 
 
 def _check_piece(patch: TableFacts, name: str) -> None:
-    """Report ends that do not fit into the length and height of a piece."""
+    """Report ends that do not fit into a piece of a patch; its name is "upper" or "lower"."""
     piece = patch[name]
     length = find_piece_length(patch, name)
     height = piece.height or patch.height

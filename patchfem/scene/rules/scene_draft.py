@@ -19,6 +19,7 @@ SET_MISTAKE_ORDER = 10**9
 # Length in characters above which a message cuts a word; keys, units and file names are shorter.
 MAX_WORD_CHARACTERS = 200
 N_SHOWN_CHARACTERS = 60  # number of characters of a cut word that a message shows
+# Pattern of a word that is cut in a message
 _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 
@@ -88,22 +89,25 @@ class SceneDraft:
         return find_value(self.raw, key)
 
     def add_mistake(self, key: str, message: str) -> None:
-        """Add a mistake at the line of a key or, if the key is missing, of the nearest table above it."""
+        """Add a message about a mistake at the line of a key.
+
+        If the key is missing, it is the line of the nearest table above it.
+        """
         order, location = self._locate(key)
         self._add(order, location, number_items_from_one(f"{self.display_key(key)}: {message}"))
 
     def add_missing(self, key: str, reason: str) -> None:
-        """Add a missing key as a mistake at the line of its table."""
+        """Add a missing key as a mistake at the line of its table; the reason says what needs it."""
         needed = describe_missing_key(find_key(key), key)
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 
     def add_missing_table(self, name: str, reason: str) -> None:
-        """Add a missing table as a mistake of the whole file."""
+        """Add the missing table `name` as a mistake of the whole file; the reason says what needs it."""
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
-        """Add a mistake for a --set option, or a first value of [sweep], that cannot be applied."""
+        """Add the text of a mistake in a --set option, or a first value of [sweep], that cannot be applied."""
         if self.swept_key:
             self.add_mistake(self.swept_key, text)
         else:
@@ -142,13 +146,17 @@ class SceneDraft:
         return ".".join(pieces)
 
     def _locate(self, key: str) -> tuple[int, str]:
-        """Return the sort order of a mistake and the text that locates it, such as FILE:LINE."""
+        """Return the sort order of a mistake at a key and the text that locates it, such as FILE:LINE."""
         if find_line(dict.fromkeys(self.sets, 1), key):
             return SET_MISTAKE_ORDER, "--set"
         line = find_line(self.lines, key)
         return line, f"{self.path}:{line}" if line else self.path
 
     def _add(self, order: int, location: str, text: str) -> None:
+        """Add the text of a mistake once, with the location before it; long words and control characters are cut.
+
+        `order` sorts the mistakes: a line number, or 0 for the whole file.
+        """
         text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:N_SHOWN_CHARACTERS]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)
         self._mistakes.setdefault((order, f"{location}: {printable}"))
@@ -168,4 +176,5 @@ def find_value(value: TomlValue | None, key: str) -> TomlValue | None:
 
 @lru_cache(4096)
 def _split_at_dots(key: str) -> tuple[str, ...]:
+    """Return the words of a dotted key."""
     return tuple(key.split("."))

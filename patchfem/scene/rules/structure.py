@@ -19,11 +19,12 @@ NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
+# Keys that name places of a universal file
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 
 
 def check_structure(draft: SceneDraft) -> None:
-    """Report mistakes inside [structure]."""
+    """Report mistakes inside [structure] of a scene draft."""
     structure = TableFacts(draft, "structure", draft.tables.structure)
     if draft.tables.structure is None:
         return
@@ -40,7 +41,7 @@ def check_structure(draft: SceneDraft) -> None:
 
 
 def _check_file(structure: TableFacts) -> None:
-    """Report a file that cannot be read by its extension, and keys that do not fit to its kind."""
+    """Report a structure.file that cannot be read by its extension, and keys that do not fit to it."""
     extension = Path(structure.file).suffix.lower()
     if extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS):
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
@@ -76,7 +77,7 @@ def _check_file(structure: TableFacts) -> None:
 
 
 def _check_joint(structure: TableFacts) -> None:
-    """Report a bonded spring without a single contact."""
+    """Report a bonded spring of a structure that has no interface or several."""
     n_interfaces = len(tuple(structure.interface))
     if structure.bonded and structure.table.masses is not None and n_interfaces != 1:
         structure.add_mistake(
@@ -87,7 +88,13 @@ def _check_joint(structure: TableFacts) -> None:
 
 
 def _check_reduced(structure: TableFacts) -> None:
-    """Report files of [structure.reduced] that cannot be read by their extension, and wrong coordinates."""
+    """Report files of [structure.reduced] that cannot be read by their extension, and wrong coordinates.
+
+    Parameters
+    ----------
+    structure : TableFacts
+        Table [structure] with the table [structure.reduced].
+    """
     reduced = structure.reduced
     for key in MATRIX_KEYS:
         file = getattr(reduced.table, key)
@@ -123,7 +130,10 @@ def _describe_extension(extension: str) -> str:
 
 
 def _check_modes(structure: TableFacts) -> None:
-    """Report modes of equal name, too much damping, and participations in the base motion above 1."""
+    """Report modes of a structure with equal names, and participations in the base motion above 1.
+
+    Unusually high damping gets a remark.
+    """
     names: set[str] = set()
     squares = []
     for index, mode in enumerate(structure.mode):
@@ -139,6 +149,7 @@ def _check_modes(structure: TableFacts) -> None:
                 f"{path}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
+        # Participation in the base motion: that of the first mode is the one in the sliding unless it is given.
         default = 0.0 if index else mode.slide
         base = mode.base if structure.has(f"{path}.base") else default
         squares.append((base or 0.0) ** 2)
@@ -154,7 +165,7 @@ def _check_modes(structure: TableFacts) -> None:
 
 
 def check_energy_gain(draft: SceneDraft, kind: str) -> None:
-    """Report modes that gain energy in a scene without friction."""
+    """Report modes of a draft that gain energy in a scene without friction (of the kind "linear")."""
     for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
         if mode.damping < 0:
             draft.add_mistake(
@@ -170,9 +181,11 @@ def default_output(index: int) -> float:
 
 
 def describe_default_outputs(tables: Tables) -> list[str]:
-    """Return a sentence about each mode whose default of `output` decides what a drive or a sensor does.
+    """Return a sentence on each mode whose default of `output` decides what a drive or sensor does.
 
     These are the first mode under a force, which acts at the output point, and other modes that slide.
+
+    `tables` are those of the scene.
     """
     modes = tables.structure.mode if tables.structure is not None else ()
     drive = tables.drive
@@ -201,7 +214,7 @@ def describe_default_outputs(tables: Tables) -> list[str]:
 
 
 def find_instrument_key(draft: SceneDraft) -> str:
-    """Return the key of the first sensor whose motion differs from that of the output, or "" if there is none."""
+    """Return the key of the first sensor of a draft that moves unlike the output, "" if there is none."""
     for index, mode in enumerate(draft.values.structure.mode):
         output = default_output(index) if mode.table.output is None else mode.output
         for key in ("accelerometer", "gauge"):
@@ -232,7 +245,10 @@ def _find_coordinates(structure: TableFacts) -> CoordinateNumbers:
 
 
 def _iterate_numbered_places(structure: TableFacts) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """Yield each key that names masses or boundary coordinates by number, with the numbers."""
+    """Yield each key of a structure that names masses or coordinates by number, with the numbers.
+
+    The number 0 stands for the base.
+    """
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(structure[name]):
             yield f"structure.{name}.{index}.between", tuple(item.between)
@@ -244,7 +260,7 @@ def _iterate_numbered_places(structure: TableFacts) -> Iterator[tuple[str, tuple
 
 
 def _check_numbered_places(structure: TableFacts) -> None:
-    """Report masses or boundary coordinates that do not exist, and pairs that join one of them to itself."""
+    """Report masses or coordinates that a structure does not have, and pairs that join one to itself."""
     values, noun, list_key = _find_coordinates(structure)
     for key, numbers in _iterate_numbered_places(structure):
         base = "; 0 stands for the base" if len(numbers) == 2 else ""
@@ -262,7 +278,7 @@ def _check_numbered_places(structure: TableFacts) -> None:
 
 
 def _check_start(structure: TableFacts) -> None:
-    """Report initial values that are not one for each mode, mass or boundary coordinate."""
+    """Report initial values of a structure that are not one for each mode, mass or coordinate."""
     coordinates = _find_coordinates(structure)
     if coordinates.values:
         count = len(coordinates.values)

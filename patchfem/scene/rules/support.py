@@ -53,9 +53,11 @@ class Joint(TableFacts):
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read, to which mistakes are added.
     table_key : str
         Dotted key of the law: "friction", or that of an interface between masses.
     law : Friction or None
+        Table of the friction law, None if it could not be read.
     contact : Contact or None
         Patch of the joint.
     kind : str
@@ -83,20 +85,20 @@ class Joint(TableFacts):
         self.wave = find_waveform(draft.tables.drive)
 
     def find_key_value(self, key: str) -> ViewValue:
-        """Return the value of a key of the scene, or of the patch of the joint if it begins with "patch"."""
+        """Return the value of a dotted key of the scene; "patch" at its beginning stands for the patch of this joint."""
         table, *names = key.split(".")
         return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
 
     def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait of `effects.LAWS[...].traits`."""
+        """Return whether the law has a trait, such as "bonds"; `effects.LAWS` lists them."""
         return law_has_trait(self.law or None, trait)
 
     def supports(self, *words: str) -> bool:
-        """Return whether the law is known and supports all of the given features."""
+        """Return whether the law is known and supports all of some features, such as "pieces"."""
         return self.law in LAWS and all(law_supports(self.table, word) for word in words)
 
     def lacks(self, *words: str) -> bool:
-        """Return whether the law is known and does not support all of the given features."""
+        """Return whether the law is known and does not support all of some features, such as "pieces"."""
         return self.law in LAWS and not self.supports(*words)
 
     @property
@@ -293,7 +295,7 @@ FEATURES = {
 
 @cache
 def find_feature(name: str) -> Feature:
-    """Return a feature of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
+    """Return the feature `name` of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
     if name in FEATURES:
         return FEATURES[name]
     key, _, value = name.partition("=")
@@ -326,7 +328,10 @@ SUPPORT = _read_rows()
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
-    """Report combinations of keys that a run of this kind cannot compute yet."""
+    """Report combinations of keys in a draft that a run of this kind cannot compute yet.
+
+    The combinations are the rows of SUPPORT, which are tried on each interface.
+    """
     check_method(draft, kind)
     joints = [Joint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
     for index, interface in enumerate(draft.values.structure.interface if kind == "rig" else ()):
@@ -349,7 +354,10 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
 
 def describe_row(names: str, instead: str) -> str:
-    """Return the message of a row of SUPPORT, with names of properties in braces."""
+    """Return the message of a row of SUPPORT, with names of properties of a `Joint` in braces.
+
+    `names` are the features of the row, and `instead` is what the user can do.
+    """
     first, *others = names.split(", ")
     words = find_feature(first).words
     if beside := " and ".join(filter(None, map(_name_feature, others))):

@@ -48,7 +48,11 @@ MISSING = _list_rows("missing")
 
 
 def check_together(draft: SceneDraft, kind: str) -> None:
-    """Report the keys of a scene that need, exclude or idle beside keys of other tables."""
+    """Report the keys of a draft that need or exclude keys of other tables, or have no effect with them.
+
+    `kind` is the kind of scene. Each row of the tables MISTAKES, REMARKS, MISSING_TABLES and MISSING is a condition,
+    such as a key and its value, with a sentence.
+    """
     patches = [key for key, _ in iterate_patches(draft)]
     for rows, report in (
         (MISTAKES, draft.add_mistake),
@@ -83,7 +87,12 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
 
 
 class _Clause(NamedTuple):
-    """Clause of a condition: its keys, and the values that one of them has, () for any."""
+    """Clause of a condition on the keys of a scene.
+
+    - is_negated: whether the clause must not hold.
+    - keys: dotted keys, of which one must be given.
+    - values: values that this key must have, () for any.
+    """
 
     is_negated: bool
     keys: tuple[str, ...]

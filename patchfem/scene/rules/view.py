@@ -21,9 +21,11 @@ class _Unknown(float):
         return iter(())
 
     def __getattr__(self, name: str) -> _Unknown:
+        """Return this value, whatever the attribute: a part of an unknown value is unknown."""
         return self
 
     def __getitem__(self, name: str) -> _Unknown:
+        """Return this value, whatever the key."""
         return self
 
 
@@ -42,11 +44,13 @@ class TableView:
         self.table = table
 
     def __getattr__(self, name: str) -> ViewValue:
+        """Return the value of a key of the table by its attribute name, wrapped; unknown without a table."""
         value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds the value without this method
         return value
 
     def __getitem__(self, name: str) -> ViewValue:
+        """Return the value of a key of the table by its attribute name."""
         return getattr(self, name)
 
 

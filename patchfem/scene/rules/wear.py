@@ -10,7 +10,7 @@ from .view import UNKNOWN_VALUE
 
 
 def check_wear(draft: SceneDraft) -> None:
-    """Report mistakes in [wear.friction]."""
+    """Report mistakes in [wear.friction] of a scene draft."""
     wear = TableFacts(draft, "wear", draft.tables.wear)
     if wear.friction:
         _check_friction(wear)
@@ -18,7 +18,7 @@ def check_wear(draft: SceneDraft) -> None:
 
 
 def _check_friction(wear: TableFacts) -> None:
-    """Report depths that do not rise from 0, and factors that do not begin with 1."""
+    """Report wear depths that do not rise from 0, and factors that do not begin with 1."""
     depths = tuple(wear.friction.depth)
     if depths and (depths[0] or not all(low < high for low, high in pairwise(depths))):
         wear.add_mistake(
@@ -36,7 +36,10 @@ def _check_friction(wear: TableFacts) -> None:
 
 
 def _check_law(wear: TableFacts) -> None:
-    """Report factors on a key that the friction law does not have, or with which the pieces lock."""
+    """Report factors in [wear.friction] on a key that the law lacks, or with which the pieces lock.
+
+    `wear` is the table [wear].
+    """
     law = wear.scene.friction
     if wear.friction.bond_length_factor and not law_takes_key(law.law, "bond_length"):
         wear.add_mistake(

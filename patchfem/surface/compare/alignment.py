@@ -19,25 +19,29 @@ from .statistics import (
     subtract_local_level,
 )
 
-MAX_FIT_POINTS = (
-    40_000  # number of points to which the place is fitted; more would hardly improve it
-)
-MIN_COMMON = 0.2  # smallest common part relative to the own surface
-MAX_STRETCH = 0.015  # largest error of length of a place
+# Largest number of points to which the place is fitted; more would hardly improve it
+MAX_FIT_POINTS = 40_000
+# Smallest part of the own surface that both surfaces must show
+MIN_COMMON = 0.2
+# Largest relative difference in length of two traces at the same place
+MAX_STRETCH = 0.015
 N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
 BEND_GAIN = 0.8
-CLEAR_BEND_GAIN = (
-    0.2  # the same where heights above the first trace do not matter: no line fits at all
-)
+# Noise about a parabola relative to that about a line below which the parabola is subtracted even if it leaves heights
+# above the first trace: then no line fits at all
+CLEAR_BEND_GAIN = 0.2
 MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
-SURE_SIGNIFICANCE = (
-    12.0  # the same as MIN_SIGNIFICANCE, of a place among others nearly as significant
-)
-LIKELY_SIGNIFICANCE = 6.0  # significance of a place that suffices if enough heights agree
-MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
-MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated surfaces
-MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
+# Significance of the correlation at a place above which the place is sure without other evidence
+SURE_SIGNIFICANCE = 12.0
+# Significance of the correlation at a place that suffices if enough heights agree, too
+LIKELY_SIGNIFICANCE = 6.0
+# Smallest fraction, of the heights that do not agree by chance, that must agree at a likely place
+MIN_EXCESS_AGREEMENT = 0.2
+# Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
+MIN_AGREEMENT = 3.0
+# Fraction of heights that must agree in addition to MIN_AGREEMENT times that of unrelated surfaces
+MIN_AGREEING = 0.05
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
@@ -53,6 +57,9 @@ class Aligned:
 
     - numbers: what the sentence on the reason needs.
     - gain_error: standard deviation of the gain, as far as the unworn heights show it.
+    - model: common points of both surfaces.
+    - fit: depths, place and datum that fit the unworn heights.
+    - place: place of the second surface where the search found it.
     """
 
     reason: str = ""
@@ -71,10 +78,16 @@ def align(
     Parameters
     ----------
     first, second : Raster
+        Heights before and after wear, without spikes.
     shift : float, optional
         Known shift of the second trace [m].
     is_straight : bool
         Whether the datum of traces is known to be straight.
+
+    Returns
+    -------
+    Aligned
+        Model and fit, or the reason why the surfaces cannot be compared.
     """
     place = Place(-np.array([shift]), 0.0) if shift is not None else find_place(first, second)
     model = _make_model(first, second, place)
@@ -100,13 +113,20 @@ def align(
 
 
 def _refuse(first: Raster, second: Raster) -> Aligned:
-    """Return why no place is found: a mirror finish, or surfaces that have none."""
+    """Return why no common place of two surfaces is found: a mirror finish, or none exists.
+
+    `first` and `second` are the surfaces before and after wear.
+    """
     numbers = find_mirror_finish([fill_gaps(surface.z) for surface in (first, second)])
     return Aligned("mirror_finish" if numbers else "elsewhere", numbers)
 
 
 def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
-    """Return the model at a place, on part of the points by default; None if the surfaces hardly overlap."""
+    """Return the model of two surfaces at a place; None if they hardly overlap.
+
+    `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every
+    axis; by default as many as MAX_FIT_POINTS allows.
+    """
     own, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
         stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
@@ -139,7 +159,10 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
 
 
 def _is_same_place(aligned: Aligned) -> bool:
-    """Return whether the surfaces have a place in common: by its significance, or by the heights that agree."""
+    """Return whether aligned surfaces really have a place in common.
+
+    That is shown by the significance of the correlation there, or by the fraction of heights that agree.
+    """
     model = aligned.model
     fit = aligned.fit
     own = model.own.z[model.known]
@@ -154,7 +177,9 @@ def _is_same_place(aligned: Aligned) -> bool:
         return True
     chance = _estimate_chance(*waves, noise)
     agreeing = fit.unworn.mean()
-    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS * (1 - chance):
+    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS_AGREEMENT * (
+        1 - chance
+    ):
         return True
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 
@@ -163,6 +188,9 @@ def _estimate_chance(first, second, noise: float) -> float:
     """Return the fraction of heights of unrelated surfaces that agree within the noise.
 
     They are those of both surfaces, without their long waves, at other places.
+
+    `first` and `second` are their heights (n,) or (m, n) [m] on the same points, and `noise` is the standard deviation
+    [m] of an unworn depth.
     """
     count = first.shape[-1]
     fractions = []
@@ -199,7 +227,7 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
 
 
 def _is_bent(straight: Fit, bent: Fit) -> bool:
-    """Return whether a parabolic datum explains the depths better than a straight one."""
+    """Return whether a parabolic datum, the fit `bent`, explains the depths better than a straight one."""
     gain = np.median(bent.noise) / np.median(straight.noise)
     if gain < CLEAR_BEND_GAIN:
         return True
@@ -208,7 +236,24 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
-    """Fit the gain of the instrument too, and keep it if it is clear; return the error of the gain as well."""
+    """Fit the gain of the instrument, too, and keep it if it is clear.
+
+    Parameters
+    ----------
+    model : Model
+        Common points of both surfaces.
+    fit : Fit
+        Fit with a gain of 1.
+    digit : float
+        Standard deviation [m] due to the printed digits of the heights.
+
+    Returns
+    -------
+    fit : Fit
+        With the gain, if it is clear.
+    error : float
+        Standard deviation of the gain [1].
+    """
     scaled = fit
     for _ in range(N_GAIN_STEPS):
         change, error = _estimate_gain(model, scaled)
@@ -225,9 +270,11 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
 
 
 def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
-    """Estimate a further change of the gain, and its standard deviation, from the short waves of the valleys.
+    """Estimate a further change of the gain of a fit, and its standard deviation [1].
 
     A drift has no short waves, and valleys wear last, so that neither passes for another gain.
+
+    It follows from the short waves of the valleys in the `model`.
     """
     unworn = model.draw(fit.unworn, False)
     columns = (fit.depth, model.compute_jacobian(fit.state)[:, -1])
@@ -253,7 +300,7 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
 
 
 def _find_digit(z) -> float:
-    """Return the smallest difference of two heights [m], at most their range over 100."""
+    """Return the smallest difference of two heights z [m], at most their range over 100."""
     levels = np.unique(z[np.isfinite(z)])
     steps = np.diff(levels)
     return float(min(steps.min(), np.ptp(levels) / 100)) if steps.size else 0.0

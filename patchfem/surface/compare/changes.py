@@ -13,13 +13,18 @@ from .statistics import (
     make_polynomials,
 )
 
-WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
-MIN_PART_SIDE = (
-    4  # side of the smallest changed part of scans; a smaller one may be an error of interpolation
-)
-MIN_RUN = 9  # the same of traces, where an error of interpolation at a kink spreads over 7 samples and one on each side
-MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
-MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
+# Sides in samples of the windows whose mean depth is tested, by number of axes
+WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
+# Side in samples of the smallest changed part of scans; a smaller one may be an error of interpolation
+MIN_PART_SIDE = 4
+# Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
+# and one more on each side
+MIN_RUN_SAMPLES = 9
+# Side in samples of the smallest group of points whose own depths, not means over windows, show a change; by number of
+# axes
+MIN_SPOT_SIDE = {1: 1, 2: 3}
+# Standard deviations to which a single depth counts in a mean over a window, by number of axes
+MAX_PULL_DEVIATIONS = {1: 4.0, 2: 8.0}
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
 N_PARTS = 60  # parts of the trace whose means show a shallow track
@@ -46,22 +51,28 @@ def find_changed(depth, noise) -> np.ndarray:
     known = np.isfinite(depth)
     relative = np.where(known, depth / noise, 0.0)
     changed = np.zeros(depth.shape, bool)
-    windows = WINDOWS[depth.ndim]
+    windows = WINDOW_SIDES[depth.ndim]
+
+    # Threshold in standard deviations, so high that noise rarely exceeds it anywhere in all windows
     limit = compute_threshold(len(windows) * known.sum())
-    pull = MAX_PULL[depth.ndim]
+    pull = MAX_PULL_DEVIATIONS[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
 
+    # Windows from single points to wide ones; points that have changed already do not count in wider windows
     for side in windows:
         if side > min(depth.shape) / 4:
             break
         use = known & ~changed
         weight = ndimage.uniform_filter(use.astype(float), side)
         values = relative if side == 1 else remainder
+        # Mean over the window of the points that count
         mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
         # Slow errors of the datum make means scatter more than those of white noise.
         fraction = UNCHANGED_FRACTION[depth.ndim]
         scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], fraction)
         scatter = max(scatter, side ** (-depth.ndim / 2))
+
+        # All points of a window whose mean is too high have changed; single points of scans count only in groups
         high = (mean > limit * scatter) & (weight > 0.25)
         spot = MIN_SPOT_SIDE[depth.ndim]
         if side == 1:
@@ -69,13 +80,14 @@ def find_changed(depth, noise) -> np.ndarray:
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
+    # A trace may have a track too shallow for any window; groups of points too small for a change are left out
     side = MIN_PART_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)
         shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
         changed[places[shallow.samples]] = True
         changed = ndimage.binary_dilation(changed)
-        side = MIN_RUN
+        side = MIN_RUN_SAMPLES
     return ndimage.binary_opening(changed, np.ones((side,) * depth.ndim)) & known
 
 
@@ -96,7 +108,10 @@ class Boxes(NamedTuple):
 
 @lru_cache(maxsize=2)
 def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
-    """Return boxes with at least `n_inside` parts, and `n_beside` on each side, free of a polynomial datum."""
+    """Return boxes with at least `n_inside` parts, and `n_beside` on each side of a trace.
+
+    A polynomial datum of the given degree is subtracted from each.
+    """
     datum = make_polynomials(N_PARTS, degree)
     spans = []
     for first in range(n_beside, N_PARTS - n_beside):
@@ -121,7 +136,10 @@ class ShallowTrack(NamedTuple):
 
 
 def find_shallow_track(depth) -> ShallowTrack:
-    """Find a track in the means of 60 parts, by the likelihood ratio of a box beside a cubic datum."""
+    """Find a track in depths (n,) [m] by the means of 60 parts.
+
+    The test is the likelihood ratio of a box beside a cubic datum.
+    """
     if depth.size < 2 * N_PARTS:
         return ShallowTrack(slice(0), MIN_TRACK_HEIGHT * float(depth.std()))
     edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
@@ -143,11 +161,16 @@ def find_shallow_track(depth) -> ShallowTrack:
 
 
 def find_detection_limit(depth, noise) -> float:
-    """Return the mean depth [m] from which on a track of a trace is found, or below which a square of a scan is not."""
+    """Return the smallest mean depth [m] of a track that is found in a trace, or of a square in a scan.
+
+    `depth` and `noise` (n,) or (m, n) [m] are the depths and the standard deviation of an unworn one.
+    """
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
-    side = max(side for side in WINDOWS[2] if side <= max(min(depth.shape) / 4, 1))
-    mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
+    side = max(side for side in WINDOW_SIDES[2] if side <= max(min(depth.shape) / 4, 1))
+    mean = ndimage.uniform_filter(
+        np.clip(depth / noise, -MAX_PULL_DEVIATIONS[2], MAX_PULL_DEVIATIONS[2]), side
+    )
     scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
-    threshold = compute_threshold(len(WINDOWS[2]) * depth.size)
+    threshold = compute_threshold(len(WINDOW_SIDES[2]) * depth.size)
     return float(threshold * scatter * np.median(noise))

@@ -38,14 +38,18 @@ from .statistics import remove_long_waves
 from .track import find_spans, get_margin, measure_track
 from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
-END_SAMPLES = 7  # number of lines from an end at which growth includes it
-MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
-MARGIN = 7  # side of the square by which worn places of scans are enlarged, so that flanks count
+# Number of lines of points at an end of a surface in which growth counts as growth at this end
+END_SAMPLES = 7
+# Fraction of the points of a line near an end above which the end has grown
+MIN_GROWN_LINE = 0.5
+# Side in samples of the square by which worn places of scans are enlarged, so that flanks count
+WORN_MARGIN_SIDE = 7
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
 MAX_TRACK_FRACTION = 0.8
-MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
+# Smallest fraction of worn heights in a track as wide as the whole surface; where only tops are worn, it is smaller
+MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
-MIN_BOW = 3.0
+MIN_BOW_RATIO = 3.0
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_TOPS_FRACTION = 0.6
@@ -67,6 +71,7 @@ class Names(NamedTuple):
     place: tuple[str, ...]
 
 
+# Names of the quantities by number of axes: 1 for traces, 2 for scans
 NAMES = {
     1: Names(
         lost="worn_area",
@@ -110,6 +115,7 @@ class Options(NamedTuple):
     keep_spikes: bool = False
 
 
+# Options of a comparison for which the user gives none
 DEFAULTS = Options()
 
 
@@ -147,6 +153,8 @@ def compare_surfaces(
     """
     surfaces = (before, after)
     _check_options(surfaces, options)
+
+    # Spikes and dust become missing heights, and both surfaces get even steps
     cleaned = [clean_surface(each, keep_spikes=options.keep_spikes) for each in surfaces]
     removed = tuple(
         int(clean.missing.sum() - raw.missing.sum()) for clean, raw in zip(cleaned, surfaces)
@@ -159,11 +167,14 @@ def compare_surfaces(
         values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
         result = Comparison(before, after, Finding("identical", {}), values)
     else:
+        # The second surface is placed on the first, the depths at their common points are measured, and the waves of
+        # both are compared
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
         result = _measure(surfaces, (first, second), aligned)
         ratios = _compare_waves(result, options.direction)
         result = replace(result, values=result.values | ratios)
 
+    # The user is told how many heights were left out
     evidence = replace(result.evidence, removed=removed)
     findings = result.findings
     if any(removed):
@@ -188,6 +199,7 @@ def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: O
 
 
 def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
+    """Return quantities of these names without value, and with the code of the reason."""
     return {name: name_unknown(name, reason) for name in names}
 
 
@@ -196,7 +208,22 @@ def _measure(
     rasters: tuple[Raster, Raster],
     aligned: Aligned,
 ) -> Comparison:
-    """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none."""
+    """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none.
+
+    Parameters
+    ----------
+    surfaces : tuple
+        Traces or scans before and after wear, as they were read.
+    rasters : tuple of Raster
+        The same on even steps and without spikes.
+    aligned : Aligned
+        Common place of both, or the reason why there is none.
+
+    Returns
+    -------
+    Comparison
+        Verdict, quantities by name, tracks and findings.
+    """
     is_trace = rasters[0].z.ndim == 1
     names = NAMES[rasters[0].z.ndim]
     if not aligned.reason:
@@ -282,7 +309,10 @@ def _find_detection_limit(depths: DepthMap) -> float:
 
 
 def _make_placement(aligned: Aligned) -> Placement:
-    """Return shift, rotation and gain of the second surface, with the errors that follow from the unworn heights."""
+    """Return shift, rotation and gain of the second of two aligned surfaces.
+
+    Their errors follow from the unworn heights.
+    """
     state = aligned.fit.state
     errors = aligned.fit.errors
     placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))
@@ -299,7 +329,11 @@ def _make_placement(aligned: Aligned) -> Placement:
 def _collect_findings(
     evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
-    """Return what a reader must know of the place, the datum, the gain and the tracks."""
+    """Return findings that a reader must know: on the place, the datum, the gain and the tracks.
+
+    `evidence` has the aligned depths and how they were placed, and `bend` [m] is the height of the subtracted
+    parabola.
+    """
     placement = evidence.placement
     depths = evidence.curves
     is_placed = placement.basis == "place"
@@ -341,16 +375,23 @@ def _collect_findings(
 
 
 def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool:
-    """Return whether less than a fraction of the heights in a track are worn."""
+    """Return whether less than a fraction of the heights in a track are worn.
+
+    `span` are the first and the last sample of the track in `depths`.
+    """
     return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
 
 
 def _enlarge(part) -> np.ndarray:
-    return ndimage.binary_dilation(part, np.ones((MARGIN,) * part.ndim))
+    """Return a mask, `part`, enlarged by a square of WORN_MARGIN_SIDE samples."""
+    return ndimage.binary_dilation(part, np.ones((WORN_MARGIN_SIDE,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
-    """Return the mask of worn places with their flanks."""
+    """Return the mask of the worn places in `depths` with their flanks.
+
+    `spans` are first and last sample of each track of a trace.
+    """
     if depths.depth.ndim > 1:
         return _enlarge(depths.worn) & depths.inside & ~depths.grown
     covered = np.zeros(depths.depth.size, bool)
@@ -376,10 +417,18 @@ def _doubt(
     code : str
         Verdict on lost and grown material.
     depths : DepthMap
+        Depths of the aligned surfaces.
     spans, tracks
         Tracks of a trace.
     sizes : tuple of float
         Lost and grown area or volume, and height of the bow.
+
+    Returns
+    -------
+    code : str
+        Verdict: the given one, or one of two possible causes.
+    numbers : dict
+        Heights [m] by name that both causes would have; {} if there is one cause.
     """
     area, grown, bend = sizes
     bow = 2 / 3 * max(bend, 0.0) * depths.size
@@ -397,14 +446,17 @@ def _doubt(
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
     waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = bow > area and bend > MIN_BOW * waves_height
+    is_bow_large = bow > area and bend > MIN_BOW_RATIO * waves_height
     if is_bow_large and (code == "no_wear" or (code.startswith("worn") and is_cut)):
         return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
     return code, {}
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:
-    """Return whether material grew along an end or a border, which a scar over the rest resembles."""
+    """Return whether material grew along an end or a border of the `depths`.
+
+    A scar over all the rest looks the same.
+    """
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
@@ -416,7 +468,7 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
 
 
 def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
-    """Return the largest depth and its place."""
+    """Return the largest depth and its place, as quantities by name."""
     largest, near = measure_largest(depths)
     best = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
     x = depths.x[best[-1]]
@@ -432,7 +484,10 @@ def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
 
 
 def _measure_share(depths: DepthMap) -> Quantity:
-    """Return the worn fraction of a scan, known but for a line of points around the worn places."""
+    """Return the worn fraction of the `depths` of a scan.
+
+    Its interval is a line of points around the worn places.
+    """
     cell = depths.cell
     share = float(depths.worn.sum()) * cell / depths.size
     edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
@@ -442,7 +497,11 @@ def _measure_share(depths: DepthMap) -> Quantity:
 def _name_ends(
     track: dict[str, Quantity], placement: Placement, middle: float
 ) -> dict[str, Quantity]:
-    """Return the mean depth within the longest track, and its ends in both traces; middle: of the second one [m]."""
+    """Return the mean depth within the longest track, and its ends in both traces.
+
+    `track` are its quantities, `placement` the place of the second trace, and `middle` [m] the middle of the second
+    trace, about which it is stretched.
+    """
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
     for end in ("from", "to"):
@@ -459,7 +518,11 @@ def _name_ends(
 
 
 def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
-    """Compare the waves along the lines of the common part; without one, the ratios have no value."""
+    """Compare the waves along lines of the common part; return their ratios after/before by name.
+
+    `result` is the comparison, and `direction` "x" or "y" that of the lines. Without a common place the ratios have no
+    value.
+    """
     depths = result.evidence.curves
     if depths is None:
         return _name_unknowns(waves.RATIO_NAMES, result.verdict.code)

@@ -20,7 +20,7 @@ class DepthErrors(NamedTuple):
 
     - variance: function of a mask, variance [m2] of the sum of its depths.
     - drift: root mean square [m] of the mean depths of unworn tiles about the datum, 0 if these are too few.
-    - freedom: number of independent tiles, beyond those that determine the datum, that show the variance.
+    - freedom: degrees of freedom of the variance: number of independent tiles less the terms of the datum.
     - correlation: number of neighbouring heights that share an error.
     - model: relative standard deviation of a single depth due to gain, tip and interpolation.
     """
@@ -42,6 +42,7 @@ class DepthMap:
     - y: None for traces.
     - inside, missing: masks of the common part, and of its points without a depth.
     - cell: length [m] or area [m2] of a point.
+    - errors: errors that the unworn heights show.
     """
 
     x: np.ndarray
@@ -81,7 +82,10 @@ class DepthMap:
         return float(known.std()) if known.size else 0.0
 
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
-        """Integrate the depth over a mask; return the area [m2] or volume [m3] and its standard deviation."""
+        """Integrate the depth over a mask; return area [m2] or volume [m3] and its standard deviation.
+
+        `part` is the mask; with the sign -1 grown material counts as positive.
+        """
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
         error = SCATTER_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
         # The line over a gap misses the tops in it, which are worn deeper, and its valleys.
@@ -89,15 +93,17 @@ class DepthMap:
         return value, float(np.sqrt(error**2 + gaps**2 + (MODEL_ERROR * value) ** 2))
 
     def measure_hidden(self, covered) -> float:
-        """Return the area or volume that slight wear, within the noise, may have beside what a mask covers.
+        """Return the area [m2] or volume [m3] that slight wear may have outside the mask `covered`.
 
         It lies there still, or has lowered the datum, which then is higher than the valleys.
+
+        Such wear is within the noise.
         """
         limit = 2 * UNWORN_LIMIT
         relative = np.clip(self.depth / self.noise, -limit, limit)
         beside = self.inside & ~covered & ~self.missing
-        left = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
+        loss_beside = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
         height = remove_long_waves(self.before + self.after)
         valleys = relative[self.unworn & (height < np.median(height))]
         lowered = max(-float(np.median(valleys)), 0.0) if valleys.size else 0.0
-        return left + lowered * self.noise_level * self.size
+        return loss_beside + lowered * self.noise_level * self.size

@@ -14,13 +14,16 @@ from .records import name_quantity
 from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
 
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
-MIN_TILES = 6  # smallest number of tiles that show these errors
+# Smallest number of tiles that show the errors of the datum
+MIN_TILES = 6
 MIN_FREEDOM = (
     3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
 )
-MIN_DATUM_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
+# Smallest number of unworn heights in a tile that shows the errors of the datum
+MIN_DATUM_TILE_HEIGHTS = 5
 MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
-MEDIAN_VARIANCE = 1.57  # variance of a median relative to that of a mean, of normal errors
+# Variance of the median of normal errors relative to that of their mean, pi/2
+MEDIAN_VARIANCE = 1.57
 MAX_DEPTH_NOISE = 4.0  # noise relative to the median above which a depth cannot be the largest
 
 
@@ -30,10 +33,15 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     Parameters
     ----------
     model : Model
+        Common points of both surfaces, at the place of the fit.
     fit : Fit
         Depths at the known points of the model.
     gain_error : float, optional
         Standard deviation of the gain of the instrument.
+
+    Returns
+    -------
+    DepthMap
     """
     box = find_box(model.common)
     terms = [
@@ -87,9 +95,15 @@ def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
     Parameters
     ----------
     x, depth : (n,) array [m]
+        Places, and depths below the datum.
     sigma : float
         Noise of every depth [m].
     worn, missing : (n,) bool array
+        Worn points, and points that were not measured.
+
+    Returns
+    -------
+    DepthMap
     """
     noise = np.full(depth.size, sigma)
     nothing = np.zeros(depth.size, bool)
@@ -128,7 +142,13 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         Functions of which the datum is a combination.
     shifts : sequence of (n,) or (m, n) array, optional
         Changes of the depths by one standard deviation of other errors [m].
+
+    Returns
+    -------
+    DepthErrors
+        Its `variance` is a function of a mask.
     """
+    # Count of unworn heights in each tile, and the means of their depths and of the functions of the datum there.
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
         use = unworn[tile]
@@ -136,6 +156,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
             parts = [values[tile][use].mean() for values in (depth, *base)]
             tiles.append((use.sum(), *parts))
     counts, means, *centers = np.array(tiles).T if tiles else np.zeros((2 + len(base), 1))
+    # Rows are weighted by the root of the count, because the variance of a mean falls with it.
     root = np.sqrt(counts)
     centers = np.array(centers).T * root[:, None]
     # Where tiles are few, a tile may share a single error.
@@ -143,6 +164,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     freedom = MIN_FREEDOM
     drift = 0.0
     if counts.size >= MIN_TILES:
+        # The scatter of the means about the datum that fits them best gives s^2.
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
         # A slow drift makes neighbouring tiles share their errors, so that fewer of them are independent.
@@ -152,9 +174,11 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         scatter = residual @ residual / (counts.size - len(base))
         drift = float(np.sqrt(scatter / counts.mean()))
         variance = float(scatter * shared * student**2)
+    # Covariance of the coefficients of the datum for s = 1.
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
     def compute_variance(part) -> float:
+        """Return the variance [m2] of the sum of the depths in a mask `part`."""
         moments = base[:, part].sum(axis=1)
         white = variance * float(moments @ inverse @ moments + part.sum())
         return white + sum(float(shift[part].sum()) ** 2 for shift in shifts)
@@ -167,6 +191,9 @@ def _bend_datum(depth, unworn, base) -> np.ndarray:
     """Return how far [m] the unworn depths (n,) of a trace bend its datum, if it has two terms more.
 
     Where a drift is slow, this is the error of a datum in a wide track, which the flanks alone do not show.
+
+    `unworn` (n,) is the mask of the unworn depths, and `base` (k, n) are the functions of which the datum is a
+    combination.
     """
     x = np.linspace(-1, 1, depth.size)
     bent = np.vstack((base, x ** len(base), x ** (len(base) + 1)))
@@ -179,6 +206,11 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the
     interval contains every single depth, because a crest may be worn as deep, and both ends what the samples do not
     resolve: the part of the largest depth that every second sample does not show.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Depths of aligned surfaces.
 
     Returns
     -------

@@ -63,12 +63,17 @@ def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
     Parameters
     ----------
     model : Model
+        Common points of both surfaces.
     state : (k,) array
         Start.
     free : list of int
         Indices of the fitted parameters.
     digit : float
         Standard deviation [m] due to the printed digits of the heights; the noise is at least this.
+
+    Returns
+    -------
+    Fit
     """
     fit = None
     worn = np.zeros(int(model.known.sum()), bool)
@@ -95,13 +100,19 @@ def evaluate(model: Model, state, free: list[int], digit: float, worn=None) -> F
     Parameters
     ----------
     model : Model
+        Common points of both surfaces.
     state : (k,) array
+        Place, datum and gain, in the order of `Model`.
     free : list of int
         Indices of the fitted parameters.
     digit : float
         Smallest standard deviation of a depth [m].
     worn : (n,) bool array, optional
         Heights that are known to be worn before.
+
+    Returns
+    -------
+    Fit
     """
     depth = model.compute_depth(state)
     worn = np.zeros(depth.size, bool) if worn is None else worn
@@ -122,12 +133,18 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
     Parameters
     ----------
     depth : (n,) array [m]
+        Depths below the datum.
     terms : (n, j) array
         Terms of the variance, the first one constant.
     sigma : float
         Scale of all depths [m].
     worn : (n,) bool array
         Depths that do not count.
+
+    Returns
+    -------
+    (n,) array
+        Standard deviation of each depth [m], also of worn ones.
     """
     from scipy.optimize import nnls
 

@@ -13,8 +13,9 @@ from .depths import make_section
 from .raster import Raster, fill_gaps
 from .statistics import subtract_plane
 
-N_TRACES = 50  # number of starts, and of random phases, of the first trace that show its roughness
-# Height of a track relative to the largest one in all these traces, above which it is not chance.
+# Number of shifted copies of the first trace, and of copies with random phases, that show what its roughness alone does
+N_TRACES = 50
+# Height of a track relative to the largest one in the copies of the first trace, above which it is not chance
 MIN_CLEARANCE = 1.2
 FLANK_PARTS = 6  # smallest number of parts of each flank
 MIN_PART_SAMPLES = 4  # smallest number of samples of a part
@@ -25,6 +26,16 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
 
     A line with a box is fitted to means of 60 parts. The box is a track if it is deeper than in the first trace from 50
     starts and with 50 random phases (Theiler 1992), and if the flanks are no rougher than this trace.
+
+    Parameters
+    ----------
+    first, second : Raster
+        Traces before and after wear, which share no place.
+
+    Returns
+    -------
+    DepthMap or None
+        Depths of the second trace below the line through its flanks.
     """
     z = fill_gaps(second.z)
     step = float(second.steps[0])

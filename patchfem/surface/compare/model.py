@@ -31,33 +31,48 @@ BORDER_SAMPLES = 3  # distance from the border of a surface from which on its sp
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
-# Side of a surface relative to the deviation of the Gaussian of the long waves, which are not used to refine its place.
+# Side of a surface relative to the standard deviation of a Gaussian; the waves longer than it are not used to refine
+# the place
 PLACE_WAVES = {1: 100, 2: 20}
-MIN_WAVE_SAMPLES = 10.0  # smallest such deviation of traces, in samples
-# Deviations of the Gaussians that smooth both surfaces in turn.
+# Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
+# place
+MIN_WAVE_SAMPLES = 10.0
+# Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
 REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
 N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
-MIN_DETERMINANT = 1e-3  # smallest determinant of the places of tiles that show a datum
-MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
+# Smallest determinant of the mean datum functions of some tiles; below it these tiles do not determine a datum
+MIN_DETERMINANT = 1e-3
+# Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one; datums of larger
+# scale are not compared
+MAX_DATUM_SCALE = 4.0
 MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
-MAX_AGREEING_DISTANCE = (
-    5.0  # distance from a datum, in its smallest scale, within which heights agree
-)
-MIN_GROWN_DISTANCE = 10.0  # distance, in the same scale, above which they have grown
+# Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
+MAX_AGREEING_DISTANCE = 5.0
+# Distance of a height above a datum, relative to the smallest scale, from which on it has grown
+MIN_GROWN_DISTANCE = 10.0
 
 
 class Model:
     """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place.
 
     `max_gain_change` is the largest change of the gain that is left, until it is fitted.
+
+    Most methods take a `state`: the place of the second surface, d shifts [m] and a turn (rotation [rad] of scans,
+    stretch of traces), then the k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
+    [1].
+
+    The "own" surface is the one on whose points depths are known: the first of two scans, the second of two traces.
     """
 
     def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
-        """Choose the common points at a place, of each `stride`-th own point."""
+        """Choose the common points at a place, of each `stride`-th own point.
+
+        `own` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
+        """
         every = (..., *(slice(None, None, stride),) * own.z.ndim)
         self.own = Raster(own.z[every], own.origin, own.steps * stride)
         self.n_axes = own.z.ndim
@@ -89,11 +104,14 @@ class Model:
         self.keep_common(self.start)
 
     def _shape(self, values) -> np.ndarray:
-        """Return values (d,) in the shape of a factor of points (d, ...)."""
+        """Return values (d,) as an array that can be combined with points (d, ...)."""
         return np.reshape(values, (-1,) + (1,) * self.n_axes)
 
     def keep_common(self, state) -> None:
-        """Keep the points that both surfaces show; `common` has those near the border of the other one too."""
+        """Keep the points that both surfaces show at a state.
+
+        They are `known`; `common` has those near the border of the other surface, too.
+        """
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
@@ -102,13 +120,13 @@ class Model:
         self.known = self.common & ((pixels >= BORDER_SAMPLES) & (pixels <= last)).all(axis=0)
 
     def _map_pixels(self, state) -> np.ndarray:
-        """Return the place (d, ...) of the points on the other surface, in its samples."""
+        """Return the place (d, ...) of the own points on the other surface at a state, in samples of it."""
         turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
         start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
         return (turned + start) / self._shape(self.other.steps)
 
     def compute_depth(self, state) -> np.ndarray:
-        """Return the depth (n,) [m]."""
+        """Return the depth (n,) [m] below the datum at the known points and a state."""
         pixels = self._map_pixels(state)[:, self.known]
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
@@ -117,13 +135,16 @@ class Model:
         return (depth + state[-1] * self._get_waves(pixels)) / (1 + state[-1])
 
     def _get_waves(self, pixels) -> np.ndarray:
-        """Return the heights (n,) of the first surface about its plane at the known points."""
+        """Return the heights (n,) [m] of the first surface about its plane at the known points.
+
+        `pixels` (d, n) are the places of these points on the other surface.
+        """
         if self.n_axes > 1:
             return self.waves[self.known]
         return ndimage.map_coordinates(self.waves, pixels, prefilter=False, mode="mirror")
 
     def compute_jacobian(self, state) -> np.ndarray:
-        """Return the derivative (n, d + 1 + k) of the depth by the state."""
+        """Return the derivative (n, d + 2 + k) of the depth by the numbers of a state."""
         pixels = self._map_pixels(state)[:, self.known]
         slopes = np.array(
             [
@@ -142,24 +163,33 @@ class Model:
         return np.vstack((place, self.datum[:, self.known], self._get_waves(pixels))).T
 
     def compute_noise_terms(self, state, jacobian) -> np.ndarray:
-        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        """Return terms (n, 3) of the variance of depths: instrument, positions on slopes, kinks.
+
+        Each is multiplied by a factor that is fitted. The `jacobian` is that of the depth at this state.
+        """
         slopes = (jacobian[:, : self.n_axes] ** 2).sum(axis=1)
         pixels = self._map_pixels(state)[:, self.known]
         kinks = ndimage.map_coordinates(self.bend, pixels, order=0, mode="nearest")
         return np.column_stack((np.ones(slopes.size), slopes, kinks**2))
 
     def draw(self, values, fill=np.nan) -> np.ndarray:
-        """Return values (n,) of the known points as a map in the shape of the surface."""
+        """Return values (n,) of the known points as a map in the shape of the surface.
+
+        Other points of it have the value `fill`.
+        """
         image = np.full(self.own.z.shape, fill, dtype=np.asarray(values).dtype)
         image[self.known] = values
         return image
 
     def find_changed(self, depth, noise) -> np.ndarray:
-        """Return the points (n,) bool that noise does not explain, of positive depth."""
+        """Return a mask (n,) of points whose positive depth (n,) [m] exceeds what noise (n,) [m] explains."""
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
 
     def find_worn(self, depth, noise) -> np.ndarray:
-        """Return the worn points (n,) bool, with tops that are narrow or hardly worn."""
+        """Return the worn points (n,) bool, with tops that are narrow or hardly worn.
+
+        `depth` and `noise` (n,) [m] are the depths and the standard deviation of an unworn one.
+        """
         worn = self.find_changed(depth, noise)
         height = (self.own.z[self.known] - self.sign * depth / 2) / np.median(noise)
         relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
@@ -190,12 +220,15 @@ class Model:
         return np.maximum(sizes, MIN_WAVE_SAMPLES) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:
-        """Return values (n,) smoothed and without their long waves."""
+        """Return values (n,) smoothed by a Gaussian and without their long waves.
+
+        `width` is the standard deviation of the Gaussian in samples.
+        """
         image = fill_gaps(self.draw(values))
         return (smooth(image, width) - smooth(image, np.hypot(self.smoothing, width)))[self.known]
 
     def find_datum(self, state, n_terms: int) -> np.ndarray:
-        """Return the state with the datum of some terms on which the unworn heights lie."""
+        """Return a state whose datum, of the first `n_terms` functions, goes through the unworn heights."""
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
         parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]
@@ -224,6 +257,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
         Indices of the heights of each tile, and of each end that may be unworn.
     """
     random = np.random.default_rng(0)
+
+    # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
+    # MAX_DATUMS
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
@@ -231,12 +267,14 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DETERMINANT]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
+    # Their scale is the distance within which a fifth of some heights lie
     thin = np.arange(0, depth.size, max(depth.size // MAX_DATUM_SAMPLES, 1))
     few_base = base[thin]
     few = depth[thin]
     # A quarter of the heights shows which datums are worth improving.
     scales = _scale_datums(datums, few_base[::4], few[::4])
     datums = datums[np.argsort(scales)[:N_DATUMS]]
+    # Concentration step: a least-squares fit to the fifth of the heights that are nearest to the datum
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
         nearest = np.argpartition(residual, few.size // 5, axis=1)[:, : few.size // 5]
@@ -245,8 +283,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
         right = -np.einsum("kni,kn->ki", rows, few[nearest])
         datums = np.linalg.solve(normal, right[..., None])[..., 0]
 
+    # Of the datums with a small scale the best one is taken: with an unworn end, few heights above it, and many on it
     scales = _scale_datums(datums, few_base, few)
-    near = np.flatnonzero(scales <= MAX_SCALE * scales.min())
+    near = np.flatnonzero(scales <= MAX_DATUM_SCALE * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
     agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
     has_end = np.zeros(near.size, bool)
@@ -258,5 +297,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
 
 def _scale_datums(datums, base, depth) -> np.ndarray:
-    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum."""
+    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum.
+
+    `datums` (k, j) are factors of the functions in the columns of `base` (n, j), and `depth` (n,) [m] are depths
+    without datum.
+    """
     return np.quantile(np.abs(depth + datums @ base.T), 0.2, axis=1)

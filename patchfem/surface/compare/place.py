@@ -10,15 +10,15 @@ from ..profile import robust_deviation
 from .raster import Raster, fill_gaps
 from .statistics import TINY, remove_long_waves, smooth
 
-# By number of axes: errors of length of a trace, and rotations of a scan [rad], the same turned by 180 degrees too.
+# Rotations of a scan [rad] that are tried, also after half a turn
 ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
+# Turns that are tried, by number of axes: relative differences in length of traces, and rotations [rad] of scans
 TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
 MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
-IMAGE_WAVES = {
-    1: 40,
-    2: 12,
-}  # side of an image relative to the deviation of the Gaussian of its long waves
-BORDER_FRACTION = 0.1  # part of a trace that falls to zero at its ends before it is whitened
+# Side of an image relative to the standard deviation of the Gaussian of its long waves, by number of axes
+IMAGE_WAVES = {1: 40, 2: 12}
+# Fraction of a trace, half of it at each end, over which its heights fall to zero before its spectrum is whitened
+BORDER_FRACTION = 0.1
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
 # Significance of a place beyond which no mirrored scan is tried.
 CLEAR_SIGNIFICANCE = 9.0
@@ -40,7 +40,10 @@ class Place(NamedTuple):
 
 
 def make_matrix(turn: float, n_axes: int) -> np.ndarray:
-    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans."""
+    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans.
+
+    `turn` is the stretch [1] or the rotation [rad], and `n_axes` is 1 for traces and 2 for scans.
+    """
     if n_axes == 1:
         return np.array([[1 + turn]])
     cos = np.cos(turn)
@@ -49,7 +52,10 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
 
 
 def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
-    """Return own and other surface: depths stand at the samples of the second trace, or of the first scan."""
+    """Return the own and the other surface, of the surfaces before and after wear.
+
+    Depths are computed at the points of the own surface: the second of two traces, the first of two scans.
+    """
     return (second, first) if first.z.ndim == 1 else (first, second)
 
 
@@ -57,7 +63,18 @@ def find_place(first: Raster, second: Raster) -> Place:
     """Find the place of the second surface with the most significant correlation.
 
     The significance is Fisher's z times the root of the number of common points, relative to its scatter over all lags.
+
+    Parameters
+    ----------
+    first, second : Raster
+        Heights before and after wear.
+
+    Returns
+    -------
+    Place
+        Shift [m], turn and mirroring of the second surface.
     """
+    # Both surfaces become images with the same square pixels: those of the finer surface, unless they were too many.
     n_axes = first.z.ndim
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
@@ -68,6 +85,7 @@ def find_place(first: Raster, second: Raster) -> Place:
         own, other = order(first, second.mirror() if mirrored else second)
         images = zip(*(_make_images(surface, pixel) for surface in (own, other)))
         for (image, other_image), turn in product(images, TURNS[n_axes]):
+            # The other image is turned about its middle, and correlated with the own one at all lags at once.
             matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
@@ -77,6 +95,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             if significance[peak] <= best.significance:
                 continue
 
+            # Lags beyond the size of the own image are negative: they stand at the end of each axis.
             lag = np.where(
                 np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
             )
@@ -84,6 +103,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             at = (own.middle - own.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
             best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
+        # Mirrored scans are tried only if this side does not fit clearly; traces are always tried both ways.
         if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
             break
     return best
@@ -122,9 +142,12 @@ def _whiten(z) -> np.ndarray:
 
 
 def correlate(first, second) -> np.ndarray:
-    """Return the significance of the correlation of two images at each lag, negative lags at the end.
+    """Return the significance of the correlation of two images at each lag.
 
     It is -inf where the images overlap too little.
+
+    `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. Lags count pixels by which the
+    second image is moved; negative lags stand at the end of each axis.
     """
     size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]

@@ -18,7 +18,12 @@ MAX_PLACE_UNEVENNESS = (
 
 
 class Raster(NamedTuple):
-    """Heights z (n,) or (m, n) [m], NaN where missing; first place and step (d,) [m] of each axis, y before x."""
+    """Surface on even steps, of d = 1 axis (trace) or d = 2 axes (scan, y before x).
+
+    - z (n,) or (m, n): heights [m], NaN where missing.
+    - origin (d,): first position [m] along each axis.
+    - steps (d,): step [m] along each axis.
+    """
 
     z: np.ndarray
     origin: np.ndarray
@@ -48,7 +53,7 @@ class Raster(NamedTuple):
 
 
 def fill_gaps(z) -> np.ndarray:
-    """Fill missing heights: of a trace (n,) by straight lines, of a scan (m, n) by the nearest height."""
+    """Fill missing heights z of a trace (n,) by straight lines, of a scan (m, n) by the nearest one."""
     missing = np.isnan(z)
     if z.ndim > 1 or not missing.any():
         return fill_nearest(z)
@@ -57,7 +62,10 @@ def fill_gaps(z) -> np.ndarray:
 
 
 def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Profile | Areal:
-    """Mark spikes, dust and saturated heights as missing; raise PatchfemError if too few heights are left."""
+    """Mark spikes, dust and saturated heights of a surface as missing.
+
+    With `keep_spikes` they only count. Raises PatchfemError if too few heights are left.
+    """
     if isinstance(surface, Areal):
         if min(surface.z.shape) < MIN_SCAN_SIDE:
             rows, columns = surface.z.shape
@@ -79,7 +87,7 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
 
 
 def _find_saturated(z) -> np.ndarray:
-    """Return the heights, bool, at the end of the range of the instrument, far from all others."""
+    """Return a mask of the heights z at the end of the range of the instrument, far from all others."""
     levels = np.unique(z[~np.isnan(z)])
     is_saturated = np.zeros(z.shape, bool)
     if levels.size < 4:
@@ -99,6 +107,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
         origin = np.array([axis[0] for axis in axes])
         return Raster(surface.z, origin, np.array([np.diff(axis).mean() for axis in axes]))
 
+    # The raster has the mean step of an even trace, and finer steps for an uneven one, whose heights are interpolated.
     known = ~surface.missing
     x = surface.x[known]
     distances = np.diff(x)
@@ -109,6 +118,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
         step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_TRACE_SAMPLES)
     grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
     z = np.interp(grid, x, surface.z[known])
+    # Points within a wide gap of the trace are missing, unless they are next to a measured height.
     after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
     nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
     is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (

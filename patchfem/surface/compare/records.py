@@ -16,6 +16,7 @@ from ..quantity import SIDE, Quantity, read_definitions
 if TYPE_CHECKING:
     from .depth_map import DepthMap
 
+# Unit and definition of each quantity of a comparison, by name
 DEFINITIONS = read_definitions("comparison")
 
 
@@ -105,7 +106,11 @@ class Comparison:
 
 
 def name_quantity(name: str, value: float, low: float | None, high: float | None) -> Quantity:
-    """Return the quantity of this name with its interval."""
+    """Return the quantity of this name with its value and its interval.
+
+    Its unit and definition are those of the name; `low` and `high` are the ends of the interval, None if they are not
+    known.
+    """
     bounds = [None if number is None else float(number) for number in (value, low, high)]
     return Quantity(*bounds, *DEFINITIONS[name], name=name)
 
@@ -116,6 +121,7 @@ def name_estimate(name: str, value: float, error: float, least: float = -np.inf)
     Parameters
     ----------
     name : str
+        Name of the quantity, such as "worn_depth_mean".
     value, error : float
         Value and its standard deviation.
     least : float, optional

@@ -7,7 +7,7 @@ from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
-BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
+BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
@@ -19,7 +19,7 @@ WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussi
 MIN_NEIGHBOUR_FRACTION = (
     0.2  # smallest weight of the neighbours in the mask that determines the level beside a height
 )
-MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
+MAX_FINISH_RATIO = 1.5  # short waves relative to the noise, below which no place can be found
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -47,6 +47,7 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     Parameters
     ----------
     depth : (n,) array [m]
+        Depths at the present parameters.
     jacobian : (n, k) array
         Derivative of the depth by each parameter.
     sigma : float
@@ -54,7 +55,7 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     excluded : (n,) bool array, optional
         Depths without weight.
     """
-    root = np.clip(1 - (depth / (BIWEIGHT * sigma)) ** 2, 0.0, None)
+    root = np.clip(1 - (depth / (BIWEIGHT_CONSTANT * sigma)) ** 2, 0.0, None)
     if excluded is not None:
         root = np.where(excluded, 0.0, root)
     scale = np.sqrt((jacobian**2).mean(axis=0)) + TINY
@@ -98,9 +99,11 @@ def compute_threshold(n_tests: float) -> float:
 
 
 def smooth(z, deviations) -> np.ndarray:
-    """Return the Gaussian mean line or surface of heights (n,) or (m, n) without gaps, mirrored at their borders.
+    """Return the Gaussian mean line or surface of heights z (n,) or (m, n) without gaps.
 
     deviations: standard deviation of the weights in samples, one for each axis or for all of them.
+
+    The heights are continued by their mirror image at the borders.
     """
     spectrum = fft.dctn(z)
     for axis, deviation in enumerate(np.broadcast_to(deviations, z.ndim)):
@@ -111,7 +114,10 @@ def smooth(z, deviations) -> np.ndarray:
 
 
 def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
-    """Subtract the Gaussian mean line or surface from heights (n,) or (m, n) without gaps."""
+    """Subtract the Gaussian mean line or surface from heights z (n,) or (m, n) without gaps.
+
+    `part` is the size of the surface over the standard deviation of the Gaussian.
+    """
     return z - smooth(z, np.array(z.shape) / part)
 
 
@@ -127,11 +133,14 @@ def subtract_local_level(values, mask) -> np.ndarray:
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
-    """Return rms height and noise [m] of heights (n,) or (m, n) that are hardly rougher than their white noise, else {}."""
+    """Return rms height and noise [m] of a surface hardly rougher than its white noise, else {}.
+
+    `surfaces` are arrays of heights (n,) or (m, n) [m]; the first such surface counts.
+    """
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
         height = robust_deviation(remove_long_waves(z))
-        if height <= MAX_FINISH * noise:
+        if height <= MAX_FINISH_RATIO * noise:
             return {"rq": float(height), "noise": float(noise)}
     return {}
 

@@ -6,11 +6,12 @@ import numpy as np
 from scipy import ndimage
 
 from ..profile import find_runs
-from .changes import MIN_RUN, WINDOWS
+from .changes import MIN_RUN_SAMPLES, WINDOW_SIDES
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .statistics import compute_threshold, remove_long_waves
 
-CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
+# Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear; its reverse shows growth
+LOSS_TO_GROWTH_RATIO = 3.0
 MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
 TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
 N_CLASSES = 10  # number of classes of heights whose depths are compared
@@ -45,11 +46,11 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     """
     height = remove_long_waves(height)
     is_high = height > np.median(height)
-    limit = compute_threshold(len(WINDOWS[height.ndim]) * height.size)
+    limit = compute_threshold(len(WINDOW_SIDES[height.ndim]) * height.size)
     square = np.ones((TOP_SIDE,) * height.ndim)
     worn = ndimage.binary_opening((relative > limit) & is_high, square)
     filled = ndimage.binary_opening((relative < -limit) & ~is_high, square)
-    if ndimage.label(worn)[1] < max(MIN_TOPS, CONTROL * ndimage.label(filled)[1]):
+    if ndimage.label(worn)[1] < max(MIN_TOPS, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
         worn[:] = False
 
     known = np.flatnonzero(relative)
@@ -59,12 +60,22 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
 
 def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
-    """Return the heights (n,) bool of classes that wear lowered, even slightly, if it lowered most tops of a surface.
+    """Return a mask (n,) of heights in classes that wear lowered, even slightly.
 
-    They are deeper than the valleys by more than another gain explains.
+    Parameters
+    ----------
+    relative, height : (n,) array
+        Depth and height in standard deviations.
+    max_gain_change : float
+        Largest change of the gain that both surfaces may still have.
+
+    Returns
+    -------
+    (n,) bool array
+        Only if wear lowered most classes of tops: they are deeper than the valleys by more than another gain explains.
     """
     is_worn = np.zeros(height.size, bool)
-    if height.size < N_CLASSES * MIN_RUN:
+    if height.size < N_CLASSES * MIN_RUN_SAMPLES:
         return is_worn
     classes = np.array_split(np.argsort(height), N_CLASSES)
     rise, above = (_subtract_valleys(values, classes) for values in (relative, height))
@@ -97,7 +108,10 @@ class Tops(NamedTuple):
 
 
 def find_tops(depths: DepthMap) -> Tops:
-    """Find the tops that would be worn in a track: as high as the lowest quarter of the worn heights; not the worn ones."""
+    """Find the unworn tops that would be worn in a track, from the depths of a trace.
+
+    They are higher than the lowest quarter of the worn heights.
+    """
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
     is_deep = depths.worn & (relative > UNWORN_LIMIT)

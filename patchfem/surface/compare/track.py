@@ -16,18 +16,19 @@ from .tops import find_tops
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
-MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
-MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
-MAX_VALLEY_DEPTH = (
-    0.5  # largest mean depth of valleys relative to that of tops at which only tops are worn
-)
+# Mean depth of the tops of a part of a trace, in standard deviations of a depth, from which on it belongs to a track
+MIN_TRACK_DEPTH = 0.5
+# Largest mean depth over the few samples of a top that is not worn, in standard deviations of a single depth
+MAX_UNWORN_TOP = 1.5
+# Mean depth of valleys relative to that of tops below which only the tops of a part are worn
+MAX_VALLEY_DEPTH = 0.5
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
 # Standard deviations of a single height on a flank.
 MIN_FLANK_DEPTH = 4.0
 FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
 MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
-FLANKS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
+FLANK_POWERS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
 CLEAR_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
 FLANK_HEIGHT = 25.0  # depth, in standard deviations, to which a flank is fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
@@ -35,16 +36,21 @@ MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FL
 SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
 MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
-MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
+MAX_SQUARED_RESIDUAL = 16.0  # squared residual of a single depth beyond which it counts no more
 RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
-N_FIFTHS = 5  # the floor is the deepest part of a track that is as long as a fifth of it
+# The floor of a track is its deepest part of the length of a fifth of it
+N_FIFTHS = 5
 # Bias of the largest of the means over parts of a length, in standard deviations of such a mean, for each length over
 # which they are within two of these of the largest; 0.5 to 0.9 for flat, round, wedge-shaped and tilted bottoms.
 MAXIMUM_BIAS = 0.7
 
 
 class End(NamedTuple):
-    """Place [m] where a track begins or ends, with its interval."""
+    """Place where a track begins or ends.
+
+    - value: place [m].
+    - low, high: ends of its interval [m].
+    """
 
     value: float
     low: float
@@ -57,6 +63,16 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
     floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a
     track may stand above the first surface.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Depths of a trace.
+
+    Returns
+    -------
+    list of tuple
+        (first, last) of each track.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
     tops = find_tops(depths)
@@ -80,12 +96,16 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
 
 
 def get_margin(span: tuple[int, int]) -> int:
-    """Return the number of samples of the flanks beyond the known ends of a track."""
+    """Return the number of samples of the flanks beyond the first and last sample, `span`, of a track."""
     return max(int(FLANK_FRACTION * (span[1] - span[0])), MIN_FLANK_SAMPLES)
 
 
 def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
-    """Find where a track begins and ends; both ends are sought from outside to the middle."""
+    """Find where a track begins and ends, each with its interval.
+
+    `span` are its first and last worn sample in the `depths`. Each end is the change point at which the depth leaves
+    zero, sought from outside to the middle, but not beyond tops that are not worn.
+    """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
@@ -124,7 +144,11 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 
 
 def _has_unworn_valleys(relative, is_high) -> bool:
-    """Return whether depths (n,) inside of an end are those of tops alone, from which heights are high (n,) bool."""
+    """Return whether wear inside an end of a track touched tops alone.
+
+    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops; then the
+    valleys between them are less deep.
+    """
     if is_high.all() or not is_high.any():
         return False
     return bool(relative[~is_high].mean() < MAX_VALLEY_DEPTH * relative[is_high].mean())
@@ -141,6 +165,10 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
         First worn sample.
     depths : DepthMap
         For the correlation of the errors, and the error of the level.
+
+    Returns
+    -------
+    End
     """
     step = float(np.median(np.diff(x)))
     if worn < 3:
@@ -152,6 +180,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
+
+    # Samples from well before the first worn one to where the flank is deep
     part = x[low:stop]
     values = relative[low:stop]
     if part.size < 8:
@@ -164,6 +194,9 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     places = part[2:-1:stride] - step / 2
     levels = np.array([values, values + level, values - level])
     deviance = _fit_flanks(part, levels, places, depths.errors.correlation)
+
+    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form; the
+    # interval of the end reaches over all of them
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
@@ -176,18 +209,35 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
 
 
 def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
-    """Fit flanks that begin at each place (m,) to depths (levels, n); return deviances (levels, forms, m)."""
+    """Fit flanks that begin at each place (m,) to depths (levels, n) at x (n,) [m].
+
+    Parameters
+    ----------
+    x : (n,) array
+        Places [m], from outside to the middle of a track.
+    depths : (levels, n) array
+        Depths in standard deviations, for several levels of the unworn surface.
+    places : (m,) array
+        Places [m] at which a flank may begin.
+    correlation : float
+        Number of neighbouring depths that share an error.
+
+    Returns
+    -------
+    (levels, forms, m) array
+        Deviance of the best flank of each form.
+    """
     distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
     is_inside = distance > 0
-    deviance = np.empty((len(depths), len(FLANKS), places.size))
-    for form, powers in enumerate(FLANKS):
+    deviance = np.empty((len(depths), len(FLANK_POWERS), places.size))
+    for form, powers in enumerate(FLANK_POWERS):
         base = is_inside[..., None] * distance[..., None] ** np.array(powers)
         normal = np.einsum("mni,mnj->mij", base, base)
         normal += 1e-12 * np.eye(len(powers)) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
         residual = depths.T - fitted
-        deviance[:, form] = np.minimum(residual**2, MAX_SQUARE).sum(axis=1).T
+        deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_RESIDUAL).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
@@ -205,6 +255,11 @@ def measure_track(
         First and last worn sample.
     lost : tuple of float, optional
         Area lost in the track [m2] and its interval; by default, what is lost between its ends.
+
+    Returns
+    -------
+    Track
+        Quantities by name, such as "width" and "depth_mean", each with its interval.
     """
     start, end = find_ends(depths, span)
     x = depths.x
@@ -256,6 +311,8 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
 
     The largest of many noisy means is too large: by 1.8 standard deviations of a mean over a flat bottom, and by
     nothing where one place is far deeper than all others.
+
+    The track begins at `start` and has a `width` [m].
     """
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
     count = max(inside.size // N_FIFTHS, 1)
@@ -277,10 +334,11 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
 
 
 def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> tuple[float, float]:
-    """Return the area [m2] above the first surface within one width beside a track, and its standard deviation.
+    """Return the area [m2] of the ridges beside a track, and its standard deviation [m2].
 
-    It reaches from both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing
-    is found as grown, the error is what the noise may hide beside the track.
+    `depths` are those of the trace, and the ridges are sought within one width of the `ends`. The area reaches from
+    both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing is found as
+    grown, the error is what the noise may hide beside the track.
     """
     total = 0.0
     variance = 0.0

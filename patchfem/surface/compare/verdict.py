@@ -6,7 +6,7 @@ from scipy import special
 from ..quantity import SIDE
 from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
-from .tops import CONTROL, find_worn_tops
+from .tops import LOSS_TO_GROWTH_RATIO, find_worn_tops
 
 MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
 MIN_LOST_DEVIATIONS = (
@@ -15,10 +15,12 @@ MIN_LOST_DEVIATIONS = (
 
 
 def find_sure_loss(depths: DepthMap) -> float:
-    """Return the number of standard deviations of lost material that drift and noise do not explain.
+    """Return the loss, in its standard deviations, above which drift and noise do not explain it.
 
     The worn places were chosen as the deepest ones out of as many as the common part contains. Drift is known
     from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %.
+
+    `depths` gives the number of places and of independent tiles.
     """
     n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
     freedom = depths.errors.freedom
@@ -27,7 +29,10 @@ def find_sure_loss(depths: DepthMap) -> float:
 
 
 def measure_sharp_loss(depths: DepthMap) -> float:
-    """Return the area [m2] or volume [m3] of tops that lie deeper than the unworn heights beside them, as no drift does."""
+    """Return the area [m2] or volume [m3] lost from tops of the `depths` map that lie deeper than others.
+
+    Unworn heights beside them do not lie as deep; no drift is so sharp.
+    """
     if not depths.worn.any():
         return 0.0
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
@@ -61,10 +66,10 @@ def judge_change(
     grown, grown_error : float
         Material above the first surface, and its standard deviation.
     """
-    if area > SIDE * error and lost > CONTROL * grown:
+    if area > SIDE * error and lost > LOSS_TO_GROWTH_RATIO * grown:
         return "worn" if area > sure_loss * error else "scar_or_drift"
     is_grown = grown > MIN_GROWN_DEVIATIONS * grown_error
-    if is_grown and grown > CONTROL * max(lost, 0.0):
+    if is_grown and grown > LOSS_TO_GROWTH_RATIO * max(lost, 0.0):
         return "grown"
     if is_grown and lost > MIN_LOST_DEVIATIONS * error:
         return "worn_and_grown"

@@ -26,7 +26,7 @@ MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of th
 MIN_WAVE_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
-POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
+SIZE_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
 # Degree of the polynomial that is the form of a part: the bottom of a track is bent.
 FORM_DEGREE = {"inside": 4, "outside": 1}
 
@@ -50,11 +50,16 @@ def compare_waves(
         Standard deviation of the depth [m], of both surfaces together.
     ends : sequence of float, optional
         Ends of tracks, in samples.
+
+    Returns
+    -------
+    dict of str to Quantity
+        "amplitude_ratio" and "slope_ratio"; without value where noise or the length does not allow one.
     """
-    kept = np.ones(lines[0].shape[1], bool)
+    is_kept = np.ones(lines[0].shape[1], bool)
     for end in ends:
-        kept &= np.abs(np.arange(kept.size) - end) > BAND[1] / step
-    length = kept.sum() * step
+        is_kept &= np.abs(np.arange(is_kept.size) - end) > BAND[1] / step
+    length = is_kept.sum() * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_WAVE_STEPS:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
 
@@ -62,8 +67,8 @@ def compare_waves(
     lines = [_subtract_polynomial(line, 1) for line in lines]
     deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in BAND]
     lines = [z - smooth(z, deviations[1]) for z in lines]
-    passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, kept] for z in lines]
-    slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
+    passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
+    slopes = [(np.diff(z, axis=1) / step)[:, is_kept[1:]] for z in lines]
 
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
@@ -81,7 +86,10 @@ def compare_waves(
 
 
 def _subtract_polynomial(z, degree: int) -> np.ndarray:
-    """Subtract the polynomial of least squares from heights (n,), or from each line of heights (k, n)."""
+    """Subtract the polynomial of least squares from heights z (n,), or from each line of z (k, n).
+
+    The polynomial has this degree over the position in the line.
+    """
     basis = make_polynomials(z.shape[-1], degree)
     return z - z @ basis @ basis.T
 
@@ -141,6 +149,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     if cutoff is None:
         return {}, None
 
+    # Each region is cut into sections of one cut-off, whose parameters scatter; their means have intervals
     regions = {}
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():
@@ -152,7 +161,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
                 sections += _cut_sections(z, cutoff / step, FORM_DEGREE[region])
             sizes[side] = _measure_sections(sections, step)
         table = {"before": {}, "after": {}, "ratio": {}}
-        for name, power in POWERS.items():
+        for name, power in SIZE_POWERS.items():
             pair = [sizes[side][name] for side in ("before", "after")]
             for side, values in zip(table, pair):
                 bounds = _divide_means(np.ones(len(values)), values, power)
@@ -185,7 +194,10 @@ def _cut_sections(z, cutoff: float, degree: int) -> list[np.ndarray]:
 
 
 def _measure_sections(sections: list[np.ndarray], step: float) -> dict[str, np.ndarray]:
-    """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
+    """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope.
+
+    `sections` are arrays of heights (n,) [m] with this step [m] between neighbours.
+    """
     return {
         "Ra": np.array([np.abs(part).mean() for part in sections]),
         "Rq": _average_squares(sections),

@@ -17,11 +17,12 @@ from .units import HEADER_EXAMPLE, shorten
 MIN_MATRIX_ROWS = (
     8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
 )
+# Names of an array of heights in a MATLAB file, the first one that it has is read
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 
 
 def read_npy(content: Content) -> Table:
-    """Read an .npy file of two or three columns, or of as many rows."""
+    """Read the content of an .npy file of two or three columns, or of as many rows."""
     with refuse_damage(f"{content.path}: {DAMAGED}"):
         array = np.load(io.BytesIO(content.data), allow_pickle=False)
     is_real = array.dtype.kind in "fiu"
@@ -31,7 +32,10 @@ def read_npy(content: Content) -> Table:
 
 
 def read_mat(content: Content) -> Table:
-    """Read a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
+    """Read the content of a MATLAB file: variables x, (y,) and z or gap, or one matrix.
+
+    The matrix has two or three columns.
+    """
     path = content.path
     arrays = read_real_arrays(path, content.data)
     by_name = {name.lower(): array for name, array in arrays.items()}
@@ -54,7 +58,10 @@ def read_mat(content: Content) -> Table:
 
 
 def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
-    """Read the only array of two or three columns; raise PatchfemError if there is none, or more than one."""
+    """Read the only array of two or three columns; raise PatchfemError if there is none, or more than one.
+
+    `path` names the file in the message.
+    """
     tables = [array for array in arrays.values() if array.ndim == 2 and array.shape[1] in (2, 3)]
     if len(tables) == 1:
         table = tables[0]
@@ -67,6 +74,6 @@ def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
 
 
 def _make_table(path, columns: dict[str, np.ndarray]) -> Table:
-    """Return the table of columns without units."""
+    """Return the table of columns without units; `path` is the file."""
     columns = {name: np.asarray(values, float) for name, values in columns.items()}
     return Table(path, columns, {}, str(path), remedy=f"write it as text and {HEADER_EXAMPLE}")

@@ -24,6 +24,7 @@ _FIRST_BYTES = {  # format of a file by its first bytes
     b"\xff\xfe": "text",
     b"\xfe\xff": "text",
 }
+# End of the message about a damaged file
 DAMAGED = "the file is cut off or damaged; save or export it anew"
 
 
@@ -43,7 +44,7 @@ class Content(NamedTuple):
 
 
 def fetch(path) -> Content:
-    """Read a surface file, and decompress it if it is packed.
+    """Read the surface file `path`, and decompress it if it is packed.
 
     Raises Missing or PatchfemError if there is no such file, or if it is too large or damaged.
     """
@@ -67,7 +68,10 @@ def fetch(path) -> Content:
 
 
 def _read_limited(path: Path, suffix: str, file) -> Content:
-    """Read a file up to the limit for its format; suffix: of its name, such as ".CSV"."""
+    """Read an open file up to the limit for its format.
+
+    `path` names it in messages, and `suffix` is that of its name, such as ".CSV".
+    """
     data = bytearray(file.read(HEAD_BYTES))
     # Numbers below five are control characters, which a text has only if it is damaged.
     is_binary = bool(set(data) & set(range(5))) and suffix.lower() not in (".csv", ".txt")

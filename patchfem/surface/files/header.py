@@ -12,20 +12,25 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
-from .units import HEADER_EXAMPLE, ROLES, parse_length_unit
+from .units import HEADER_EXAMPLE, ROLES_BY_NAME, parse_length_unit
 
 MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought
 MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 MAX_NAME = 80  # largest number of characters in the name of a column with its unit
 MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
-COMMENT = ("#", "%", "//")
+# Signs at the start of a line of the header that is a comment
+COMMENT_SIGNS = ("#", "%", "//")
+# Pattern of a number with a decimal comma, such as -1,25e-6
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was not measured
+# Pattern of a height that was not measured
+MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
 _COLUMN = re.compile(
     r"([^\W\d][\w .-]*?)\s*(?:[\[(]([^\[\]()]*)[\])]|(?:[_/]|\s(?:in\s)?)\s*(\w+)(?=\s\s|$))"
 )
+# Pattern of a cell between blanks, with its unit
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
+# Pattern of a line that states the size or the units of a matrix
 _FACT = re.compile(
     r"(?:(width|height|lateral units|value units)\s*:|(length),(?=\s*[0-9.]+ \w+$))\s*(.*)",
     re.IGNORECASE,
@@ -56,18 +61,36 @@ class Header(NamedTuple):
 
 
 def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterator[tuple[int, str]]]:
-    """Read the lines above the numbers; returns the header, and the lines from the first row of numbers on.
+    """Read the lines above the numbers of a text file.
 
-    Raises PatchfemError if no row of numbers follows.
+    Parameters
+    ----------
+    path
+        File, for messages.
+    lines : iterator of (int, str)
+        Line numbers and lines of the file.
+
+    Returns
+    -------
+    header : Header
+    lines : iterator of (int, str)
+        Lines from the first row of numbers on.
+
+    Raises
+    ------
+    PatchfemError
+        If no row of numbers follows.
     """
     named: dict[int, tuple[int, list[Column]]] = {}  # lines of names by their number of cells
     facts = {}
     number = 0
     for number, line in islice(lines, MAX_HEADER_LINES):
-        is_comment = line.lstrip().startswith(COMMENT)
+        is_comment = line.lstrip().startswith(COMMENT_SIGNS)
         text = line.strip(" \n\t#%/") if is_comment else line.strip()
         cells, delimiter = split_cells(text)
         is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
+
+        # A row of numbers ends the header; its columns are those of the last line of as many names
         start, columns = named.get(len(cells), (number, []))
         if is_row and cells[0] and not is_comment:
             return Header(columns, facts, len(cells), start), chain([(number, line)], lines)
@@ -76,19 +99,19 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
             facts[(fact[1] or fact[2]).lower()] = fact[3]
             continue
 
-        found = [_parse_column(cell) for cell in cells]
-        if any(column.role for column in found):
-            is_other = any(re.search("[:=]", column.name) for column in found)
-            if not 1 < len(found) <= MAX_HEIGHT_COLUMNS or is_other:
+        parsed = [_parse_column(cell) for cell in cells]
+        if any(column.role for column in parsed):
+            is_other = any(re.search("[:=]", column.name) for column in parsed)
+            if not 1 < len(parsed) <= MAX_HEIGHT_COLUMNS or is_other:
                 continue
             start = number
-            columns = found
+            columns = parsed
         else:
             # A line of units belongs to the names above it, or to x, (y,) z.
-            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(found), "")]
+            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(parsed), "")]
             columns = [
                 column._replace(unit=column.unit or unit.unit)
-                for column, unit in zip(columns, found)
+                for column, unit in zip(columns, parsed)
             ]
         named[len(cells)] = (start, columns)
         # Names of a comment count if one of them is known.
@@ -103,7 +126,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
 
 
 def _parse_column(cell: str) -> Column:
-    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone.
+    """Parse the cell with the heading of a column, such as `x [um]` or `x in mm`, or a unit alone.
 
     A word without brackets is a unit only behind a known name; `Length 5 mm` is a setting.
     """
@@ -112,15 +135,15 @@ def _parse_column(cell: str) -> Column:
     match = _COLUMN.match(cell[:MAX_NAME])
     name, unit, word = match.groups() if match else (cell, None, None)
     role = name.strip(" _").lower()
-    if word is not None and role in ROLES and parse_length_unit(word):
+    if word is not None and role in ROLES_BY_NAME and parse_length_unit(word):
         unit = word
     elif word is not None:
         role = cell.lower()
-    return Column(ROLES.get(role, role), unit, cell)
+    return Column(ROLES_BY_NAME.get(role, role), unit, cell)
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
-    """Return the number and the unit of a fact such as `4.0 um`; None for what is missing."""
+    """Return number and unit in the text of a fact such as `4.0 um`; None for what is missing."""
     number, _, unit = text.strip().partition(" ")
     if not NUMBER_PATTERN.fullmatch(number):
         return None, text.strip() or None
@@ -128,9 +151,9 @@ def parse_fact(text: str) -> tuple[float | None, str | None]:
 
 
 def split_cells(text: str) -> tuple[list[str], str | None]:
-    """Split a line at the delimiter that leaves only numbers, or at the first delimiter; None: blanks.
+    """Split the text of a line into cells; return these and the delimiter, None for blanks.
 
-    So a decimal comma is not taken for a delimiter.
+    It is the delimiter that leaves only numbers, or else the first one. So a decimal comma is not taken for a delimiter.
     """
     delimiters = (";", ",", "\t", "|", None)
     for delimiter in delimiters:
@@ -152,7 +175,10 @@ def _strip_cells(cells: list[str]) -> list[str]:
 
 
 def is_number(cell: str, delimiter: str | None) -> bool:
-    """Return whether a cell of a text file is a number or a missing height."""
-    if NUMBER_PATTERN.fullmatch(cell) or MISSING.fullmatch(cell):
+    """Return whether a cell of a text file is a number or a missing height.
+
+    A decimal comma is possible unless the delimiter is a comma.
+    """
+    if NUMBER_PATTERN.fullmatch(cell) or MISSING_PATTERN.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

@@ -19,7 +19,7 @@ from .units import HEADER_EXAMPLE, shorten
 
 
 def read_instrument(content: Content) -> Table:
-    """Read a file in the format of an instrument with the package SurfaceTopography.
+    """Read the content of a file in an instrument's format with the package SurfaceTopography.
 
     Raises Missing without the package, and PatchfemError if it cannot read the file.
     """

@@ -10,7 +10,8 @@ from .table import make_surface
 from .text import read_text
 from .units import SIZE_LINES, UNIT_LIST, parse_length_unit
 
-READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
+# Reader of each kind of content
+READERS_BY_KIND = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
 
 def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
@@ -19,6 +20,7 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     Parameters
     ----------
     path : path-like
+        Text, NumPy, MATLAB or instrument file, which may be compressed by gzip.
     units : tuple of str, optional
         Units of x (and y) and of z, such as ("mm", "um"): they complete a file that states none, and overrule
         the header of a text with a note. A format that always states its units keeps them, with a note.
@@ -40,11 +42,14 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     content = fetch(path)
     if content.kind == "text":
         return make_surface(read_text(content, has_units=units is not None), units)
-    return make_surface(READERS[content.kind](content), units)
+    return make_surface(READERS_BY_KIND[content.kind](content), units)
 
 
 def _require_units(path, units) -> None:
-    """Raise PatchfemError unless the units are a pair of units of length; the text "mm" is not the pair m and m."""
+    """Raise PatchfemError unless the units are a pair of units of length; the text "mm" is not the pair m and m.
+
+    `path` names the file in the message.
+    """
     is_pair = isinstance(units, tuple | list) and len(units) == 2
     if is_pair and all(isinstance(unit, str) and parse_length_unit(unit) for unit in units):
         return
@@ -55,7 +60,10 @@ def _require_units(path, units) -> None:
 
 
 def read_profile(path, units: tuple[str, str] | None = None) -> Profile:
-    """Read the trace in a file; raise PatchfemError for an areal scan."""
+    """Read the trace in the file `path`; raise PatchfemError for an areal scan.
+
+    `units` are those of x and z, such as ("mm", "um").
+    """
     surface = read_surface(path, units)
     if isinstance(surface, Areal):
         rows, columns = surface.z.shape

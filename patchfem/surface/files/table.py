@@ -61,7 +61,7 @@ class Table(NamedTuple):
     length: float | None = None
 
     def add_note(self, text: str) -> "Table":
-        """Return the table with a further sentence about the file."""
+        """Return the table with a further sentence about the file, `text`."""
         return self._replace(notes=(*self.notes, f"{self.place}: {text}"))
 
     def locate(self, sample: int) -> str:
@@ -79,9 +79,15 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     Parameters
     ----------
     table : Table
+        Numbers of a file in its own units.
     units : tuple of str, optional
         Units of x (and y) and of z. They complete and overrule those of the file, with a note, except in formats that
         always state their units.
+
+    Returns
+    -------
+    Profile or Areal
+        Positions and heights [m], with increasing positions.
     """
     size = table.columns["z"].size
     refuse_many_heights(table.path, size)
@@ -120,7 +126,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
 
 
 def refuse_many_heights(path, count: int) -> None:
-    """Raise PatchfemError if a surface has more heights than memory should hold."""
+    """Raise PatchfemError if the count of heights in the file `path` is too large for the memory."""
     if count > MAX_HEIGHTS:
         raise PatchfemError(
             f"{path}: {count} heights, more than {MAX_HEIGHTS:.0e}; export a part of the scan"
@@ -128,7 +134,11 @@ def refuse_many_heights(path, count: int) -> None:
 
 
 def _convert_column(table: Table, role: str, given: str | None) -> Table:
-    """Convert a column to metres; a unit of the user overrules the file, with a note."""
+    """Convert a column of a table to metres.
+
+    `role` is "x", "y" or "z", and `given` is the unit that the user states, or None. It overrules the file, with a
+    note.
+    """
     stated = table.units.get(role)
     unit = given or stated
     if unit is None:
@@ -148,7 +158,10 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
 
 
 def _check_numbers(table: Table, role: str) -> None:
-    """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing."""
+    """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing.
+
+    `role` is the name of the column of the `table`.
+    """
     values = table.columns[role].ravel()
     is_bad = ~(np.abs(values) <= MAX_LENGTH)
     if role == "z":
@@ -162,7 +175,10 @@ def _check_numbers(table: Table, role: str) -> None:
 
 
 def _fill_raster(table: Table) -> Table:
-    """Arrange points as a matrix, whose cells without a point are missing, or as a trace if they form a line."""
+    """Arrange the points of a table as a matrix, or as a trace if they form a line.
+
+    Cells of the matrix without a point are missing heights.
+    """
     x, y, z = (table.columns[role] for role in "xyz")
     columns, in_column = _find_positions(x)
     rows, in_row = _find_positions(y)
@@ -192,14 +208,20 @@ def _fill_raster(table: Table) -> Table:
 
 
 def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct positions of points (k,) but for round-off, and the index of each point (n,)."""
+    """Return the distinct positions (k,) among values (n,), and the index (n,) of each value in them.
+
+    Values that differ by round-off count as equal.
+    """
     positions, index = np.unique(values, return_inverse=True)
     is_new = np.diff(positions, prepend=-np.inf) > POSITION_ROUND_OFF * np.ptp(values)
     return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
 def _require_increase(table: Table, role: str, places) -> None:
-    """Raise PatchfemError if positions [m] are equal or do not increase, or there are fewer than two of them."""
+    """Raise PatchfemError if the positions of a column are equal or do not increase.
+
+    `role` is "x" or "y", and `places` (n,) [m] are the positions; the `table` tells the line of a wrong one.
+    """
     if not np.ptp(places) > 0:
         raise PatchfemError(
             f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
@@ -220,11 +242,13 @@ def _require_increase(table: Table, role: str, places) -> None:
 
 
 def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
-    """Return equally spaced positions (n,) [m] if these differ from them only by rounding, and the table with a note.
+    """Return the table and positions x (n,) [m], made even if they differ only by rounding.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
     differ by it; uneven steps, such as 1.0 and 1.4 um in turn, are no multiples of their difference.
+
+    `role` is "x" or "y". The table gets a note if positions are changed.
     """
     if x.size < MIN_ROUNDED:
         return table, x
@@ -239,12 +263,14 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
         if np.abs(n_digits - np.rint(n_digits)).max() > DIGIT_TOL:
             return table, x
 
+    # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
     count = np.arange(x.size) - (x.size - 1) / 2
     evens = [x.mean() + float(count @ x / (count @ count)) * count]
     if table.length is not None:
         lengths = [table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
         evens = [*(x[0] + places for places in lengths), *evens]
 
+    # The first candidate from which the positions differ by rounding alone
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
@@ -263,6 +289,9 @@ def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, .
     """Return a note on heights [m] that span more than the length [m] in units that the user or the format gives.
 
     Raises PatchfemError for a tiny length, and for such heights in units from a header, which have no other source.
+
+    `path` names the file in messages, z (n,) or (m, n) are its heights, and `has_sure_units` tells whether the units
+    were given by the user or by the format.
     """
     if length < MIN_TRACE_LENGTH:
         raise PatchfemError(

@@ -19,18 +19,28 @@ import numpy as np
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
-from .header import COMMENT, MISSING, Column, Header, parse_fact, read_header, split_cells
+from .header import (
+    COMMENT_SIGNS,
+    MISSING_PATTERN,
+    Column,
+    Header,
+    parse_fact,
+    read_header,
+    split_cells,
+)
 from .table import Table
 from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 MAX_STEP_UNEVENNESS = 1e-6
+# Pattern of a number in quotes with a decimal comma
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+# Pattern of a control character, which no text contains
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
-    """Read the columns or the matrix of a text file.
+    """Read the columns or the matrix in the content of a text file.
 
     has_units: whether the user states the units; then columns of unknown names are taken in their order.
     """
@@ -57,7 +67,7 @@ def read_text(content: Content, *, has_units: bool = False) -> Table:
 
 
 def _decode(content: Content) -> str:
-    r"""Decode a text file, with \n at the ends of lines and without quotes."""
+    r"""Decode the content of a text file, with \n at the ends of lines and without quotes."""
     data = content.data
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")
@@ -142,6 +152,8 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     """
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
+
+    # The first row and column may be coordinates, which no header states
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
     if has_axes and not _is_even(z[1, 1:]):
         raise PatchfemError(
@@ -165,7 +177,7 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether numbers (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
+    """Return whether values (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_STEP_UNEVENNESS * steps[0])
 
@@ -198,7 +210,7 @@ def _read_rows(
     for number, line in lines:
         line = line.strip(" \n")
         place = f"{path}:{number}: '{shorten(line)}'"
-        if line.startswith(COMMENT):
+        if line.startswith(COMMENT_SIGNS):
             if is_matrix and re.search("[:=]", line):
                 raise PatchfemError(
                     f"{place} ends the scan or begins another one; keep only one scan per file"
@@ -231,10 +243,13 @@ def _read_rows(
 
 
 def _parse_cell(place: str, role: str, cell: str) -> float:
-    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text."""
+    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text.
+
+    `place` is file and line for the message, and `role` is the name of the column.
+    """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
-    if role == "index" or (role == "z" and MISSING.fullmatch(cell)):
+    if role == "index" or (role == "z" and MISSING_PATTERN.fullmatch(cell)):
         return np.nan
     raise PatchfemError(
         f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"

@@ -30,7 +30,7 @@ _COLUMN_NAMES = {
     "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil, raw",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
 }
-ROLES = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
+ROLES_BY_NAME = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
 
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
@@ -38,13 +38,13 @@ SIZE_LINES = "write `# Width: 1.2 mm` and `# Height: 0.8 mm` and `# Value units:
 
 
 def parse_length_unit(word: str) -> float | None:
-    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer, or None for other text."""
+    """Return the factor to metres of a word such as um, µm, [mm] or Mikrometer, None for others."""
     word = normalize_unit(word.strip("[]() "))
     return UNITS.get(word) or UNIT_WORDS.get(word.lower())
 
 
 def shorten(text, length: int = 40) -> str:
-    """Make a text from a file, or the message of a library, printable and at most 40 characters long."""
+    """Make a text from a file or a library printable and at most `length` characters long."""
     text = " ".join(str(text).split())
     if not text.isprintable():
         text = text.encode("unicode_escape").decode()

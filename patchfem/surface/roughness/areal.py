@@ -13,6 +13,7 @@ DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 2517
 MIN_LENGTH_STEPS = 2.0
 N_RAYS = 360  # number of directions in which the autocorrelation is followed
 RAY_POINTS = 4  # number of points on a ray per raster step
+# Unit and definition of each parameter of a scan, by name
 AREAL = read_definitions("areal")
 
 
@@ -25,7 +26,14 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
         Heights about the reference surface, NaN where missing.
     steps : tuple of float
         Spacings along y and along x [m].
+
+    Returns
+    -------
+    dict
+        Value, or code of the reason why there is none, by name.
     """
+
+    # Parameters of the distribution of heights: Sa, Sq, Ssk, Sku, and those of the core
     heights = z[~np.isnan(z)]
     distribution = compute_moments(heights) | compute_core(heights)
     values = {f"S{name.lower()}": value for name, value in distribution.items()}
@@ -37,6 +45,7 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))
 
+    # Sal is the shortest distance at which the autocorrelation falls to 0.2, Str its ratio to the longest one
     values |= {"Sal": "not_falling", "Str": "not_falling"}
     distances = np.full(1, np.inf)
     if values["Sq"] > 0:
@@ -53,7 +62,11 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
 
 
 def _compute_area_ratio(along_y, along_x) -> float:
-    """Compute Sdr from squared slopes: cells of four heights are cut into triangles along either diagonal."""
+    """Compute Sdr, the relative area beyond the projected one [1], from squared slopes of a scan (m, n).
+
+    `along_y` (m - 1, n) and `along_x` (m, n - 1) are the squared slopes. Cells of four heights are cut into triangles
+    along either diagonal.
+    """
     total = 0.0
     for left_or_right in (along_y[:, :-1], along_y[:, 1:]):
         for low_or_high in (along_x[:-1], along_x[1:]):
@@ -83,7 +96,10 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
 
 
 def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
-    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf where it does not."""
+    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf if never.
+
+    `rho` is the autocorrelation, with the zero lag in the middle, and `steps` [m] are its steps along y and x.
+    """
     from scipy import ndimage
 
     sizes = (np.array(rho.shape) // 2) * steps

@@ -25,11 +25,23 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
     exp(-pi (x / (alpha cutoff))^2), alpha = sqrt(ln 2 / pi), along each axis; half a cut-off is trimmed at each end or
     border. Missing heights of a scan have no weight and stay missing. Raises PatchfemError if the cut-off is shorter than
     four steps or as long as a side. 1000 x 1000 heights take 0.4 s.
+
+    Parameters
+    ----------
+    surface : Profile or Areal
+        Trace or scan.
+    cutoff : float
+        Cut-off [m].
+
+    Returns
+    -------
+    tuple of Profile or Areal
+        Waviness and roughness.
     """
     is_scan = isinstance(surface, Areal)
     surface = surface if is_scan else level(resample_evenly(surface))
     axes = {"y": surface.y, "x": surface.x} if is_scan else {"x": surface.x}
-    kept = []
+    kept_slices = []
     cutoffs = []
     for name, axis in axes.items():
         step = measure_step(axis)
@@ -45,12 +57,12 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
                 f"{surface.source}: half a cut-off of {format_length(cutoff)} is trimmed at each end, so that it must be "
                 f"shorter than the length along {name}, {format_length(axis[-1] - axis[0])}"
             )
-        kept.append(slice(edge, axis.size - edge))
+        kept_slices.append(slice(edge, axis.size - edge))
         cutoffs.append(cutoff / step)
 
     waves = mean_surface(surface.z, cutoffs)
-    inside = tuple(kept)
-    places = {name: frozen_array(axes[name][part]) for name, part in zip(axes, kept)}
+    inside = tuple(kept_slices)
+    places = {name: frozen_array(axes[name][part]) for name, part in zip(axes, kept_slices)}
     return tuple(
         replace(surface, **places, z=frozen_array(z[inside])) for z in (waves, surface.z - waves)
     )
@@ -59,7 +71,7 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
 def mean_surface(z: np.ndarray, cutoffs: Sequence[float]) -> np.ndarray:
     """Compute the Gaussian mean line (n,) or surface (m, n) of heights z of this shape.
 
-    Missing heights are NaN in both. Cut-offs in steps along each axis. A million heights take 0.2 s.
+    Missing heights are NaN in both. The `cutoffs` are in steps along each axis. A million heights take 0.2 s.
     """
     known = ~np.isnan(z)
     sums = []
@@ -74,7 +86,8 @@ def mean_surface(z: np.ndarray, cutoffs: Sequence[float]) -> np.ndarray:
 def mean_line(z: np.ndarray, cutoff: float) -> np.ndarray:
     """Compute the mean line (n,) of equally spaced heights z (n,) that follows slopes up to its ends.
 
-    The weights that an end cuts off fit a straight line, not a constant (ISO 16610-28, first moment). Cut-off in steps.
+    The weights that an end cuts off fit a straight line, not a constant (ISO 16610-28, first moment). The `cutoff` is
+    in steps.
     """
     offsets, weight = _gaussian_weights(cutoff, z.size)
     # A convolution reverses the weights.
@@ -94,7 +107,7 @@ def _convolve(z, weight) -> np.ndarray:
 
 
 def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return offsets and Gaussian weights for a cut-off in steps, over `count` samples at most."""
+    """Return offsets and Gaussian weights for a `cutoff` in steps, over `count` samples at most."""
     half = min(int(np.ceil(REACH_FACTOR * cutoff)), count - 1)
     offsets = np.arange(-half, half + 1.0)
     return offsets, np.exp(-np.pi * (offsets / (ALPHA * cutoff)) ** 2)

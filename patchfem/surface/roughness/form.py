@@ -14,7 +14,7 @@ MIN_CIRCLE_HEIGHTS = 10  # smallest number of heights that determine a circle
 
 
 def parse_form_option(text: str) -> int | str:
-    """Parse the option that names the form to subtract: 1 (a line or a plane), or circle."""
+    """Parse the text of the option that names the form to subtract: 1 (line or plane), or circle."""
     form = {"1": 1, CIRCLE: CIRCLE}.get(text.strip())
     if form is not None:
         return form
@@ -28,6 +28,19 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
     """Subtract the least-squares form of a surface; return the remainder and the name of the form.
 
     Raises PatchfemError if the heights do not determine it, and for a circle under a scan.
+
+    Parameters
+    ----------
+    surface : Profile or Areal
+        Trace or scan.
+    form : int or str
+        1 for a line or a plane, "circle" for a circle under a trace.
+
+    Returns
+    -------
+    remainder : Profile or Areal
+    name : str
+        Name of the form, for the user.
     """
     is_scan = isinstance(surface, Areal)
     if form != CIRCLE:
@@ -64,7 +77,10 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
 
 
 def _evaluate_circle(state, x) -> np.ndarray:
-    """Return the heights of a circle: level, sine of the slope in the middle, curvature."""
+    """Return the heights of a circle at places x (n,), both relative to the same length.
+
+    The `state` are the level, the sine of the slope in the middle and the curvature.
+    """
     height, sine, curvature = state
     sine = np.clip(sine, -1, 1)
     end = np.clip(sine + curvature * x, -1, 1)

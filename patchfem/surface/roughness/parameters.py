@@ -21,7 +21,9 @@ MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 WITHOUT_INTERVAL = ("t", "sk", "ku")
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
+# Unit and definition of each parameter of a trace, by name
 PROFILE = read_definitions("profile")
+# Unit and definition of each amplitude of waves, by name
 WAVES = read_definitions("waves")
 
 
@@ -53,7 +55,10 @@ def compute_parameters(z, step: float, section: float | None = None) -> dict[str
 
 
 def compute_moments(z) -> dict[str, float | None]:
-    """Compute the mean, root mean square, skewness and kurtosis of heights (n,) [m]."""
+    """Compute mean, root mean square [m], skewness and kurtosis [1] of heights z (n,) [m].
+
+    The keys are "a", "q", "sk" and "ku", as in Ra; "a" is the mean of the absolute heights.
+    """
     rms = np.sqrt(np.mean(z**2))
     out = {"a": float(np.abs(z).mean()), "q": float(rms), "sk": None, "ku": None}
     if rms > 0:
@@ -88,14 +93,14 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
     is_kept = (extent >= MIN_HEIGHT_FRACTION * rough) & (width >= MIN_WIDTH_FRACTION * section)
-    kept = np.flatnonzero(is_kept)
+    kept_indices = np.flatnonzero(is_kept)
     # A hill or dale begins at the crossing before it.
-    ends = places[kept[1:][np.diff(above[first[kept]])] - 1]
+    ends = places[kept_indices[1:][np.diff(above[first[kept_indices]])] - 1]
     return float((ends[2:] - ends[:-2]).mean()) if ends.size > 2 else None
 
 
 def compute_core(z) -> dict[str, float | None]:
-    """Compute Rk, Rpk, Rvk, Mr1 and Mr2 from the Abbott curve of heights (n,) [m] (ISO 13565-2).
+    """Compute Rk, Rpk, Rvk, Mr1 and Mr2 from the Abbott curve of heights z (n,) [m] (ISO 13565-2).
 
     The core is the least-squares line of that 40 % of the curve whose secant falls least. The second
     filter stage of ISO 13565-1 is not used.
@@ -128,15 +133,16 @@ def compute_core(z) -> dict[str, float | None]:
 
 
 def abbott_curve(z, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the Abbott curve of heights (n,) [m]: material ratio (count,) from 0 to 1, and height [m]."""
+    """Compute the Abbott curve of heights z [m]: material ratio (count,) from 0 to 1, and height [m]."""
     ratio = np.linspace(0.0, 1.0, count)
     return ratio, np.interp(ratio, (np.arange(z.size) + 0.5) / z.size, np.sort(z)[::-1])
 
 
 def estimate_errors(z, step: float, section: float) -> dict[str, float]:
-    """Estimate the standard errors of the parameters by the jackknife over the sections.
+    """Estimate the standard errors of the roughness parameters by the jackknife over sections.
 
-    It is {} for fewer than MIN_SECTIONS.
+    The heights z (n,) [m] lie at equal steps `step` [m], and `section` [m] is the length of a section, one cut-off.
+    Errors are by name, in the units of the parameters; {} for fewer than MIN_SECTIONS sections.
     """
     size = round(section / step)
     count = z.size // size

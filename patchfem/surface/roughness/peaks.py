@@ -21,14 +21,16 @@ from .filter import filter_surface
 from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
-MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
-# Ratio of u_0 to rms height by Persson 2007, and by simulation (Pastewka 2013).
+# Nayak's spectral width alpha of an isotropic surface whose waves all have the same length; no surface has less
+MIN_ALPHA = 1.5
+# Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
 PERSSON = (0.4, 0.5)
 # Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
 MAX_SPIKE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
 MAX_SKEWNESS = 0.5
-MAX_EXCESS_KURTOSIS = 1.0  # largest kurtosis minus 3, for the same reason
+# Largest kurtosis minus 3 whose effect on the stiffness is below the uncertainty of the theory
+MAX_EXCESS_KURTOSIS = 1.0
 # Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
 SHARPEST_FRACTION = 0.005
 MAX_SHARPEST_POWER = 0.5  # largest fraction of m_4 in the sharpest heights; more may be due to dust
@@ -70,7 +72,7 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace that are shorter than a cut-off [m]; None: of all waves.
+    """Measure the moments of the waves of a trace shorter than `cutoff` [m]; of all if it is None.
 
     Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
     trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
@@ -128,10 +130,12 @@ def rms_moments(trace: Profile) -> Moments:
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:
-    """State that skewness and kurtosis of heights are not Gaussian, or return "".
+    """State that skewness and kurtosis of heights z (n,) [m] are not Gaussian, or return "".
 
     A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
     independent height.
+
+    `moments` are the rms height, slope and curvature of the trace, and `length` [m] is its length.
     """
     unit = (z - z.mean()) / z.std()
     skewness = float(np.mean(unit**3))

@@ -34,7 +34,7 @@ CONFIDENCE_TAIL = 0.05  # probability of a true value below, and above, the inte
 
 
 class Sampling(NamedTuple):
-    """Length, step [m] and numbers of samples of a surface, after resampling."""
+    """Length [m], step [m] and numbers of samples (`shape`) of a surface, after resampling."""
 
     length: float
     step: float
@@ -160,7 +160,11 @@ def make_report(
 def _measure_trace(
     parts: TraceParts, cutoff: float | None
 ) -> tuple[list[Quantity], tuple[str, ...]]:
-    """Return the parameters of the primary profile and of the roughness profile, and a note on few sections."""
+    """Return the parameters of both profiles of a trace, and a note if there are few sections.
+
+    `parts` has the levelled (primary) profile, its spectrum, and the roughness profile for this `cutoff` [m], None
+    without one.
+    """
     primary = parts.primary
     values = compute_parameters(primary.z, primary.step)
     del values["z"]  # of one section, which is Pt
@@ -219,7 +223,11 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
 
 
 def _name_value(name: str, value: float | None, unit: str, text: str, profile: str) -> Quantity:
-    """Return a parameter of a profile, with the code of the reason where it has no value."""
+    """Return the value of a parameter of a profile as a quantity.
+
+    `name`, `unit` and `text` (the definition) are those of the parameter, `profile` names the profile. Where it has no
+    value, the quantity has the code of the reason.
+    """
     reason = "undetermined" if value is None else ""
     return Quantity(value, None, None, unit, f"{text}, of the {profile}", reason, name)
 
@@ -236,6 +244,17 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     As between the cursors of an instrument, it runs from the last sample at or before the first
     position to the last at or before the second. Raises PatchfemError for a window that is reversed
     or not within the surface.
+
+    Parameters
+    ----------
+    surface : Profile or Areal
+        Trace or scan.
+    *ends : float
+        First and last position [m] along x of a trace; of a scan, the same along x and then along y.
+
+    Returns
+    -------
+    Profile or Areal
     """
     names = "xy" if isinstance(surface, Areal) else "x"
     if len(ends) != 2 * len(names):

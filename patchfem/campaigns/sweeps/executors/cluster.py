@@ -94,7 +94,10 @@ class Cluster(FutureExecutor):
             raise
 
     def _require_same_versions(self, here: dict[str, dict], worker: dict[str, dict]) -> None:
-        """Raise Missing if a worker has other versions than this machine; both are answers of Dask."""
+        """Raise Missing if a worker has other versions than this machine, `here`.
+
+        Both are answers of Dask.
+        """
         for name in COMPARED_VERSIONS:
             own, other = ({**node["host"], **node["packages"]}[name] for node in (here, worker))
             if own != other:
@@ -104,7 +107,11 @@ class Cluster(FutureExecutor):
                 )
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
-        """Store the data of the sweep on the cluster; raise Missing if the connection to the scheduler is lost."""
+        """Store the data of the sweep, `work`, on the cluster.
+
+        Raises Missing if the connection to the scheduler is lost. `is_silent` has no effect: workers of a cluster
+        print nothing.
+        """
         scene = work.sweep_scene
         self.common_data = scene.hash_common_data()
         scene = replace(scene, path=Path(os.path.abspath(scene.path)))

@@ -134,7 +134,10 @@ class Pool(FutureExecutor):
         self.workers = workers
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
-        """Keep the data that each new process receives."""
+        """Keep the data of the sweep, `work`, which each new process receives.
+
+        A process prints progress to the standard error stream unless `is_silent`.
+        """
         self.initial_data = (work, None if is_silent else _print_to_stderr)
         self.processes = _OwnProcesses()
         self.last_chunks: dict[ProcessPoolExecutor, Future] = {}
@@ -193,7 +196,10 @@ _PROCESS_DATA: list[WorkerData | Callable | None] = []
 
 
 def _begin_process(work: WorkerData, say: Callable | None) -> None:
-    """Keep the data of the sweep in a new process, which ends with the process that started it."""
+    """Keep the data of the sweep, `work`, in a new process, which ends with the one that started it.
+
+    `say` prints a line of text, or is None.
+    """
     # The process that started the sweep handles interrupts.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
