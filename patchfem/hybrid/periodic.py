@@ -18,7 +18,8 @@ MIN_DIFFERENCE = (
 )
 MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
-N_RELAXED = 6  # cycles without a correction after one that did not help
+N_RELAXED = 6  # cycles without a correction after the first one that did not help; twice as many after the next
+MAX_RELAXED = 200  # largest number of these cycles
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
 MAX_KINKED_CHANGE = 1e-6
@@ -191,6 +192,7 @@ class _Shooting:
             Change over this period, relative to the scale of the state.
         """
         best = np.inf
+        n_relaxed = N_RELAXED
         for _ in range(MAX_ITERATIONS):
             before = self.state
             self.relax(1)
@@ -201,9 +203,11 @@ class _Shooting:
                 self.map = None
                 continue
 
-            # A correction that did not help is given up for some periods of the motion itself.
+            # A correction that did not help is given up for some periods of the motion itself; they are
+            # many for an interface that hardly slips, where the steps of a stuck one lead far away.
             if change > best:
-                self.relax(N_RELAXED)
+                self.relax(n_relaxed)
+                n_relaxed = min(2 * n_relaxed, MAX_RELAXED)
                 self.map = None
                 best = np.inf
                 continue

@@ -137,7 +137,7 @@ class Model:
         bolted = None if self.rig is None else self.rig.structure.bolted
         if bolted is None or not bolted.stiffness:
             return []
-        stiffness = " and ".join(format_quantity(k, "N/m", 4) for k in bolted.stiffness)
+        stiffness = " and ".join(format_quantity(k, "N m-1", 4) for k in bolted.stiffness)
         return [
             f"the modes were measured with the joint bolted, so the stiffness of the joint of {bolted.scene}, "
             f"{stiffness}, is subtracted from them"

@@ -19,17 +19,13 @@ STEADY = (
 DEAR = ("patch", "wear")
 MEANT = {  # expected warnings of a scene, each with its remedy and the reason to keep it
     "studies/rig/report.toml": (
+        "the law as printed in the report created",  # eq. 2.17
         "the shape of the patch does not",
-        "the law as printed in the report created",
-    ),  # eq. 2.17
-    "studies/report/grooved.toml": (
-        "relative_displacement_amplitude has an estimated",
-    ),  # it is about to run away
-    # fits run these hundreds of times, with 100 samples a cycle
-    "studies/table_1/climbing.toml": ("absolute_acceleration_peak has an estimated",),
-    "studies/table_1/grooves.toml": ("absolute_acceleration_peak has an estimated",),
+    ),
+    # it starts from rest, as the recipe of the ladder says, and is not steady at its end
+    "studies/table_1/climbing.toml": ("relative_displacement_amplitude_steady has an estimated",),
     # fits run this scene hundreds of times on the mesh of its tolerance
-    "studies/table_1/second_path.toml": ("relative_displacement_amplitude has an estimated",),
+    "studies/table_1/second_path.toml": ("slip_start_phase has an estimated",),
     # a finer mesh takes a minute, and the study compares volumes, whose error is smaller
     "studies/benchmarks/ti64_wear.toml": ("pressure_peak has an estimated",),
     # the study compares integrators on the elements of this mesh

@@ -1,5 +1,7 @@
 """Frequency response curves by the engine `harmonic`: values and errors at every point."""
 
+import re
+
 import numpy as np
 import pytest
 from scene_runs import find_sentences
@@ -40,6 +42,20 @@ def test_exact_point_of_curve_agrees_with_sine_run(law):
                 k,
                 column,
             )
+
+
+@pytest.mark.parametrize("frequency", ["407.7 Hz", "408.125 Hz"])
+def test_exact_damper_that_hardly_slips_has_periodic_motion(frequency):
+    """The shipped damper under ten times its load, near resonance, has the amplitude of a long run."""
+    sine = f'frequency = "{frequency}"\ncycles = 3000\n'
+    text = re.sub('waveform = "sweep"\nfrom .*\nto .*\nrate .*\n', sine, pf.new("damper"))
+    scene = pf.load(text, **{"structure.interface[1].load": "10 kN"})
+    found = {}
+    for method in ("harmonic", "auto"):
+        run = pf.run(scene, **{"accuracy.method": method})
+        found[method] = run.measures["relative_displacement_amplitude"]
+        assert run.measures["friction_force_peak"].value == pytest.approx(3e3, rel=1e-6)
+    assert found["harmonic"].value == pytest.approx(found["auto"].value, rel=1e-7)
 
 
 INTERLOCK = (
