@@ -1,8 +1,7 @@
 """Arrays of a MATLAB file: versions 4 to 7 by SciPy, version 7.3, which is an HDF5 file, by h5py.
 
 MATLAB stores an array in HDF5 with its dimensions in reverse order, and a sparse matrix or a structure as a group; the
-attribute MATLAB_class distinguishes them. Files that are cut off are refused. SciPy 1.17 ends the process for some files
-without compression of which single bits are wrong; compressed files, which MATLAB writes by default, have a checksum.
+attribute MATLAB_class distinguishes them. Files that are cut off, or whose elements have wrong types, are refused.
 """
 
 import io
@@ -11,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from . import matlab_elements
 from .damage import refuse_damage
-from .packed import count_matlab_bytes, refuse_large_content
+from .packed import refuse_large_content
 from .records import check_file
 
 REMEDY = "save only the variables that are needed"  # for a file that is too large
@@ -63,8 +63,10 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
                 refuse_large_content(path, sum(sizes), REMEDY)
                 _add_group(arrays, file, "", 0)
         else:
-            refuse_large_content(path, count_matlab_bytes(data), REMEDY)
-            _read_version_5(data, arrays)
+            refuse_large_content(path, matlab_elements.count_unpacked_bytes(data), REMEDY)
+            content = matlab_elements.unpack_variables(data)
+            matlab_elements.check_elements(content)
+            _read_version_5(content, arrays)
     return arrays
 
 

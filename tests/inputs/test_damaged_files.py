@@ -96,6 +96,21 @@ FILES = {
         matlab5_bytes({"K": K, "n": np.arange(6, dtype="u1")}),
         bytes,
     ),
+    # not compressed: SciPy ends the process where a wrong type, length or flag is not refused before
+    "plain.mat": (
+        read_all,
+        "plain.mat",
+        matlab5_bytes(
+            {
+                "run": {"F": K, "by": "bench 3"},
+                "z": np.array([1 + 2j]),
+                "n": np.arange(5),
+                "K": sparse.csc_array(K),
+            },
+            packed=False,
+        ),
+        bytes,
+    ),
     "structures.mat": (
         read_all,
         "structures.mat",

@@ -1,0 +1,123 @@
+"""Elements of a MATLAB file of version 5 to 7, which are looked at before SciPy reads them.
+
+An element is the number of its type, the number of its bytes, and these bytes. A variable is an element with further
+elements inside: its flags, dimensions, name and numbers, or the variables of a cell or a structure.
+"""
+
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .packed import MAX_UNPACKED_BYTES
+
+PIECE_BYTES = 2**12  # bytes that are unpacked at once, to at most 1000 times as many
+# Version and order of the bytes in the header of a file.
+VERSION_5_MARKS = {b"\x00\x01IM": "little", b"\x01\x00MI": "big"}
+HEADER_BYTES = 128  # length [bytes] of the header of a file
+COMPRESSED_TYPE = 15  # type number of a compressed variable
+VARIABLE_TYPE = 14  # type number of a variable
+NUMBER_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)  # of integers, floats and characters
+NESTED_CLASSES = (1, 2, 3)  # classes of cells, structures and objects, which contain variables
+SPARSE_CLASS = 5  # class of a sparse matrix
+UNREAD_CLASSES = (
+    16,
+    17,
+)  # classes of functions and of other content that SciPy does not read as arrays
+COMPLEX_FLAG = 1 << 11  # bit of the flags of complex numbers
+
+
+class Element(NamedTuple):
+    """Element of a file: number of its type, and where its content starts and ends."""
+
+    kind: int
+    start: int
+    stop: int
+
+
+def count_unpacked_bytes(data: bytes) -> int:
+    """Return the unpacked size [bytes] of the compressed variables of a file, whose content is `data`.
+
+    The count ends once it exceeds the limit. Raises zlib.error for damaged variables.
+    """
+    total = 0
+    for variable in _list_variables(data):
+        unpacker = zlib.decompressobj()
+        stop = min(variable.stop, len(data))
+        for start in range(variable.start, stop, PIECE_BYTES):
+            if variable.kind == COMPRESSED_TYPE and total <= MAX_UNPACKED_BYTES:
+                total += len(unpacker.decompress(data[start : min(start + PIECE_BYTES, stop)]))
+    return total
+
+
+def unpack_variables(data: bytes) -> bytes:
+    """Return the content of a file with its variables unpacked; another version is returned as it is.
+
+    Raises zlib.error for variables that are damaged or cut off.
+    """
+    if data[124:128] not in VERSION_5_MARKS:
+        return data
+    pieces = [data[:HEADER_BYTES]]
+    for variable in _list_variables(data):
+        piece = data[variable.start - 8 : variable.stop]
+        if variable.kind == COMPRESSED_TYPE:
+            piece = zlib.decompress(piece[8:])
+        pieces.append(piece)
+    return b"".join(pieces)
+
+
+def check_elements(data: bytes) -> None:
+    """Raise ValueError if an element inside a variable without compression has a wrong type or length.
+
+    SciPy 1.17 ends the process there. `data` is the content of `unpack_variables`.
+    """
+    order = VERSION_5_MARKS.get(data[124:128])
+    variables = [element for element in _list_variables(data) if element.kind == VARIABLE_TYPE]
+    while variables:
+        variable = variables.pop()
+        parts = list(_list_elements(data, order, variable.start, variable.stop))
+        if not parts:
+            continue  # an empty cell
+        flags = int.from_bytes(data[parts[0].start : parts[0].start + 4], order)
+        array_class = flags & 0xFF
+        if array_class in UNREAD_CLASSES:
+            continue
+
+        # Numbers follow flags, dimensions and name; a sparse matrix has two arrays of places before them.
+        count = 4 + 2 * (array_class == SPARSE_CLASS) + bool(flags & COMPLEX_FLAG)
+        allowed = NUMBER_TYPES
+        if array_class in NESTED_CLASSES:
+            count = len(parts)
+            allowed = (*NUMBER_TYPES, VARIABLE_TYPE)
+        if len(parts) < count:
+            raise ValueError("a variable is incomplete")
+        for part in parts[:count]:
+            if part.kind not in allowed:
+                raise ValueError(f"an element has the unknown type {part.kind}")
+            if part.stop > variable.stop:
+                raise ValueError("an element is longer than its variable")
+        variables += [part for part in parts[:count] if part.kind == VARIABLE_TYPE]
+
+
+def _list_variables(data: bytes) -> Iterator[Element]:
+    """Iterate over the variables of a file with a content; nothing for another version."""
+    order = VERSION_5_MARKS.get(data[124:128])
+    place = HEADER_BYTES if order else len(data)
+    while place + 8 <= len(data):
+        stop = place + 8 + int.from_bytes(data[place + 4 : place + 8], order)
+        yield Element(int.from_bytes(data[place : place + 4], order), place + 8, stop)
+        place = stop
+
+
+def _list_elements(data: bytes, order: str, place: int, stop: int) -> Iterator[Element]:
+    """Iterate over the elements between two places of a content, in the order "little" or "big" of its bytes."""
+    while place + 8 <= min(stop, len(data)):
+        kind = int.from_bytes(data[place : place + 4], order)
+        # Up to four bytes stand in the place of their number, which is in the upper half of the type.
+        small_count = kind >> 16
+        if small_count:
+            yield Element(kind & 0xFFFF, place + 4, place + 4 + small_count)
+            place += 8
+            continue
+        count = int.from_bytes(data[place + 4 : place + 8], order)
+        yield Element(kind, place + 8, place + 8 + count)
+        place += 8 + -(-count // 8) * 8  # elements begin at multiples of eight bytes
