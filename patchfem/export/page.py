@@ -15,12 +15,11 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
-from ..formatting import format_number
 from . import quantities, several, store
-from .answer import Answer, Answers, Quantity
+from .answer import Answers
 from .charts import panels, plotly
-from .charts.table import CHARTS, TABLES, Column, parse_columns
-from .columns import Cells, list_rows, make_quantity
+from .charts.table import CHARTS
+from .columns import make_tables
 
 # what a file beside a page is, by its name or its ending
 FILE_TEXTS = {
@@ -151,36 +150,6 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
         missing = [f"No value: {reason}." for reason in reasons if reason]
         rows.append((name, texts, " ".join([quantities.describe(name, kind), *missing])))
     return rows, zeros
-
-
-def make_tables(answer: Answer) -> list[several.Table]:
-    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
-    tables = []
-    for table in TABLES.get(answer.kind, ()):
-        rows = list_rows(answer, table.source)
-        known = {name for row in rows for name in row}
-        columns = [one for one in parse_columns(table.columns) if one.name in known]
-        headings = [column.heading.replace("_", " ") for column in columns]
-        texts = [[_format_cell(row, column) for column in columns] for row in rows]
-        tables.append({"title": table.title, "headings": headings, "rows": texts})
-    return [table for table in tables if table["rows"]]
-
-
-def _format_cell(row: Cells, column: Column) -> str:
-    """Return a cell of a table as text; a missing value is a dash."""
-    cell = row.get(column.name)
-    if cell is not None and column.style == "quantity":
-        cell = make_quantity(row)
-    if column.style == "rounded":
-        number = getattr(cell, "value", cell)
-        return "-" if number is None else format_number(number, 3)
-    if cell is None:
-        return "-"
-    if isinstance(cell, Quantity):
-        return quantities.format_quantity(column.name, cell)
-    if isinstance(cell, float):
-        return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
-    return str(cell).replace("_", " ") if column.style == "name" else str(cell)
 
 
 def make_stress_panels(path: Path) -> list[panels.Panel]:

@@ -6,13 +6,12 @@ from typing import Any
 
 from ..formatting import format_number
 from .answer import Answers, Quantity
+from .columns import Table
 from .quantities import format_quantity
 
 MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
-# table of a page: `title`, `headings`, and `rows` of strings
-Table = dict[str, str | list[str] | list[list[str]]]
 MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
 
 
@@ -52,7 +51,7 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
 
 
 def list_scene_differences(answers: Answers) -> list[Table]:
-    """Return a table of the keys in which the resolved scenes differ, as `page.make_tables` does; [] without any."""
+    """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does; [] without any."""
     scenes = {
         name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
         for name, answer in answers.items()
