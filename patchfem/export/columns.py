@@ -110,9 +110,8 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
     """Return the columns of a CSV file that at least one row has."""
     lists = {}
     known = dict.fromkeys(name for row in rows for name in row)
-    for column in (
-        parse_columns(file.columns) if file.columns else [Column(one, one) for one in known]
-    ):
+    columns = [Column(name, name, "bare") for name in known]
+    for column in parse_columns(file.columns) if file.columns else columns:
         if column.name == "labels":  # a column for each label
             labels = [row["labels"] for row in rows]
             names = dict.fromkeys(name for one in labels for name in one)
@@ -140,7 +139,7 @@ def _list_column(rows: list[Cells], column: Column, part: str = "value") -> List
 
     # numbers are in the unit of the heading, or in the SI unit, which then follows the name
     unit = heading.partition("[")[2].rstrip("]")
-    if not unit and sized[0].unit not in ("", "1"):
+    if not unit and column.style != "bare" and sized[0].unit not in ("", "1"):
         heading = f"{heading} [{sized[0].unit}]"
     numbers = [getattr(one, part, None) for one in cells]
     scale = CSV_UNITS.get(unit, 1.0)

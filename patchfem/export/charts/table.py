@@ -58,7 +58,8 @@ class Column(NamedTuple):
     - heading: text above the column.
     - name: variable of the answer, or key in each row of its details.
     - style: "" for values as they are. In a table also "name" for words with underscores, "quantity" for a value with the
-      unit, the error and the interval of its row, "rounded" for three digits, and "percent" for a relative change.
+      unit, the error and the interval of its row, "rounded" for three digits, and "percent" for a relative change. In a CSV
+      file also "bare" for a heading without the unit.
     """
 
     heading: str
