@@ -106,19 +106,18 @@ def make_page(folders: list[Path]) -> str:
         texts = {}
 
     figures = [plotly.draw(panel) for panel in drawn]
-    parts = [{key: one[key] for key in one if key in plotly.PARTS} for one in figures]
-    packed = json.dumps(parts, separators=(",", ":"), allow_nan=False)
+    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack)
     measures, zeros = _list_measures(answers)
     return _template().render(
         answers=answers,
         first=first,
-        figures=figures,
+        panels=drawn,
         tables=tables,
         measures=measures,
         zeros=zeros,
         files=[(name, text) for name, text in texts.items() if text],
         data=_encode(gzip.compress(packed.encode(), COMPRESSION, mtime=0)),
-        library=read_library() if figures else "",
+        library=read_library() if drawn else "",
     )
 
 
