@@ -219,7 +219,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
         # a row for each backbone
         amplitude = np.unique(np.concatenate(known))
         prefix = method.replace("-", "_")
-        columns = {f"{prefix}_amplitude": (amplitude, "m", "amplitude")}
+        columns = {f"{prefix}_amplitude": (amplitude, "m")}
         for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
             records = bands if name in BAND_COLUMNS else curves
             values = np.full((len(records), amplitude.size), np.nan)
@@ -228,7 +228,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
                     row[np.searchsorted(amplitude, record.amplitude)] = getattr(record, name)
             if any(records):
                 values = values[0] if axis is None else values
-                columns[f"{prefix}_{name}"] = (values, _find_unit(name), name.replace("_", " "))
+                columns[f"{prefix}_{name}"] = (values, _find_unit(name))
         data |= make_columns(f"case {prefix}_amplitude", columns)
 
     band = backbones[0].band
