@@ -20,7 +20,12 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     for table in make_tables(answer) if answer.kind == "cost" else ():
         lines += _align([table["headings"], *table["rows"]])
     shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
-    return lines + _align(list_quantities(shown))
+    return lines + format_quantities(shown)
+
+
+def format_quantities(shown: Quantities) -> list[str]:
+    """Return an aligned line for each quantity."""
+    return _align(list_quantities(shown))
 
 
 def _align(rows: Sequence[Sequence[str]]) -> list[str]:
