@@ -17,7 +17,6 @@ from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.spectrum import BAND
-from .. import answer as answers
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
@@ -214,7 +213,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
         content[region] = {side: to_answers(values) for side, values in sides.items()}
         for name in content[region]["before"]:
             row = {side: entries[name] for side, entries in content[region].items()}
-            rows[f"{name} {region}"] = row | {"cutoff": answers.Quantity(evidence.cutoff, "m")}
+            rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
         content["reason"] = sentences.REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
