@@ -10,6 +10,7 @@ from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
 from ..model.model import Model
 from ..model.source import Source
+from ..scene.assignments import Axis
 from . import quantities
 from .answer import (
     Answer,
@@ -68,7 +69,7 @@ def make_answer(backbone: Backbone, source: Source) -> Answer:
         title=source.title,
         verdict=_make_verdict(backbone, measures),
         quantities=measures,
-        data=_make_data(backbone),
+        data=_make_data([backbone]),
         remarks=Remarks(notes=(*map(_make_sentence, backbone.notes), *backbone.advice[1:])),
         details=_make_details(backbone),
         origin=make_origin(source, "backbone"),
@@ -197,24 +198,43 @@ def _exceeds(quantity: Quantity, other: Quantity) -> bool:
     return quantity.value - other.value > errors
 
 
-def _make_data(backbone: Backbone) -> Variables:
-    """Return the curves of all methods, the recommended one first, and the band of tests around it.
+def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Variables:
+    """Return the curves of the methods, each with the band of tests around it if it is recommended.
 
-    The band has variables of its own and, for the charts, is the interval of the recommended curve.
+    Of several backbones, one for each value of the key `axis`, there are only the recommended curves, at common amplitudes
+    with NaN where a backbone has no motion. The band of a single backbone has variables of its own, too.
     """
-    records = [
-        (method.replace("-", "_"), backbone.curves[method], COLUMNS)
-        for method in METHODS
-        if method in backbone.curves
-    ]
-    band = backbone.band
-    if band is not None:
-        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:]))
-        records.append(("band", band, BAND_COLUMNS))
     data = {}
-    for prefix, record, names in records:
-        columns = {f"{prefix}_{name}": (getattr(record, name), _find_unit(name)) for name in names}
-        data |= make_columns(f"{prefix}_amplitude", columns)
+    if axis is not None:
+        data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
+    for method in METHODS:
+        bands = [one.band if one.band and one.band.method == method else None for one in backbones]
+        curves = [one.curves.get(method) for one in backbones]
+        if axis is not None:
+            curves = [curve if band else None for curve, band in zip(curves, bands, strict=True)]
+        known = [curve.amplitude for curve in curves if curve is not None]
+        if not known:
+            continue
+
+        # a row for each backbone
+        amplitude = np.unique(np.concatenate(known))
+        prefix = method.replace("-", "_")
+        columns = {f"{prefix}_amplitude": (amplitude, "m")}
+        for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
+            records = bands if name in BAND_COLUMNS else curves
+            values = np.full((len(records), amplitude.size), np.nan)
+            for row, record in zip(values, records, strict=True):
+                if record is not None:
+                    row[np.searchsorted(amplitude, record.amplitude)] = getattr(record, name)
+            if any(records):
+                values = values[0] if axis is None else values
+                columns[f"{prefix}_{name}"] = (values, _find_unit(name))
+        data |= make_columns(f"case {prefix}_amplitude", columns)
+
+    band = backbones[0].band
+    if axis is None and band is not None:
+        columns = {f"band_{name}": (getattr(band, name), _find_unit(name)) for name in BAND_COLUMNS}
+        data |= make_columns("band_amplitude", columns)
     return data
 
 
@@ -256,7 +276,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
         title=cases.source.title,
         verdict=verdict,
         quantities=measures,
-        data=_make_cases_data(cases),
+        data=_make_data(cases.backbones, axis),
         remarks=Remarks(notes=tuple(_list_notes(cases))),
         details={
             "key": axis.key,
@@ -282,33 +302,6 @@ def _list_notes(cases: BackboneCases) -> list[str]:
         own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
         notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
     return notes
-
-
-def _make_cases_data(cases: BackboneCases) -> Variables:
-    """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
-    data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
-    for method in METHODS:
-        # a curve is drawn in the variables of the method that its backbone recommends
-        curves = [
-            one.best if one.band and one.band.method == method else None for one in cases.backbones
-        ]
-        known = [curve for curve in curves if curve is not None]
-        if not known:
-            continue
-        prefix = method.replace("-", "_")
-        amplitude = np.unique(np.concatenate([curve.amplitude for curve in known]))
-        data |= make_columns(f"{prefix}_amplitude", {f"{prefix}_amplitude": (amplitude, "m")})
-
-        for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
-            values = np.full((len(curves), amplitude.size), np.nan)
-            for row, curve, backbone in zip(values, curves, cases.backbones):
-                if curve is not None:
-                    record = backbone.band if name in BAND_COLUMNS else curve
-                    row[np.searchsorted(amplitude, curve.amplitude)] = getattr(record, name)
-            dims = ("case", f"{prefix}_amplitude")
-            text = name.replace("_", " ")
-            data[f"{prefix}_{name}"] = Variable(dims, values, _find_unit(name), text)
-    return data
 
 
 def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:

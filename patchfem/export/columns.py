@@ -1,128 +1,40 @@
-"""CSV files of the curves of an answer, and the rows of its tables."""
+"""Rows of an answer, and from them its CSV files and the tables of its page.
+
+A source names the rows: a dimension of the arrays, a list of objects in the details, or the curves of a backbone. A row is a
+dict: column -> quantity, number or text. CSV files and tables select columns by their heading lines in `charts.table`.
+"""
 
 import csv
 import io
 
 import numpy as np
 
-from .answer import Answer, JsonObject, Quantity, Variable, Variables
-from .charts.table import CSV_FILES, CSV_UNITS, Column, parse_columns
+from ..formatting import format_number
+from . import quantities
+from .answer import Answer, Quantity, Variable
+from .charts.table import CSV_FILES, CSV_UNITS, TABLES, Column, CsvFile, parse_columns
 
-# cells of the columns of a CSV file by heading; a missing cell is None or ""
+# cells of a column of a CSV file by its heading; a missing cell is None or ""
 Lists = dict[str, list[str | float | None]]
-# cells of a row of a table by column
+# cells of a row by column
 Cells = dict[str, Quantity | str | float]
-
-
-def format_curves(answer: Answer) -> dict[str, str]:
-    """Return the CSV files of an answer: name -> text.
-
-    A column is headed by its name and its unit in brackets, in SI units if the table names no other unit. A missing number
-    is an empty cell.
-    """
-    texts = {}
-    for name, file in CSV_FILES.get(answer.kind, {}).items():
-        columns = parse_columns(file.columns)
-        if not file.source:
-            lists = _list_variables(answer.data, columns)
-        elif file.source == "curves":
-            lists = _stack_curves(answer.details, columns)
-        elif file.source in answer.details:
-            lists = _list_objects(answer.details[file.source], columns, file.nested)
-        else:
-            rows = {key: one for key, one in answer.data.items() if one.dims == (file.source,)}
-            lists = {key: list_cells(one) for key, one in rows.items()}
-        if lists:
-            texts[name] = format_csv(lists)
-    return texts
-
-
-def format_csv(lists: Lists) -> str:
-    """Return columns of equal length as CSV: heading -> cells."""
-    output = io.StringIO()
-    writer = csv.writer(output, lineterminator="\n")
-    writer.writerow(lists)
-    writer.writerows(zip(*lists.values(), strict=True))
-    return output.getvalue()
-
-
-def list_cells(variable: Variable) -> list[str | float]:
-    """Return the cells of a column; "" for a missing number."""
-    cells = np.asarray(variable.values).tolist()
-    if variable.meanings:
-        return [variable.meanings[code] for code in cells]
-    return ["" if cell != cell else cell for cell in cells]  # only NaN differs from itself
-
-
-def add_unit(name: str, unit: str) -> str:
-    """Return the heading of a column: its name, and its unit in brackets."""
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
-
-
-def _list_variables(data: Variables, columns: list[Column]) -> Lists:
-    """Return columns of variables; {} if there are less than two."""
-    lists = {}
-    for column in columns:
-        variable = data.get(column.name)
-        if variable is None:
-            continue
-        unit = column.heading.partition("[")[2].rstrip("]")
-        if unit:
-            scaled = Variable(variable.dims, variable.values * CSV_UNITS[unit])
-            lists[column.heading] = list_cells(scaled)
-        else:
-            lists[add_unit(column.heading, variable.unit)] = list_cells(variable)
-    return lists if len(lists) > 1 else {}
-
-
-def _list_objects(rows: list[JsonObject], columns: list[Column], nested: str) -> Lists:
-    """Return columns of a list of objects: texts, and the value and the interval of each quantity."""
-    lists = {}
-    for name in (column.name for column in columns):
-        if name == "labels":  # a column for each label
-            labels = dict.fromkeys(label for row in rows for label in row["labels"])
-            lists |= {label: [row["labels"].get(label, "") for row in rows] for label in labels}
-        else:
-            lists[name] = [row.get(name) or "" for row in rows]
-    rows = [row[nested] if nested else row for row in rows]
-    units = {name: cell["unit"] for row in rows for name, cell in row.items() if _is_number(cell)}
-    for name, unit in units.items():
-        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
-            numbers = (row.get(name, {}).get(key) for row in rows)
-            lists[add_unit(name + suffix, unit)] = list(numbers)
-    return lists
-
-
-def _is_number(cell) -> bool:
-    """Return whether a value of an object is a quantity."""
-    return isinstance(cell, dict) and "value" in cell
-
-
-def _stack_curves(details: JsonObject, columns: list[Column]) -> Lists:
-    """Return columns with the curves of all methods, and of all values of a key, below each other."""
-    key = details.get("key", "")
-    lists = {key: []} if key else {}
-    lists["method"] = []
-    cases = zip(details.get("values", [""]), details.get("cases", [details]), strict=True)
-    for value, case in cases:
-        for method, curve in case["curves"].items():
-            size = len(curve["amplitude"])
-            if key:
-                lists[key] += [value] * size
-            lists["method"] += [method] * size
-            # the band is that of the recommended curve
-            known = curve | case["band"] if method == case["method"] else curve
-            for column in columns:
-                cells = known.get(column.name, [None] * size)
-                lists.setdefault(column.heading, []).extend(cells)
-    return lists
+# table of a page: `title`, `headings`, and `rows` of strings
+Table = dict[str, str | list[str] | list[list[str]]]
+ENDS = (
+    "error",
+    "low",
+    "high",
+)  # endings of the names of arrays with the error or the interval of another array
 
 
 def list_rows(answer: Answer, source: str) -> list[Cells]:
-    """Return the rows of a table: a list, or objects or lists by name in the details, or the variables of a dimension.
+    """Return the rows of a source.
 
-    source: as in `Table`.
+    source: "curves" for the curves of a backbone below each other, the path of a list, or of objects or lists by name, in
+    the details, such as "pressed/measures", or the name of a dimension.
     """
+    if source == "curves":
+        return _stack_curves(answer)
     content = answer.details
     for key in source.split("/"):
         content = content.get(key) if isinstance(content, dict) else None
@@ -138,22 +50,142 @@ def list_rows(answer: Answer, source: str) -> list[Cells]:
         return [{key: make_quantity(one) for key, one in row.items()} for row in rows]
 
     variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
-    columns = {}
+    columns = {name: list_cells(one) for name, one in variables.items()}
     for name, variable in variables.items():
-        columns[name] = list_cells(variable)
         if variable.values.dtype.kind == "f":
-            ends = [end for end in ("error", "low", "high") if f"{name}_{end}" in variables]
-            lists = [variables[f"{name}_{end}"].values for end in ends]
+            ends = [variables.get(f"{name}_{end}") for end in ENDS]
+            numbers = [[None] * len(variable.values) if one is None else one.values for one in ends]
             columns[name] = [
-                Quantity(value, variable.unit, **dict(zip(ends, numbers, strict=True)))
-                for value, *numbers in zip(variable.values, *lists, strict=True)
+                Quantity(value, variable.unit, *parts)
+                for value, *parts in zip(variable.values, *numbers, strict=True)
             ]
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def list_cells(variable: Variable) -> list[str | float]:
+    """Return the elements of a variable of one dimension; codes as their meanings."""
+    cells = np.asarray(variable.values).tolist()
+    return [variable.meanings[code] for code in cells] if variable.meanings else cells
+
+
+def _stack_curves(answer: Answer) -> list[Cells]:
+    """Return the points of the curves of all methods, and of all values of a key, below each other."""
+    details = answer.details
+    rows = []
+    for case in details.get("cases", [details]):
+        labels = {details["key"]: case["value"]} if "key" in details else {}
+        for method, curve in case["curves"].items():
+            # the band is that of the recommended curve
+            band = {name: [None] * len(curve["amplitude"]) for name in case["band"] or ()}
+            known = band | curve | (case["band"] if method == case["method"] else {})
+            points = zip(*known.values(), strict=True)
+            first = {"labels": labels, "method": method}
+            rows += [first | dict(zip(known, point)) for point in points]
+    return rows
+
+
 def make_quantity(content):
     """Return an object of a JSON file as a quantity if it is one; other content is unchanged."""
-    if not _is_number(content):
+    if not isinstance(content, dict) or "value" not in content:
         return content
-    known = ("value", "unit", "error", "low", "high")
+    known = ("value", "unit", *ENDS)
     return Quantity(**{key: content[key] for key in known if key in content})
+
+
+def format_curves(answer: Answer) -> dict[str, str]:
+    """Return the CSV files of an answer: name -> text.
+
+    A column is headed by its name and its unit in brackets, in SI units if the table names no other unit. A missing number
+    is an empty cell.
+    """
+    texts = {}
+    for name, file in CSV_FILES.get(answer.kind, {}).items():
+        lists = _list_columns(list_rows(answer, file.source), file)
+        if len(lists) > 1:
+            texts[name] = format_csv(lists)
+    return texts
+
+
+def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
+    """Return the columns of a CSV file that at least one row has."""
+    lists = {}
+    known = dict.fromkeys(name for row in rows for name in row)
+    columns = [Column(name, name, "bare") for name in known]
+    for column in parse_columns(file.columns) if file.columns else columns:
+        if column.name == "labels":  # a column for each label
+            labels = [row["labels"] for row in rows]
+            names = dict.fromkeys(name for one in labels for name in one)
+            lists |= {name: [one.get(name, "") for one in labels] for name in names}
+        elif column.name in known:
+            lists |= _list_column(rows, column)
+    for name in known if file.has_intervals else ():
+        if any(isinstance(row.get(name), Quantity) for row in rows):
+            for part in ("value", "low", "high"):
+                heading = name if part == "value" else f"{name}_{part}"
+                lists |= _list_column(rows, Column(heading, name), part)
+    return lists
+
+
+def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
+    """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
+
+    part: of the quantities: "value", "low" or "high".
+    """
+    heading = column.heading
+    cells = [row.get(column.name) for row in rows]
+    sized = [one for one in cells if isinstance(one, Quantity)]
+    if not sized:
+        return {heading: cells}
+
+    # numbers are in the unit of the heading, or in the SI unit, which then follows the name
+    unit = heading.partition("[")[2].rstrip("]")
+    if not unit and column.style != "bare" and sized[0].unit not in ("", "1"):
+        heading = f"{heading} [{sized[0].unit}]"
+    numbers = [getattr(one, part, None) for one in cells]
+    scale = CSV_UNITS.get(unit, 1.0)
+    return {heading: [None if one is None else one * scale for one in numbers]}
+
+
+def format_csv(lists: Lists) -> str:
+    """Return columns of equal length as CSV: heading -> cells."""
+    output = io.StringIO()
+    writer = csv.writer(output, lineterminator="\n")
+    writer.writerow(lists)
+    writer.writerows(zip(*lists.values(), strict=True))
+    return output.getvalue()
+
+
+def make_tables(answer: Answer) -> list[Table]:
+    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
+    tables = []
+    for table in TABLES.get(answer.kind, ()):
+        rows = list_rows(answer, table.source)
+        known = {name for row in rows for name in row}
+        columns = [one for one in parse_columns(table.columns) if one.name in known]
+        headings = [_find_heading(answer, column) for column in columns]
+        texts = [[_format_cell(row, column) for column in columns] for row in rows]
+        tables.append({"title": table.title, "headings": headings, "rows": texts})
+    return [table for table in tables if table["rows"]]
+
+
+def _find_heading(answer: Answer, column: Column) -> str:
+    """Return the text above a column of a table."""
+    heading = answer.data[column.name].text if column.heading == "*" else column.heading
+    return heading.replace("_", " ")
+
+
+def _format_cell(row: Cells, column: Column) -> str:
+    """Return a cell of a table as text; a missing value is a dash."""
+    cell = row.get(column.name)
+    if cell is not None and column.style == "quantity":
+        cell = make_quantity(row)
+    if column.style == "rounded":
+        number = getattr(cell, "value", cell)
+        return "-" if number is None else format_number(number, 3)
+    if cell is None:
+        return "-"
+    if isinstance(cell, Quantity):
+        return quantities.format_quantity(column.name, cell)
+    if isinstance(cell, float):
+        return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
+    return str(cell).replace("_", " ") if column.style == "name" else str(cell)

@@ -81,9 +81,14 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     tolerance = model.accuracy.tolerance
     knob, runs = next(iter(curves.items()))
     rows = []
+    details = {}
     for one, curve in curves.items():
         names = find_measures_with_error(curve)
-        rows += [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
+        own = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
+        rows += own
+        # the runs of a curve of tolerances have no tolerance in common
+        sentence = None if one == TOLERANCE else describe_best_setting(curve, tolerance)
+        details[one] = {"runs": [describe_run(row) for row in own], "sentence": sentence}
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -93,7 +98,6 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         chosen = find_best_run(runs, tolerance)
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE else []
-    details = {one: describe_runs(one, curve, tolerance) for one, curve in curves.items()}
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(
@@ -108,45 +112,21 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     )
 
 
-def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
-    """Return the runs of a curve as an entry of cost.json, in SI units.
+def describe_run(row: Row) -> JsonObject:
+    """Return a run as an object of cost.json, in SI units.
 
-    Parameters
-    ----------
-    knob : str
-        What varies: TOLERANCE, or the name of a numerical setting.
-    runs : list of Cost
-        Runs of the curve, from coarse to fine.
-    tolerance : float
-        Tolerance of the scene.
-
-    Returns
-    -------
-    dict
-        - `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
-          `error`} and `meets_tolerance`.
-        - `sentence`: the cost of all measures; None for TOLERANCE, because its runs have different tolerances.
+    It has the attributes of the `Cost`, `values`, `errors` and `floors` of its measures, `worst` {`measure`, `error`} and
+    `meets_tolerance`.
     """
-    names = find_measures_with_error(runs)
-    entries = []
-    for run in runs:
-        worst = rate_run(run, names, run.tolerance)
-        entry = {
-            "worst": {"measure": worst.name, "error": worst.fraction},
-            "meets_tolerance": worst.judge(run.tolerance) is Judgement.MEETS,
-            "remedies": run.remedies,
-        }
-        for part in ("value", "error", "floor"):
-            numbers = {name: getattr(one, part) for name, one in run.measures.items()}
-            entry[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
-        attributes = to_plain(replace(run, measures={}))
-        del attributes["measures"]
-        entries.append(attributes | to_plain(entry))
-    is_setting = knob != TOLERANCE
-    return {
-        "runs": entries,
-        "sentence": describe_best_setting(runs, tolerance) if is_setting else None,
-    }
+    measures = row.run.measures
+    content = to_plain(replace(row.run, measures={}))
+    del content["measures"]
+    content["worst"] = {"measure": row.worst.name, "error": row.worst.fraction}
+    content["meets_tolerance"] = row.judgement is Judgement.MEETS
+    for part in ("value", "error", "floor"):
+        numbers = {name: getattr(one, part) for name, one in measures.items()}
+        content[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
+    return content
 
 
 def _describe_scene(row: Row, rows: list[Row]) -> list[str]:

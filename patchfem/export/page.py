@@ -7,20 +7,24 @@ packed plotly.js.
 import base64
 import gzip
 import json
+import tomllib
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from textwrap import shorten
+from typing import Any
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
-from . import quantities, several, store
-from .answer import Answer, Answers, Quantity
+from . import quantities, store
+from .answer import Answers, Quantity
 from .charts import panels, plotly
-from .charts.table import CHARTS, TABLES, Column, parse_columns
-from .columns import Cells, list_rows, make_quantity
+from .charts.table import CHARTS
+from .columns import Table, make_tables
+from .quantities import format_quantity
 
 # what a file beside a page is, by its name or its ending
 FILE_TEXTS = {
@@ -33,6 +37,10 @@ FILE_TEXTS = {
     ".csv": "columns of a table or of a curve (spreadsheet)",
     ".json": "all numbers of this answer, in SI units",
 }
+MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+# value in a scene file
+TomlValue = str | float | list[Any] | dict[str, Any]
+MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
 COMPRESSION = 6  # level of the compression of the figures in a page
 
 
@@ -94,23 +102,22 @@ def make_page(folders: list[Path]) -> str:
         if (folders[0] / store.FIELDS).is_file():
             drawn += make_stress_panels(folders[0] / store.FIELDS)
     else:
-        tables = several.list_scene_differences(answers)
+        tables = list_scene_differences(answers)
         texts = {}
 
     figures = [plotly.draw(panel) for panel in drawn]
-    parts = [{key: one[key] for key in one if key in plotly.PARTS} for one in figures]
-    packed = json.dumps(parts, separators=(",", ":"), allow_nan=False)
+    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack)
     measures, zeros = _list_measures(answers)
     return _template().render(
         answers=answers,
         first=first,
-        figures=figures,
+        panels=drawn,
         tables=tables,
         measures=measures,
         zeros=zeros,
         files=[(name, text) for name, text in texts.items() if text],
         data=_encode(gzip.compress(packed.encode(), COMPRESSION, mtime=0)),
-        library=read_library() if figures else "",
+        library=read_library() if drawn else "",
     )
 
 
@@ -145,7 +152,7 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
             continue
 
         # every answer is compared with the first one
-        texts = [several.format_entry(name, one, known[0]) for one in known]
+        texts = [format_entry(name, one, known[0]) for one in known]
         reasons = dict.fromkeys(one.reason for one in known if one and one.value is None)
         kind = next(iter(answers.values())).kind
         missing = [f"No value: {reason}." for reason in reasons if reason]
@@ -153,34 +160,68 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
     return rows, zeros
 
 
-def make_tables(answer: Answer) -> list[several.Table]:
-    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
-    tables = []
-    for table in TABLES.get(answer.kind, ()):
-        rows = list_rows(answer, table.source)
-        known = {name for row in rows for name in row}
-        columns = [one for one in parse_columns(table.columns) if one.name in known]
-        headings = [column.heading.replace("_", " ") for column in columns]
-        texts = [[_format_cell(row, column) for column in columns] for row in rows]
-        tables.append({"title": table.title, "headings": headings, "rows": texts})
-    return [table for table in tables if table["rows"]]
+def _find_uncertainty(quantity: Quantity) -> float:
+    """Return the half-width of the interval of a quantity, but at least its floor."""
+    if None in (quantity.low, quantity.high):
+        return quantity.floor
+    return max((quantity.high - quantity.low) / 2, quantity.floor)
 
 
-def _format_cell(row: Cells, column: Column) -> str:
-    """Return a cell of a table as text; a missing value is a dash."""
-    cell = row.get(column.name)
-    if cell is not None and column.style == "quantity":
-        cell = make_quantity(row)
-    if column.style == "rounded":
-        number = getattr(cell, "value", cell)
-        return "-" if number is None else format_number(number, 3)
-    if cell is None:
-        return "-"
-    if isinstance(cell, Quantity):
-        return quantities.format_quantity(column.name, cell)
-    if isinstance(cell, float):
-        return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
-    return str(cell).replace("_", " ") if column.style == "name" else str(cell)
+def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
+    """Return a quantity as text, with its change from the first answer if it differs by more than both errors.
+
+    The change is in percent, or a factor if it is large; there is none from a value that may be 0.
+
+    Parameters
+    ----------
+    name : str
+        Name of the quantity.
+    quantity, first : Quantity or None
+        The quantity of an answer and that of the first answer.
+    """
+    if quantity is None:
+        return ""
+    text = format_quantity(name, quantity)
+    if first is None or None in (quantity.value, first.value) or quantity.unit != first.unit:
+        return text
+    uncertainty = _find_uncertainty(first)
+    limit = uncertainty + _find_uncertainty(quantity)
+    if abs(quantity.value - first.value) <= limit or abs(first.value) <= uncertainty:
+        return text
+    factor = quantity.value / first.value
+    if abs(factor) >= MIN_RATIO_AS_FACTOR:
+        return f"{text} (x {format_number(factor, 2)})"
+    change = (quantity.value - first.value) / abs(first.value)
+    return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
+
+
+def list_scene_differences(answers: Answers) -> list[Table]:
+    """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does; [] without any."""
+    scenes = {
+        name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
+        for name, answer in answers.items()
+    }
+    rows = []
+    for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
+        texts = [str(scene.get(key, "-")) for scene in scenes.values()]
+        if len(set(texts)) > 1:
+            rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
+    table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
+    return [table] if rows else []
+
+
+def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
+    """Return nested tables of a scene as dotted keys; tables of a list are named by their name or number."""
+    if isinstance(table, dict):
+        pairs = table.items()
+    elif isinstance(table, list) and table and isinstance(table[0], dict):
+        pairs = [(entry.get("name", number), entry) for number, entry in enumerate(table, 1)]
+    else:
+        return {prefix: table}
+    flat = {}
+    for name, entry in pairs:
+        flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
+    return flat
 
 
 def make_stress_panels(path: Path) -> list[panels.Panel]:

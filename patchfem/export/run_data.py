@@ -22,7 +22,7 @@ from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Variable, Variables, encode, make_columns
+from .answer import Quantities, Quantity, Variable, Variables, encode, make_columns
 
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
@@ -474,23 +474,21 @@ def _collect_readings(result: Result) -> Variables:
         values = [getattr(row, name) for row in rows]
         measured_columns[f"measured_{name}"] = (np.array(values, float), unit, f"measured {name}")
         if name in computed:
-            value, error = computed[name]
+            one = computed[name]
             text = f"{name} that the sensor would indicate"
-            columns[f"computed_{name}"] = ([value], unit, text)
-            if error is not None:
-                columns[f"computed_{name}_error"] = ([error], unit, f"error of computed_{name}")
+            columns[f"computed_{name}"] = ([one.value], unit, text)
+            if one.error is not None:
+                columns[f"computed_{name}_error"] = ([one.error], unit, f"error of computed_{name}")
     return make_columns("measured_row", measured_columns) | make_columns("computed", columns)
 
 
-def find_readings(
-    result: Result,
-) -> tuple[list[measured.MeasuredRow], dict[str, tuple[float, float | None]]] | None:
+def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantities] | None:
     """Return the measured rows at the drive frequency, and the computed readings of the sensors.
 
     Returns
     -------
     tuple or None
-        Rows of the table of the scene, and {"acceleration" or "displacement": (reading, error or None)} [SI]. None if the
+        Rows of the table of the scene, and the readings `acceleration` and `displacement`. None if the
         scene names no table, if the drive has no frequency, or if no row is measured at it.
     """
     model = result.plan.model
@@ -517,7 +515,7 @@ def find_readings(
     for name, measure in measures.items():
         if measure is not None and measure.value is not None:
             error = None if measure.error is None else measure.error * factors[name]
-            computed[name] = measure.value * factors[name], error
+            computed[name] = Quantity(measure.value * factors[name], READINGS[name], error)
     return rows, computed
 
 

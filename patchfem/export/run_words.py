@@ -296,8 +296,7 @@ def list_readings(result: Result) -> list[JsonObject]:
     Returns
     -------
     list of dict
-        Keys `reading` (what, with "repeat run" where it is one), `measured` and `computed` (objects with value, unit and
-        error, in SI) and `ratio`.
+        Keys `reading` (what, with "repeat run" where it is one), `measured` and `computed` (quantities) and `ratio`.
     """
     readings = find_readings(result)
     if readings is None:
@@ -312,13 +311,12 @@ def list_readings(result: Result) -> list[JsonObject]:
         value = getattr(row, name)
         if not value or name not in computed:
             continue
-        reading, error = computed[name]
         listed.append(
             {
                 "reading": f"{name} (repeat run)" if "R" in row.flag else name,
-                "measured": {"value": value, "unit": unit},
-                "computed": {"value": reading, "unit": unit, "error": error},
-                "ratio": reading / value,
+                "measured": Quantity(value, unit),
+                "computed": computed[name],
+                "ratio": computed[name].value / value,
             }
         )
     return listed

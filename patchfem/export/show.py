@@ -1,11 +1,12 @@
 """The answer of a verb as lines on the screen: verdict, key numbers, and one line for each file."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
-from ..formatting import format_number
 from . import quantities, store
-from .answer import Answer, Quantities, Quantity
+from .answer import Answer, Quantities
+from .columns import make_tables
 
 
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
@@ -15,30 +16,22 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """
     lines = [answer.title] if answer.title else []
     lines += answer.verdict
-    if answer.kind == "cost":
-        lines += _format_costs(answer)
+    # the runs of `cost` are its answer
+    for table in make_tables(answer) if answer.kind == "cost" else ():
+        lines += _align([table["headings"], *table["rows"]])
     shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
     return lines + format_quantities(shown)
 
 
-def _format_costs(answer: Answer) -> list[str]:
-    """Return an aligned line for each run of `cost`: setting, CPU time, and value and error of the main measure."""
-    data = answer.data
-    main = next((name for name in answer.quantities if f"error_{name}" in data), None)
-    rows = []
-    for k, seconds in enumerate(data["seconds"].values.tolist()):
-        cells = [f"{data['knob'].values[k]} {data['setting'].values[k]}"]
-        cells.append(f"{format_number(seconds, 2)} CPU s")
-        if main is not None:
-            value, error = (data[name].values[k] for name in (main, f"error_{main}"))
-            quantity = Quantity(value, data[main].unit, error)
-            cells.append(f"{main} {quantities.format_quantity(main, quantity)}")
-        rows.append(cells)
+def format_quantities(shown: Quantities) -> list[str]:
+    """Return an aligned line for each quantity."""
+    return _align(list_quantities(shown))
 
-    # The last column needs no width
+
+def _align(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return an indented line for each row of texts, in aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows)]
-    widths[-1] = 0
-    return ["  " + "  ".join(map(str.ljust, cells, widths)) for cells in rows]
+    return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
@@ -48,13 +41,6 @@ def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
         reason = f" ({quantity.reason})" if quantity.reason else ""
         rows.append((name, quantities.format_quantity(name, quantity) + reason))
     return rows
-
-
-def format_quantities(shown: Quantities) -> list[str]:
-    """Return an aligned line for each quantity."""
-    rows = list_quantities(shown)
-    width = max((len(name) for name, _ in rows), default=0)
-    return [f"  {name:<{width}}  {text}" for name, text in rows]
 
 
 def list_files(folder: Path, has_page: bool = True) -> list[str]:

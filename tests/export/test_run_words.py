@@ -91,10 +91,10 @@ def test_exact_measured_row_is_compared_with_reading_of_sensor(tmp_path):
     for kind in ("peak", "rms"):
         verdict, result = get_verdict(scene, **{"measured.reading": kind})
         rows = {row["reading"]: row for row in runs.make_details(result)["measured"]}
-        readings[kind] = rows["acceleration"]["computed"]["value"]
+        readings[kind] = rows["acceleration"]["computed"].value
         peak = result.measures["absolute_acceleration_peak"].value
         amplitude = result.measures["relative_displacement_amplitude"].value
-        assert rows["displacement"]["computed"]["value"] == pytest.approx(0.8 * amplitude)
+        assert rows["displacement"]["computed"].value == pytest.approx(0.8 * amplitude)
         assert rows["displacement"]["ratio"] == pytest.approx(0.8 * amplitude / (5 * 25.4e-6))
         ratio = f"{0.8 * amplitude / (5 * 25.4e-6):.3g}"
         assert any(f"the displacement is {ratio} times the measured one" in one for one in verdict)

@@ -13,7 +13,6 @@ COLOURS = (
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
-PARTS = ("data", "layout", "frames")  # parts of a figure that plotly.js reads
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 # figure of plotly.js, or a part of it, as an object of its JSON
@@ -28,10 +27,8 @@ MENU_PLACE = {
 
 
 def draw(panel: Panel) -> Figure:
-    """Return the figure of a panel: `data`, `layout`, `frames` of a film, and texts for the page beside it."""
-    texts = ("title", "style", "caption", "description")
-    figure = {name: getattr(panel, name) for name in texts}
-    figure |= {"data": _make_traces(panel), "layout": _make_layout(panel)}
+    """Return the figure of a panel: `data`, `layout`, and `frames` of a film."""
+    figure = {"data": _make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
         _add_menu(figure, panel.choices)
     elif panel.style == "film":
@@ -90,29 +87,29 @@ def _make_traces(panel: Panel) -> list[Figure]:
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line."""
     trace = {
-        "x": pack(curve.x),
-        "y": pack(curve.y),
+        "x": curve.x,
+        "y": curve.y,
         "name": curve.name,
         "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
         "line": {"color": colour, "width": 1.7},
         "marker": {"color": colour, "size": 7},
     }
     if curve.symbols is not None:
-        trace["marker"]["symbol"] = curve.symbols.tolist()
+        trace["marker"]["symbol"] = curve.symbols
     if style == "area":
         trace["fill"] = "tozeroy"
     if curve.low is None:
         return [trace]
     if style in ("points", "dots"):
-        ends = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
+        ends = {"array": curve.high - curve.y, "arrayminus": curve.y - curve.low}
         return [trace | {"error_y": ends | {"symmetric": False, "thickness": 1.2, "color": colour}}]
 
     # the band is a closed line around the points whose ends are known
     known = np.isfinite(curve.low) & np.isfinite(curve.high)
     x, low, high = (values[known] for values in (curve.x, curve.low, curve.high))
     band = {
-        "x": pack(np.concatenate([x, x[::-1]])),
-        "y": pack(np.concatenate([high, low[::-1]])),
+        "x": np.concatenate([x, x[::-1]]),
+        "y": np.concatenate([high, low[::-1]]),
         "mode": "lines",
         "fill": "toself",
         "fillcolor": colour,
@@ -126,11 +123,11 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
 
 def _make_map_trace(curve: Curve, label: str) -> Figure:
     """Return a heat map; codes have one colour each, other values a scale that is symmetric if they change their sign."""
-    trace = {"type": "heatmap", "x": pack(curve.x), "y": pack(curve.rows), "z": pack(curve.y)}
+    trace = {"type": "heatmap", "x": curve.x, "y": curve.rows, "z": curve.y}
     if curve.meanings:
         count = len(curve.meanings)
         steps = [[(k + j) / count, CODE_COLOURS[k]] for k in range(count) for j in (0, 1)]
-        bar = {"tickvals": list(range(count)), "ticktext": list(curve.meanings)}
+        bar = {"tickvals": list(range(count)), "ticktext": curve.meanings}
         return trace | {"zmin": -0.5, "zmax": count - 0.5, "colorscale": steps, "colorbar": bar}
     low = float(np.nanmin(curve.y))
     high = float(np.nanmax(curve.y))

@@ -58,7 +58,8 @@ class Column(NamedTuple):
     - heading: text above the column.
     - name: variable of the answer, or key in each row of its details.
     - style: "" for values as they are. In a table also "name" for words with underscores, "quantity" for a value with the
-      unit, the error and the interval of its row, "rounded" for three digits, and "percent" for a relative change.
+      unit, the error and the interval of its row, "rounded" for three digits, and "percent" for a relative change. In a CSV
+      file also "bare" for a heading without the unit.
     """
 
     heading: str
@@ -82,25 +83,23 @@ def parse_columns(line: str) -> list[Column]:
 class CsvFile(NamedTuple):
     """CSV file of an answer.
 
-    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS.
-    - source: "" for variables, a dimension for all of its variables, "curves" for the curves of a backbone below each
-      other, or the key of a list of objects in the details, whose texts the columns name.
-    - nested: key of the quantities in each of these objects, "" if they are its own keys. A quantity has the columns NAME,
-      NAME_low and NAME_high.
+    - source: its rows (`columns.list_rows`).
+    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS; "" for all columns of the
+      rows, and `labels` for the texts of an object, each of which has a column.
+    - has_intervals: whether the columns NAME, NAME_low and NAME_high of all quantities of the rows follow.
     """
 
+    source: str
     columns: str
-    source: str = ""
-    nested: str = ""
+    has_intervals: bool = False
 
 
 class Table(NamedTuple):
     """Table of an answer.
 
     - title: heading.
-    - source: path of a list of objects in `details`, such as "limits" or "cases/failed", or the name of a dimension of
-      `data`.
-    - columns: heading line (`parse_columns`).
+    - source: its rows (`columns.list_rows`).
+    - columns: heading line (`parse_columns`); the heading "*" is the description of the variable.
     """
 
     title: str
@@ -480,7 +479,8 @@ COMPARE = (
         "depth hidden_depth",
         marks="track_end",
         y_label="worn depth",
-        caption="Depth of the surface after wear below the one before. Vertical lines: ends of the worn parts.",
+        caption="Depth of the surface after wear below the one before; of traces with the 95 % noise of a single depth. "
+        "Vertical lines: ends of the worn parts.",
     ),
     Chart(
         "Both traces, each about its own line",
@@ -637,43 +637,49 @@ CHARTS: dict[str, tuple[Chart, ...]] = {
 
 CSV_FILES: dict[str, dict[str, CsvFile]] = {
     "compare": {
-        "depth.csv": CsvFile("x, before, after, gap_before, gap_after, depth"),
+        "depth.csv": CsvFile("x", "x, before, after, gap_before, gap_after, depth"),
         "predicted.csv": CsvFile(
+            "x_patch",
             "x_patch, measured = measured_depth, measured_low = measured_depth_low, measured_high = measured_depth_high, "
-            "computed = computed_depth, difference = depth_difference"
+            "computed = computed_depth, difference = depth_difference",
         ),
     },
     "pairs": {
-        "pairs.csv": CsvFile("before, after, direction, labels, outcome, verdict, message", "pairs")
+        "pairs.csv": CsvFile(
+            "pairs", "before, after, direction, labels, outcome, verdict, message", True
+        )
     },
     "profile": {
-        "profile.csv": CsvFile("file", "profiles", "measures"),
-        "primary.csv": CsvFile("x, z = primary"),
-        "roughness.csv": CsvFile("x = x_rough, z = roughness"),
+        "profile.csv": CsvFile("profiles", "file", True),
+        "primary.csv": CsvFile("x", "x, z = primary"),
+        "roughness.csv": CsvFile("x_rough", "x = x_rough, z = roughness"),
     },
     "backbone": {
         "backbone.csv": CsvFile(
-            "amplitude [m] = amplitude, frequency [Hz] = frequency, frequency_error [Hz] = frequency_error, damping, "
-            "damping_error, force [N] = force, force_error [N] = force_error, force_frequency [Hz] = force_frequency, "
-            "frequency_low [Hz] = frequency_low, frequency_high [Hz] = frequency_high, damping_low, damping_high",
             "curves",
+            "labels, method, amplitude [m] = amplitude, frequency [Hz] = frequency, frequency_error [Hz] = frequency_error, "
+            "damping, damping_error, force [N] = force, force_error [N] = force_error, "
+            "force_frequency [Hz] = force_frequency, "
+            "frequency_low [Hz] = frequency_low, frequency_high [Hz] = frequency_high, damping_low, damping_high",
         )
     },
     "fit": {
         "fitted_curve.csv": CsvFile(
+            "curve_amplitude",
             "amplitude = curve_amplitude, frequency = curve_frequency, frequency_error = curve_frequency_error, "
-            "damping = curve_damping, damping_error = curve_damping_error"
+            "damping = curve_damping, damping_error = curve_damping_error",
         ),
         # of a loop, of a curve, and of rows
         "fit.csv": CsvFile(
+            "row",
             "time, displacement = slide, force, friction_ratio, fitted, "
             "amplitude, frequency, frequency_error, damping, damping_error, frequency_fitted, "
             "damping_fitted, input [g] = input, acceleration [g] = acceleration, displacement [mil] = displacement, flag, "
             "computed acceleration [g] = computed_acceleration, "
-            "computed displacement [mil] = computed_displacement, held"
+            "computed displacement [mil] = computed_displacement, held",
         ),
     },
-    "cost": {"cost.csv": CsvFile("", "run")},
+    "cost": {"cost.csv": CsvFile("run", "")},
 }
 CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
 
@@ -732,10 +738,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
         Table("Both runs", "measures", _BOTH_SIDES),
         Table("Scene pressed with each of the two surfaces", "pressed/measures", _BOTH_SIDES),
     ),
-    "pairs": (
-        Table("Means", "means", f"group, kind, direction, pairs, {PAIR_COLUMNS}"),
-        Table("Each pair", "pairs", f"before, after, verdict, message, {PAIR_COLUMNS}"),
-    ),
+    "pairs": (Table("Each pair", "pairs", f"before, after, verdict, message, {PAIR_COLUMNS}"),),
     "profile": (Table("Each file", "profiles", "file, Ra, Rq, Rz, RSm, Pa, Pq, Pt, Sa, Sq, Sz"),),
     "fit": (
         Table("Correlation of the fitted values", "pair", "values = pair, correlation:rounded"),
@@ -744,8 +747,8 @@ TABLES: dict[str, tuple[Table, ...]] = {
         Table(
             "Runs",
             "run",
-            "setting, interface nodes = nodes, steps per cycle = steps, CPU s = seconds:rounded, "
-            "largest error = largest_error:rounded, of = worst_measure, value = main_measure, result",
+            "varied = knob:name, setting, interface nodes = nodes, steps per cycle = steps, CPU s = seconds:rounded, "
+            "largest error = largest_error:rounded, of = worst_measure, * = main_measure, result",
         ),
     ),
 }

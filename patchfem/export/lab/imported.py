@@ -16,9 +16,8 @@ from ...inputs.units import SI_UNITS
 from ...scene.keys import quantities
 from ...scene.keys.removed import describe_removed
 from ..answer import JsonObject
+from ..columns import format_csv
 from . import universal
-from .universal import Column
-from .write import format_columns
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
@@ -140,9 +139,8 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     found = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(found.values) if zero else found.values
     units = {name: SI_UNITS[name] for name in values}
-    columns = [Column(name, units[name], column) for name, column in values.items()]
-    write_text(out, format_columns(columns))
-    rows = columns[0].values.size
+    write_text(out, format_csv({f"{name} [{units[name]}]": one for name, one in values.items()}))
+    rows = next(iter(values.values())).size
     told = f"{rows} rows of {', '.join(values)}"
     return {"rows": rows, "units": units, "notes": found.notes, "told": told}
 
@@ -164,11 +162,10 @@ def _write_decay(
         Notes on the records.
     """
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
-    columns = [
-        Column(f"decay_{name}", DECAY_UNITS[name.removesuffix("_error")], column)
-        for name, column in curve._asdict().items()
-    ]
-    write_text(out, format_columns(columns))
+    columns = {f"decay_{name}": one.tolist() for name, one in curve._asdict().items()}
+    units = {name: DECAY_UNITS[name.removesuffix("_error")] for name in curve._fields}
+    headings = [f"decay_{name} [{unit}]" for name, unit in units.items()]
+    write_text(out, format_csv(dict(zip(headings, columns.values(), strict=True))))
     ends = [
         f"{formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit='Hz')} with a damping ratio of "
         f"{formatting.format_value(curve.damping[k], curve.damping_error[k])} at "
@@ -177,7 +174,7 @@ def _write_decay(
     ]
     return {
         "points": curve.time.size,
-        **{column.name: column.values.tolist() for column in columns},
+        **columns,
         "notes": [*notes, *curve_notes],
         "told": f"{curve.time.size} amplitudes, from {ends[0]} to {ends[1]}",
     }

@@ -17,11 +17,11 @@ from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.spectrum import BAND
-from ..answer import Answer, Remarks, Variable
+from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
-from .sentences import to_json
+from .sentences import to_answers
 from .variables import band, make_variables, maps
 
 SIDES = ("before", "after")
@@ -34,7 +34,6 @@ SHOWN_ELSEWHERE = (
     "worn_to_before",
     "worn_to_after",
 )
-MIN_BAND_FRACTION = 0.01  # width of a band relative to the axis, below which the line hides it
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 
 
@@ -130,10 +129,9 @@ def make_answer(comparison: Comparison) -> Answer:
             "band": BAND,
             "direction": comparison.direction or None,
             **_describe_place(comparison),
-            "other_tracks": [to_json(other.values) for other in comparison.tracks[1:]],
+            "other_tracks": [to_answers(other.values) for other in comparison.tracks[1:]],
             "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
             **_compare_roughness(comparison),
-            **_caption_band(comparison),
             "notes": file_notes,
         },
     )
@@ -150,8 +148,8 @@ def build(
     words: sentences.Words,
     values: dict[str, Quantity],
     track: dict[str, Quantity],
-    data: dict[str, Variable],
-    details: dict[str, object],
+    data: Variables,
+    details: JsonObject,
 ) -> Answer:
     """Return the answer of a comparison of two surfaces or runs.
 
@@ -170,9 +168,7 @@ def build(
     """
     # Values are shown once on the page; compare.json has them all.
     values = values | {name_in_track(name): value for name, value in track.items()}
-    shown = [
-        name for name in values if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
-    ]
+    shown = {name: one for name, one in values.items() if name not in SHOWN_ELSEWHERE}
 
     content = {
         "patchfem": __version__,
@@ -180,15 +176,15 @@ def build(
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
         "confidence": LEVEL,
         **dict(zip(SIDES, sources, strict=True)),
-        **to_json(values),
-        "track": to_json(track) or None,
+        **to_answers(values),
+        "track": to_answers(track) or None,
     }
 
     return Answer(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),
         verdict=words.verdict,
-        quantities={name: sentences.to_answer(values[name]) for name in shown},
+        quantities=to_answers(shown),
         data=data,
         remarks=Remarks(words.warnings, words.notes),
         details=content | details,
@@ -196,42 +192,25 @@ def build(
     )
 
 
-def _is_repeated(name: str, values: dict[str, Quantity]) -> bool:
-    """Return whether a number of a track is that of the whole section."""
-    area = values.get("worn_area")
-    return name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
-
-
-def _describe_place(comparison: Comparison) -> dict[str, object]:
+def _describe_place(comparison: Comparison) -> JsonObject:
     """Return how the second surface lies on the first one: `reference` and `registration` of compare.json."""
     placement = comparison.evidence.placement
     names = ("shift_x", "shift_y", "rotation") if comparison.is_areal else ("shift",)
     names += ("significance",)
     values = comparison.values if placement is None else comparison.values | placement.values
-    registration = to_json({name: values[name] for name in names if name in values})
+    registration = to_answers({name: values[name] for name in names if name in values})
     registration["mirrored"] = bool(placement and placement.mirrored)
     basis = placement.basis if placement is not None else ""
     return {"reference": basis or None, "registration": registration}
 
 
-def _caption_band(comparison: Comparison) -> dict[str, object]:
-    """Return the caption of the band around the depth of traces, if the band is wide enough to be seen."""
-    curves = comparison.evidence.curves
-    if curves is None or comparison.is_areal:
-        return {}
-    width = 2 * SIDE * np.median(curves.noise)
-    if width < MIN_BAND_FRACTION * np.ptp(curves.depth):
-        return {}
-    return {"captions": {"Worn depth": "Band: 95 % noise of a single depth."}}
-
-
-def _compare_roughness(comparison: Comparison) -> dict[str, object]:
+def _compare_roughness(comparison: Comparison) -> JsonObject:
     """Return the roughness inside and outside of the track: `roughness` of compare.json, and the rows of a table."""
     evidence = comparison.evidence
     content = {"cutoff": evidence.cutoff, "inside": None, "outside": None}
     rows = {}
     for region, sides in evidence.roughness.items():
-        content[region] = {side: to_json(values) for side, values in sides.items()}
+        content[region] = {side: to_answers(values) for side, values in sides.items()}
         for name in content[region]["before"]:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
@@ -249,7 +228,7 @@ def _explain_no_roughness(comparison: Comparison) -> str:
     return "elsewhere" if comparison.evidence.placement.basis == "flanks" else "short_track"
 
 
-def _make_data(comparison: Comparison) -> dict[str, Variable]:
+def _make_data(comparison: Comparison) -> Variables:
     """Return the aligned curves or maps of a comparison, or both traces alone without a common place."""
     curves = comparison.evidence.curves
     if curves is None:
@@ -267,7 +246,7 @@ def _make_data(comparison: Comparison) -> dict[str, Variable]:
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 
-def _make_tracks(tracks: tuple[Track, ...]) -> dict[str, Variable]:
+def _make_tracks(tracks: tuple[Track, ...]) -> Variables:
     """Return the known ends of the tracks of traces."""
     if not tracks:
         return {}
@@ -275,7 +254,7 @@ def _make_tracks(tracks: tuple[Track, ...]) -> dict[str, Variable]:
     return make_variables("track_end", track_end=np.array(ends, float))
 
 
-def _make_separate(comparison: Comparison) -> dict[str, Variable]:
+def _make_separate(comparison: Comparison) -> Variables:
     """Return both traces, each about its own least-squares line; {} for scans."""
     if comparison.is_areal:
         return {}
@@ -286,7 +265,7 @@ def _make_separate(comparison: Comparison) -> dict[str, Variable]:
     return data | _make_abbott([trace.z for trace in traces])
 
 
-def _make_abbott(heights) -> dict[str, Variable]:
+def _make_abbott(heights) -> Variables:
     """Return the Abbott curves of the heights before and after wear; {} if one of them is unknown."""
     known = [values[np.isfinite(values)] for values in heights]
     if not all(values.size for values in known):

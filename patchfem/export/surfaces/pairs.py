@@ -3,16 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from ... import __version__
 from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
 from ...surface.compare.compare import DEFAULTS, Options
-from ..answer import Answer, Remarks, Variable
+from ..answer import Answer, JsonObject, Variables, make_columns
 from . import compare, worn
-from .variables import make_variables
+from .variables import TEXTS
 
 CHARTED_QUANTITIES = {
     "worn_depth_mean": "m",
@@ -55,7 +53,7 @@ def answer_pairs(
     return make_answer(rows, Path(table).name)
 
 
-def _compare_line(line: TableLine, options: Options) -> dict[str, object]:
+def _compare_line(line: TableLine, options: Options) -> JsonObject:
     """Return the content of compare.json for the pair of a line, with the cells of the line."""
     cells = {"line": line.line, "before": line.names[0], "after": line.names[1]}
     cells["labels"] = dict(line.labels)
@@ -78,21 +76,19 @@ def _compare_line(line: TableLine, options: Options) -> dict[str, object]:
     return answer.details | cells | {"outcome": "done", "message": ""}
 
 
-def make_answer(rows: list[dict], name: str) -> Answer:
+def make_answer(rows: list[JsonObject], name: str) -> Answer:
     """Return the answer of the compared pairs of a table with this name."""
     return Answer(
         kind="pairs",
         title=name,
         verdict=(_count(rows),),
-        quantities={},
         data=_make_data(rows),
-        remarks=Remarks(),
         details={"patchfem": __version__, "pairs": rows},
         origin={"patchfem": __version__},
     )
 
 
-def _count(rows: list[dict]) -> str:
+def _count(rows: list[JsonObject]) -> str:
     """Return the headline: numbers of pairs, of pairs with wear and of failed pairs."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     depths = [row.get("worn_depth_mean", {}) for row in rows]
@@ -100,13 +96,10 @@ def _count(rows: list[dict]) -> str:
     return f"{len(rows)} pairs: {n_worn} worn, {len(rows) - n_worn - failed} not, {failed} failed."
 
 
-def _make_data(rows: list[dict]) -> dict[str, Variable]:
+def _make_data(rows: list[JsonObject]) -> Variables:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    lines = np.array([float(row["line"]) for row in rows])
-    data = make_variables("pair", line=(lines, "1"))
+    columns = {"line": ([float(row["line"]) for row in rows], "1", TEXTS["line"])}
     for name, unit in CHARTED_QUANTITIES.items():
-        cells = [row.get(name, {}) for row in rows]
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
-            values = np.array([cell.get(key) for cell in cells], float)
-            data |= make_variables("pair", **{name + suffix: (values, unit)})
-    return data
+            columns[name + suffix] = ([row.get(name, {}).get(key) for row in rows], unit)
+    return make_columns("pair", columns)

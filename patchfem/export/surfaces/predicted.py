@@ -43,7 +43,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     """
     fitted = predicted.fit_wear(_measure_depth(comparison), read_history(folder, piece))
     numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
-    values = {name: sentences.to_answer(value) for name, value in numbers.items()}
+    values = sentences.to_answers(numbers)
     sentence = describe(fitted)
     notes = describe_reliability(fitted)
 

@@ -14,7 +14,7 @@ from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
 from ...surface.spectrum import BAND
-from ..answer import Answer, Remarks, Variable
+from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..quantities import format_value
 from . import sentences
 from .variables import make_variables, maps
@@ -88,7 +88,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
         headlines.append(f"{state}{_state_main(values, members)}.")
-        quantities |= {key: sentences.to_answer(value) for key, value in values.items()}
+        quantities |= sentences.to_answers(values)
 
     notes = [text for each in reports for text in each.notes]
     if any(value.low is not None for each in reports for value in each.values):
@@ -149,13 +149,11 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
     return [SIZES_NOTE] if (sizes.max(axis=0) > MAX_SIZE_RATIO * sizes.min(axis=0)).any() else []
 
 
-def _means_to_dict(
-    kind: str, count: int, means: dict[str, Mean], notes: list[str]
-) -> dict[str, object]:
+def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> JsonObject:
     """Return the means of one kind of files as an object of profile.json."""
-    measures = sentences.to_json({name: mean.mean for name, mean in means.items()})
+    measures = {}
     for name, mean in means.items():
-        measures[name]["scatter"] = mean.scatter
+        measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
     content = {"kind": kind, "files": count, "confidence": LEVEL, "notes": notes}
     return content | {"measures": measures}
 
@@ -199,7 +197,7 @@ def describe_treatment(each: RoughnessReport) -> str:
     return f"{text}; without a cut-off there is no roughness profile{advice and ', '}{advice}."
 
 
-def report_to_dict(each: RoughnessReport) -> dict[str, object]:
+def report_to_dict(each: RoughnessReport) -> JsonObject:
     """Return the roughness of a surface as an object of profile.json."""
     size, treatment = each.sampling, each.treatment
     content = {
@@ -213,7 +211,7 @@ def report_to_dict(each: RoughnessReport) -> dict[str, object]:
         "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
-        "measures": sentences.to_json({value.name: value for value in each.values}),
+        "measures": sentences.to_answers({value.name: value for value in each.values}),
         "notes": each.notes,
     }
     if each.kind == "areal":
@@ -233,7 +231,7 @@ def _find_moments(each: RoughnessReport) -> dict | None:
     return {"cutoff": cutoff, **values, "notes": notes}
 
 
-def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
+def _make_data(reports: list[RoughnessReport]) -> Variables:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
     data = make_variables("file", file=(np.array([each.source for each in reports]), ""))
     curves = [abbott_curve(each.heights) for each in reports]

@@ -134,9 +134,9 @@ def to_answer(quantity: Quantity) -> answer.Quantity:
     return answer.Quantity(value, unit, low=low, high=high, reason=reason)
 
 
-def to_json(values: dict[str, Quantity]) -> dict[str, dict]:
-    """Return measured quantities by name as objects of a JSON file."""
-    return {name: to_answer(quantity).as_json() for name, quantity in values.items()}
+def to_answers(values: dict[str, Quantity]) -> answer.Quantities:
+    """Convert measured quantities by name."""
+    return {name: to_answer(quantity) for name, quantity in values.items()}
 
 
 def format_value(name: str, quantity: Quantity) -> str:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..answer import Variable
+from ..answer import Variable, Variables
 
 MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
 TEXTS = {
@@ -11,12 +11,10 @@ TEXTS = {
     "before": "height before wear",
     "after": "height after wear, aligned",
     "depth": "worn depth: before less after",
-    "state": "state of each height",
     "track_end": "ends of the tracks",
     "before_map": "height before wear, or gap of the unloaded surfaces",
     "after_map": "height after wear, or gap of the unloaded surfaces",
     "depth_map": "worn depth: before less after",
-    "material_ratio": "material ratio",
     "gap_before": "gap of the unloaded surfaces before wear",
     "gap_after": "gap of the unloaded surfaces, wear included",
     "hidden_depth": "even and wedge-shaped part of the wear, which a trace cannot show",
@@ -34,9 +32,7 @@ TEXTS = {
 }
 
 
-def make_variables(
-    dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
-) -> dict[str, Variable]:
+def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]) -> Variables:
     """Return arrays (n,) [m], or pairs of an array and its unit, along one dimension as variables; NaN is missing."""
     data = {}
     for name, values in arrays.items():
@@ -45,13 +41,13 @@ def make_variables(
     return data
 
 
-def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> dict[str, Variable]:
+def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
     """Return lengths (n,) [m] with the ends of their band as the variables NAME, NAME_low and NAME_high."""
     ends = {f"{name}_low": values - half, f"{name}_high": values + half}
     return make_variables(dimension, **{name: values}, **ends)
 
 
-def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> dict[str, Variable]:
+def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
     """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
     rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
     data = make_variables("x", x=x[columns]) | make_variables("y", y=y[rows])

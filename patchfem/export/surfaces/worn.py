@@ -6,15 +6,14 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...formatting import format_length
-from ...surface.quantity import Quantity
 from ...wear import between_runs
 from ...wear.between_runs import Wear
 from .. import quantities
-from ..answer import Answer, Variable
+from ..answer import Answer, Quantity, Variables
 from . import sentences
 from .compare import SIDES, build
 from .patches import PatchRun, read_patch
-from .sentences import format_value, to_json
+from .sentences import format_value
 from .variables import make_variables, maps
 
 # measures of both runs that stand beside each other; the first three are in the verdict
@@ -90,7 +89,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
             f"{format_length(-wear.depth.min(), 3)} less, so it does not continue the earlier one"
         )
 
-    zero = to_json({"shift": Quantity(0.0, 0.0, 0.0, "m", "")})
+    zero = {"shift": Quantity(0.0, "m", low=0.0, high=0.0)}
     names = [name for name in MEASURES if any(name in side["measures"] for side in sides.values())]
 
     return build(
@@ -164,7 +163,7 @@ def _describe_measures(runs: tuple[PatchRun, PatchRun]) -> list[str]:
     return [f"Before and after: {'; '.join(parts)}."] if parts else []
 
 
-def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> dict[str, Variable]:
+def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
     """Return gaps, worn depth and its hidden part along the patch, and pressure and friction loop of both runs."""
     state = runs[1].state
     before, after = wear.gaps

@@ -223,26 +223,17 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     path : Path
         File to write.
     """
-    names = sort_measures(table)
-    heads = [axis.key for axis in cases.axes] + ["outcome"]
-    texts = []
-    for name in names:
-        heads += [name, f"{name}_error"]
-        texts.append(_format_numbers(table.measures[name].values, "{!r}"))
-        texts.append(_format_numbers(table.measures[name].errors, "{:.6g}"))
-    heads += ["message"] + ["case"] * bool(case_folders)
-    # The rows are made one by one, because the cells of all cases would fill the memory.
-    lines = (
-        [
-            *cases.texts(number),
-            str(table.outcome[number]),
-            *cells,
-            table.messages.get(number, ""),
-            *case_folders[number : number + 1],
-        ]
-        for number, *cells in zip(range(len(table)), *texts)
-    )
-    write_rows(path, chain([heads], lines))
+    columns = {"outcome": map(str, table.outcome)}
+    for name in sort_measures(table):
+        columns[name] = _format_numbers(table.measures[name].values, "{!r}")
+        columns[f"{name}_error"] = _format_numbers(table.measures[name].errors, "{:.6g}")
+    columns["message"] = (table.messages.get(number, "") for number in range(len(table)))
+    if case_folders:
+        columns["case"] = case_folders
+    # the rows are made one by one, because the cells of all cases would fill the memory
+    cells = enumerate(zip(*columns.values(), strict=True))
+    lines = ([*cases.texts(number), *row] for number, row in cells)
+    write_rows(path, chain([[*(axis.key for axis in cases.axes), *columns]], lines))
 
 
 def _format_numbers(numbers: np.ndarray, template: str) -> Iterator[str]:

@@ -20,7 +20,6 @@ from ..netcdf import read_netcdf, write_arrays
 
 CHUNKS = "chunks"
 SUFFIX = ".nc"
-MAX_CASES_PER_FILE = 4096  # cases of a file into which small files are merged
 TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
@@ -115,37 +114,27 @@ class Chunks:
         return rows[self.places]
 
     def merge_files(self, *, removes_others: bool) -> None:
-        """Merge the files if most of them contain few cases.
+        """Merge the files into one; a damaged file is removed.
 
         removes_others: whether to remove files without a requested case.
         """
-        files = self.list_files()
-        if len(files) <= 2 * -(-len(self.names) // MAX_CASES_PER_FILE) and not removes_others:
+        outdated = set(self.list_files())
+        if len(outdated) < 2:
             return
-        group = {}
-        for path in files:
-            names, results = read_chunk(path)
-            if not len(names) or (removes_others and (self._find_rows(names) < 0).all()):
-                path.unlink()
-                continue
-            group[path] = (names, results)
-            if sum(len(names) for names, _ in group.values()) >= MAX_CASES_PER_FILE:
-                self._merge(group)
-                group = {}
-        self._merge(group)
-
-    def _merge(self, group: dict[Path, tuple[np.ndarray, CaseResults]]) -> None:
-        """Write the contents of several files into one, and then remove these files."""
-        if len(group) < 2:
-            return
+        all_names = []
         parts = []
         start = 0
-        for names, results in group.values():
-            parts.append((start + np.arange(len(names)), results))
-            start += len(names)
-        all_names = np.concatenate([names for names, _ in group.values()])
-        new = write_chunk(self.folder, all_names, join_case_results(start, parts))
-        for path in group.keys() - {new}:
+        for path in self.list_files():
+            names, results = read_chunk(path)
+            if names.size and not (removes_others and (self._find_rows(names) < 0).all()):
+                all_names.append(names)
+                parts.append((start + np.arange(names.size), results))
+                start += names.size
+        if parts:
+            # the new file may have the name of an old one
+            results = join_case_results(start, parts)
+            outdated.discard(write_chunk(self.folder, np.concatenate(all_names), results))
+        for path in outdated:
             path.unlink()
 
 

@@ -73,7 +73,7 @@ that of a group of pairs."""
         head = ("measure", "unit", "floor", "meaning")
         surface_names = [
             definitions.name_in_track(name) if name in TRACK_PARTS else name
-            for name in definitions.list_names()
+            for name in definitions.SURFACE_QUANTITIES
         ]
         return (
             "\n\n".join(
