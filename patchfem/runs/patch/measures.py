@@ -28,7 +28,7 @@ from ..results.patch_rows import (
     Values,
     make_measure,
 )
-from .condensed import condense_on_same_meshes
+from .condensed import condense_once
 from .limits import extrapolate_to_zero_cell_length
 from .press import Patch, Patches, solve_patch_contact
 from .values import (
@@ -559,7 +559,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     # them.
     other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
     try:
-        pair = condense_on_same_meshes(other_model, patch.pair)
+        pair = condense_once(other_model, *patch.pair.meshes)
         other_values = compute_static_values(solve_patch_contact(other_model, pair, coarse=patch))
     except PatchfemError as error:
         return [

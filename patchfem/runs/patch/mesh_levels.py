@@ -12,7 +12,7 @@ from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
-from .condensed import condense, condense_on_shared_meshes
+from .condensed import condense, condense_once
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
@@ -60,12 +60,14 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         meshes = make_given_meshes(patch_model)[: None if estimate else 1]
         pairs = [condense(patch_model, *level) for level in meshes]
         return solve_on_pairs(patch_model, pairs, tolerance)
-    patches = store.get_or_compute(
-        ("patches", store.content_key(patch_model), tolerance, estimate),
-        lambda: solve_on_pairs(
-            patch_model, condense_on_shared_meshes(patch_model), tolerance, estimate
-        ),
-    )
+
+    def solve_on_shared_meshes() -> Patches:
+        """Solve the patch on the meshes that it shares with other cases of a sweep."""
+        pairs = [condense_once(patch_model, *level) for level in mesh.shared]
+        return solve_on_pairs(patch_model, pairs, tolerance, estimate)
+
+    key = ("patches", store.content_key(patch_model), tolerance, estimate)
+    patches = store.get_or_compute(key, solve_on_shared_meshes)
     has_profile = mesh.is_automatic and patch_model.gap.profile is not None
     if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
         return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)

@@ -1,22 +1,22 @@
 """Meshes for all cases of a sweep, with short cells wherever the contact of any case ends.
 
-In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to its
-own contact. At each position the shared mesh has the cells of the case that needs the shortest ones
-there. It is refined until all cases meet the tolerance. Pieces with prescribed elements or with a
-mesh file have equal meshes in all cases anyway.
+In: the `PatchModel`s of the cases. Out: the meshes of all levels (`PatchMesh.shared`). The mesh of a
+single case is graded to its own contact. At each position the shared mesh has the cells of the case
+that needs the shortest ones there. It is refined until all cases meet the tolerance. Pieces with
+prescribed elements or with a mesh file have equal meshes in all cases anyway.
 """
 
 from dataclasses import replace
 from itertools import chain, pairwise
-from uuid import uuid4
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...mesh import pieces as piece_meshes
 from ...mesh.grading import Layout
-from ...model.patch import PatchModel, SharedMeshes
+from ...model.patch import PatchModel
 from . import grids, mesh_levels
-from .condensed import CondensedPair, cache_condensed_pairs, condense
+from .condensed import CondensedPair, condense, condense_once
 from .press import solve_patch_contact
 from .store import Key
 
@@ -62,7 +62,7 @@ def geometry_key(patch_model) -> Key:
 
 def choose_shared_meshes(
     patches, tolerance: float, is_complete: bool = True
-) -> SharedMeshes | None:
+) -> "tuple[tuple[piece_meshes.Mesh, piece_meshes.Mesh | None], ...] | None":
     """Choose meshes that suit all patches of equal geometry, independently of their order.
 
     Parameters
@@ -76,12 +76,13 @@ def choose_shared_meshes(
 
     Returns
     -------
-    SharedMeshes or None
-        None if no case can be solved.
+    tuple or None
+        Meshes of the lower and the upper piece on each level, from fine to coarse (`PatchMesh.shared`). None if no case
+        can be solved.
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return name_shared_meshes(mesh_levels.make_given_meshes(patch_model))
+        return tuple(mesh_levels.make_given_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
@@ -98,14 +99,7 @@ def choose_shared_meshes(
         grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
         tolerance,
     )
-    meshes = name_shared_meshes([pair.meshes for pair in pairs])
-    cache_condensed_pairs(cases[0], meshes, pairs)
-    return meshes
-
-
-def name_shared_meshes(levels) -> SharedMeshes:
-    """Return SharedMeshes with a name of their own, which stays the same in all processes of a sweep."""
-    return SharedMeshes(tuple(levels), uuid4().hex)
+    return tuple(pair.meshes for pair in pairs)
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
@@ -275,7 +269,7 @@ def _refine_until_tolerance_is_met(
     """
     pairs = []
     while True:
-        pairs.insert(0, condense(cases[0], *bodies))
+        pairs.insert(0, condense_once(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
         if len(pairs) < grids.MIN_LEVELS:
             continue
