@@ -6,8 +6,8 @@ that needs the shortest ones there. It is refined until all cases meet the toler
 prescribed elements or with a mesh file have equal meshes in all cases anyway.
 """
 
-from dataclasses import replace
-from itertools import chain, pairwise
+from dataclasses import astuple, replace
+from itertools import chain
 
 import numpy as np
 
@@ -32,8 +32,6 @@ MAX_INTERFACE_NODES = 400
 # are of second order in their length.
 SINGLE_CASE_TOL = 1e-3
 MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
-# Largest ratio of the cell lengths of neighbouring cases that are joined by a single band.
-MAX_CELL_RATIO = 2.0
 
 
 def geometry_key(patch_model) -> Key:
@@ -86,13 +84,14 @@ def choose_shared_meshes(
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
-    layout = _make_common_layout([*cases, *load_variants], not (are_all_patches and is_complete))
+    layout = _make_common_layout([*cases, *load_variants])
     if layout is None:
         return None
     # If the contact edges move or the patch slips partially, the initial contact does not determine
-    # the measures.
+    # the measures. Cases between the given ones have longer cells at their own contact edges.
     cell_factor = 1.0
-    if not (patch_model.mesh.edge_motion or has_partial_slip):
+    is_known = are_all_patches and is_complete
+    if is_known and not (patch_model.mesh.edge_motion or has_partial_slip):
         cell_factor = np.clip((tolerance / SINGLE_CASE_TOL) ** 0.5, 1.0, MAX_CELL_FACTOR)
     pairs = _refine_until_tolerance_is_met(
         cases,
@@ -135,35 +134,24 @@ def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
 
 def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     """Return the load and gap parameters that may differ between patches of one mesh geometry."""
-    loading = patch_model.loading
-    shapes = []
-    for _, part in patch_model.gap.shapes:
-        shapes += [float(value) for _, value in part if isinstance(value, int | float)]
-    skin_values = [value for _, value in patch_model.interface.skin or ()]
-    skin = [float(value or 0.0) for value in skin_values if isinstance(value, int | float | None)]
-    loading_numbers = (
-        loading.load,
-        loading.approach,
-        loading.offset,
-        loading.line_moment,
-        loading.can_rotate,
-        loading.rotational_stiffness,
-        *(patch_model.mesh.slip or ()),
-        *(patch_model.interface.strips or ()),
-    )
-    return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
+    interface = patch_model.interface
+    shapes = tuple(tuple(part) for _, part in patch_model.gap.shapes)
+    skin = tuple(interface.skin or ())
+    own = (astuple(patch_model.loading), patch_model.mesh.slip, interface.strips, shapes, skin)
+    return tuple(_list_numbers(own))
 
 
-def _make_common_layout(cases: list[PatchModel], has_intermediate_cases: bool) -> Layout | None:
-    """Return column layouts of the coarsest grids merged for all patches; None on failure.
+def _list_numbers(value) -> list[float]:
+    """Return the numbers in nested tuples in their order; None counts as 0, and texts are left out."""
+    if value is None or isinstance(value, int | float):
+        return [float(value or 0.0)]
+    if not isinstance(value, tuple):
+        return []
+    return list(chain.from_iterable(map(_list_numbers, value)))
 
-    Parameters
-    ----------
-    cases : list of PatchModel
-        Patches of equal geometry.
-    has_intermediate_cases : bool
-        Whether the sweep contains cases between the given ones.
-    """
+
+def _make_common_layout(cases: list[PatchModel]) -> Layout | None:
+    """Return column layouts of the coarsest grids merged for all patches of equal geometry; None on failure."""
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = grids.make_search_layout(first)
@@ -178,7 +166,7 @@ def _make_common_layout(cases: list[PatchModel], has_intermediate_cases: bool) -
                 largest_ratio = max(largest_ratio, extent.cell / extent.width)
         if not layouts:
             return None
-        layout = _merge_layouts(layouts, has_intermediate_cases)
+        layout = _merge_layouts(layouts)
         if largest_ratio <= max_cell_ratio:
             break
     return layout
@@ -191,18 +179,16 @@ def _find_contact_extent(patch_model, pair):
     """
     try:
         patch = solve_patch_contact(patch_model, pair)
-        return grids.find_contact_extent(patch, patch_model.mesh.slip)
+        return grids.find_contact_extent(patch)
     except PatchfemError:
         return None
 
 
-def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layout:
+def _merge_layouts(layouts: list[Layout]) -> Layout:
     """Merge column layouts, taking the shortest cell of all layouts at each position."""
     bands = set()
     for layout in layouts:
         bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
-    if has_intermediate_cases:
-        bands |= set(_interpolate_bands(layouts))
 
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
@@ -227,25 +213,6 @@ def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layou
                 cell_lengths, replace(merged, bands=(band,)).cell_lengths(positions)
             )
     return replace(merged, bands=tuple(needed_bands))
-
-
-def _interpolate_bands(layouts: list[Layout]) -> grids.Bands:
-    """Return bands of short columns between the contact edges of neighbouring cases."""
-    bands = []
-    half_length = max(layout.stop for layout in layouts)
-    for side in (-1, 1):
-        contact_ends = set()
-        for low, high, min_cell in chain.from_iterable(layout.bands for layout in layouts):
-            if low == high and low * side >= 0 and abs(low) < half_length:
-                contact_ends.add((low, min_cell))
-        for (low, a), (high, b) in pairwise(sorted(contact_ends)):
-            count = (
-                1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
-            )
-            positions = np.linspace(low, high, count + 1).tolist()
-            cell_lengths = np.geomspace(a, b, count + 1).tolist()
-            bands += zip(positions[:-1], positions[1:], map(max, pairwise(cell_lengths)))
-    return bands
 
 
 def _refine_until_tolerance_is_met(

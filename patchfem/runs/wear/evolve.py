@@ -16,6 +16,7 @@ import numpy as np
 
 from ...contact.press import strip_offsets
 from ...core import PatchfemError, frozen_array
+from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
@@ -75,7 +76,6 @@ class WornPatch:
     - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
     - stripped: (patch, depth (t, m) [m]) after the same jumps with another number of strips
       (`measures.with_other_strip_count`); None without strips.
-    - frame_error: relative error of the slip path due to the finite number of frames.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
     """
@@ -86,7 +86,6 @@ class WornPatch:
     moments: tuple[WearMoment, ...]
     depths: tuple[np.ndarray, ...]
     stripped: tuple[Patch, np.ndarray] | None
-    frame_error: float
     seconds: float
     stopped: str
 
@@ -207,6 +206,7 @@ def compute_wear(
     )
 
     # A motion without bound has no slip path, so that no wear is computed for it.
+    state, moments = initial or (None, ())
     stop_reason = ""
     try:
         if initial is None:
@@ -215,17 +215,14 @@ def compute_wear(
             state = make_initial_wear_state(problem, earlier_depth)
             moments = (_record_moment(patch, state, motion),)
         else:
-            state, moments = initial
             patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
-        worn = [mesh and _add_earlier_wear(model, mesh) for mesh in coarse]
-        patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
         stop_reason = f"nothing was worn: {reason}"
-        seconds = perf_counter() - clock
-        return WornPatch(patch, tuple(worn), None, (), (), None, 0.0, seconds, stop_reason)
 
     # Jumps over many cycles, each with the contact solved on the worn gap.
-    while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
+    while state is not None and state.cycle < n_cycles:
+        if find_worn_through_coating(model, state.depth) is not None:
+            break
         try:
             state = _take_next_jump(model, problem, state)
         except _UnboundedMotion as reason:
@@ -240,7 +237,8 @@ def compute_wear(
         if progress is not None:
             progress(state.cycle / n_cycles)
 
-    # The jumps are repeated on coarser meshes and with other strips for the errors.
+    # The jumps are repeated on coarser meshes and with other strips for the errors. Without any jump, this adds the wear
+    # of an earlier run.
     replayed = []
     for mesh in coarse:
         if mesh is not None:
@@ -259,7 +257,6 @@ def compute_wear(
         moments,
         tuple(depth for _, depth in replayed),
         stripped,
-        moments[-1].miss,
         perf_counter() - clock,
         stop_reason,
     )
@@ -292,18 +289,30 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
     The fraction is 0 if there are no coatings.
     """
-    max_depth = float(depth.max(initial=0.0))
-    upper_share = model.wear.upper_share
-    pieces = model.patch.pieces
     coatings = [WornCoating(0.0, "", 0.0)]
-    for share, piece, name in (
-        (upper_share, pieces.upper, "upper"),
-        (1 - upper_share, pieces.lower, "lower"),
-    ):
+    for piece, name, piece_depth in list_worn_pieces(model, depth):
         if piece.coating is not None:
-            fraction = share * max_depth / piece.thickness
-            coatings.append(WornCoating(fraction, name, piece.thickness))
+            coatings.append(WornCoating(piece_depth / piece.thickness, name, piece.thickness))
     return max(coatings)
+
+
+class WornPiece(NamedTuple):
+    """Piece of a patch, its name "upper" or "lower", and the largest depth [m] that is worn off it."""
+
+    piece: PatchPiece
+    name: str
+    depth: float
+
+
+def list_worn_pieces(model, depth) -> list[WornPiece]:
+    """Return both pieces with their parts of a worn depth (m,) [m], (s, m) for strips, of both together."""
+    largest = float(depth.max(initial=0.0))
+    share = model.wear.upper_share
+    pieces = model.patch.pieces
+    return [
+        WornPiece(pieces.upper, "upper", share * largest),
+        WornPiece(pieces.lower, "lower", (1 - share) * largest),
+    ]
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
