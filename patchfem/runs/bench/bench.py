@@ -144,6 +144,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
     is_loaded = applied > 1e-3 * applied.max(initial=0.0)
     ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
 
+    # Energy balance: work - change of stored energy - dissipated + created = 0.
     work, stored, dissipated, created = histories.ledger
     energies = {
         "work_in": work[-1],
@@ -153,6 +154,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
         "power": np.abs(np.diff(work)).sum(),
         "peak_stored": np.abs(stored).max(),
     }
+    # The slip is that of the last cycle; all other measures are those of the whole run.
     return {
         "normal_load": float(model.point.load if model.load_varies else load[0]),
         "friction_force_peak": float(np.abs(force).max()),
