@@ -20,8 +20,7 @@ from .condensed import CondensedPair, condense, condense_once
 from .press import solve_patch_contact
 from .store import Key
 
-# Largest number of cases that determine the mesh; of more cases, the most different ones are
-# selected.
+# Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
 MAX_LAYOUT_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
@@ -102,10 +101,10 @@ def choose_shared_meshes(
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
-    """Select the patches that differ most from each other, by farthest-point selection.
+    """Select patches that differ from each other by load or surface shape, and those with the extremes of every number.
 
-    The patches are compared by load and surface shape. The result does not depend on their order.
-    The second result is True if all patches are selected.
+    Of many patches, those at equal distances in their order by these numbers are selected. The result does not depend
+    on the order in which they are given. The second result is True if all patches are selected.
 
     Parameters
     ----------
@@ -117,19 +116,9 @@ def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
     if len(keys) <= MAX_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
-    scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
-    coordinates = np.arcsinh(
-        np.divide(numbers, scale, out=np.zeros_like(numbers), where=np.isfinite(scale))
-    )
-    coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
-    selected = [int(np.argmin(coordinates.sum(axis=1)))]
-    distances = np.full(len(keys), np.inf)
-    while len(selected) < MAX_LAYOUT_CASES:
-        distances = np.minimum(
-            distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
-        )
-        selected.append(int(np.argmax(distances)))
-    return [rows[keys[k]] for k in sorted(selected)], False
+    even = np.linspace(0, len(keys) - 1, MAX_LAYOUT_CASES).round().astype(int)
+    selected = np.unique([*even, *numbers.argmin(axis=0), *numbers.argmax(axis=0)])
+    return [rows[keys[k]] for k in selected], False
 
 
 def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
