@@ -6,7 +6,11 @@ import numpy as np
 
 
 class ShearFields(NamedTuple):
-    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] at m nodes in f states."""
+    """Fields at m nodes in f states.
+
+    - traction (f, m): shear traction [Pa].
+    - local_slip (f, m): irreversible slip [m].
+    """
 
     traction: np.ndarray
     local_slip: np.ndarray
