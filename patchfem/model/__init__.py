@@ -23,10 +23,7 @@ PUBLIC = {
         "build_without_sweep",
         "write_resolved",
     ),
-    "patch": (
-        "SharedMeshes",
-        "TYPICAL_N_NODES",
-    ),
+    "patch": ("TYPICAL_N_NODES",),
     "peaks": ("read_spectral_moments",),
     "pieces": (
         "extend_grid",

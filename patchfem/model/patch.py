@@ -187,18 +187,6 @@ class PatchInterface:
     partial_slip: str
 
 
-class SharedMeshes(NamedTuple):
-    """Meshes that several patches share.
-
-    - levels: meshes (lower, upper) of each level, fine to coarse; upper is None if it is like the
-      lower.
-    - name: unique name, by which results on these meshes are cached.
-    """
-
-    levels: "tuple[tuple[Mesh, Mesh | None], ...]"
-    name: str
-
-
 class PrescribedSlip(NamedTuple):
     """Prescribed slide of the holders that causes partial slip of a patch.
 
@@ -231,7 +219,8 @@ class PatchMesh:
     - file: mesh file of the two pieces.
     - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    - shared: meshes that serve all cases of a sweep.
+    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse; the upper one is None if it is
+      like the lower one.
     - slip: slide whose partial slip the mesh has to resolve.
     - n_finer: halvings of the elements beyond those that the static measures need.
     """
@@ -240,7 +229,7 @@ class PatchMesh:
     file: MeshFile | None
     is_static: bool = False
     edge_motion: str = ""
-    shared: SharedMeshes | None = None
+    shared: "tuple[tuple[Mesh, Mesh | None], ...] | None" = None
     slip: PrescribedSlip | None = None
     n_finer: int = 0
 

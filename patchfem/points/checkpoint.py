@@ -1,5 +1,8 @@
 """Checkpoints of a long march on disk, from which it goes on with equal results to the last bit.
 
+`write_state` and `read_state` write and read a state of nested lists, that of a march or of other long computations.
+The arrays of the state are those of an .npz archive, and its form is a text in JSON in the same archive.
+
 `store_checkpoints` sets the files of all marches in its context, one per march in the order in which they begin. A march
 that ends within MIN_WRITE_INTERVAL writes nothing. A checkpoint holds the arrays of the march and of its record.
 """
@@ -10,6 +13,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -26,28 +30,23 @@ RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
 MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums", "work_sums")
 RECORD_STATE = ("early", "recent", "energies", "before")
-CYCLES = ("extremes", "phasors")  # lists of numbers of the cycles of a record
 _FILES = ContextVar("checkpoint_files", default=None)
 
 
+@dataclass
 class CheckpointFiles:
     """Checkpoint files of a run, one for each of its marches.
 
-    Parameters
-    ----------
-    path_of_march : callable
-        path_of_march(number) -> Path of the file of a march.
-    key : str
-        Identifies the scene and its numerical settings.
-    is_resumed : bool
-        Whether existing files are read.
+    - path_of_march: path_of_march(number) -> Path of the file of a march.
+    - key: identifies the scene and its numerical settings.
+    - is_resumed: whether existing files are read.
+    - n_begun: number of marches that have begun.
     """
 
-    def __init__(self, path_of_march: Callable[[int], Path], key: str, is_resumed: bool):
-        self.path_of_march = path_of_march
-        self.key = key
-        self.is_resumed = is_resumed
-        self.n_begun = 0
+    path_of_march: Callable[[int], Path]
+    key: str
+    is_resumed: bool
+    n_begun: int = 0
 
 
 @contextmanager
@@ -109,35 +108,15 @@ def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
     files.n_begun += 1
     path = files.path_of_march(files.n_begun)
     digest = hashlib.sha256(f"{files.key} {request}".encode())
+    time = np.linspace(0, request[0] * run.step, 1000)
     arrays = []
-    pack(run.system, arrays)
+    pack((run.system, np.asarray(run.drive.values(time))), arrays)
     for array in arrays:
         digest.update(f"{array.shape} ".encode() + array.tobytes())
-    time = np.linspace(0, request[0] * run.step, 1000)
-    digest.update(np.asarray(run.drive.values(time)).tobytes())
     key = digest.hexdigest()
     if files.is_resumed and path.is_file():
         load_checkpoint(path, key, run, record)
     return MarchCheckpoint(path, key)
-
-
-def pack(value, arrays: list[np.ndarray]):
-    """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
-    if isinstance(value, np.ndarray):
-        arrays.append(value)
-        return {"array": len(arrays) - 1}
-    if isinstance(value, tuple | list):
-        return [pack(part, arrays) for part in value]
-    return value
-
-
-def unpack(value, arrays):
-    """Return the lists that `pack` made, with the arrays of a mapping by the names "0", "1", ..."""
-    if isinstance(value, dict):
-        return arrays[str(value["array"])]
-    if isinstance(value, list):
-        return [unpack(part, arrays) for part in value]
-    return value
 
 
 def convert_to_tuples(value, model):
@@ -166,19 +145,10 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     Missing
         If the file cannot be written.
     """
-    arrays = []
-    state = (
-        run.system,
-        [getattr(run, name) for name in MARCH_STATE],
-        [getattr(record, name) for name in RECORD_STATE],
-        [np.array(getattr(record, name)) for name in CYCLES],
-    )
-    form = np.array(json.dumps(pack(state, arrays)))
-    named = {str(number): array for number, array in enumerate(arrays)}
-    with write_atomically(path) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), form=form, **named)
-        file.flush()
-        os.fsync(file.fileno())
+    march_state = [getattr(run, name) for name in MARCH_STATE]
+    record_state = [getattr(record, name) for name in RECORD_STATE]
+    cycles = np.array(record.extremes), np.array(record.phasors)
+    write_state(path, key, (run.system, march_state, record_state, cycles))
 
 
 def load_checkpoint(path: Path, key: str, run, record) -> None:
@@ -200,30 +170,82 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
     PatchfemError
         If the file belongs to another march or cannot be read.
     """
-    folder = path.parent.name
+    system, march_state, record_state, cycles = read_state(path, key)
+    run.system = convert_to_tuples(system, run.system)
+    for name, value in zip(MARCH_STATE, march_state, strict=True):
+        setattr(run, name, value)
+    for name, value in zip(RECORD_STATE, record_state, strict=True):
+        setattr(record, name, value)
+    record.extremes, record.phasors = map(list, cycles)
+    record.last = record.recent[-1]
+
+
+def write_state(path: Path, key: str, state) -> None:
+    """Write a state to a file, which is replaced as a whole.
+
+    Parameters
+    ----------
+    path : Path
+        File of the state.
+    key : str
+        Identifies the computation to which the state belongs.
+    state : nested lists and tuples
+        Numbers, texts, None and arrays.
+
+    Raises
+    ------
+    Missing
+        If the file cannot be written.
+    """
+    arrays = []
+    form = np.array(json.dumps(pack(state, arrays)))
+    named = {str(number): array for number, array in enumerate(arrays)}
+    with write_atomically(path) as partial, open(partial, "wb") as file:
+        np.savez(file, key=np.array(key), form=form, **named)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read_state(path: Path, key: str):
+    """Read a state as nested lists.
+
+    Parameters
+    ----------
+    path : Path
+        File of the state.
+    key : str
+        Key of the computation that continues from the state.
+
+    Raises
+    ------
+    PatchfemError
+        If the state belongs to another computation or cannot be read.
+    """
+    reason = "belongs to another scene or to another version of patchfem"
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-
-        if str(arrays["key"]) != key:
-            raise PatchfemError(
-                f"{folder}: the state saved there belongs to another scene or to another version of patchfem; "
-                f"{RETRY_ADVICE}"
-            )
-
-        form = json.loads(str(arrays["form"]))
-        system, march_state, record_state, cycles = unpack(form, arrays)
-        run.system = convert_to_tuples(system, run.system)
-        for name, value in zip(MARCH_STATE, march_state, strict=True):
-            setattr(run, name, value)
-        for name, value in zip(RECORD_STATE, record_state, strict=True):
-            setattr(record, name, value)
-        for name, value in zip(CYCLES, cycles, strict=True):
-            setattr(record, name, list(value))
-        record.last = record.recent[-1]
-    except PatchfemError:
-        raise
+        if str(arrays["key"]) == key:
+            return _unpack(json.loads(str(arrays["form"])), arrays)
     except Exception as error:  # a damaged archive can raise exceptions of many classes
-        raise PatchfemError(
-            f"{folder}: the state saved there cannot be read ({error}); {RETRY_ADVICE}"
-        ) from None
+        reason = f"cannot be read ({error})"
+    raise PatchfemError(f"{path.parent.name}: the state saved there {reason}; {RETRY_ADVICE}")
+
+
+def pack(value, arrays: list[np.ndarray]):
+    """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {"array": len(arrays) - 1}
+    if isinstance(value, tuple | list):
+        return [pack(part, arrays) for part in value]
+    return value
+
+
+def _unpack(value, arrays):
+    """Return the lists that `pack` made, with the arrays of a mapping by the names "0", "1", ..."""
+    if isinstance(value, dict):
+        return arrays[str(value["array"])]
+    if isinstance(value, list):
+        return [_unpack(part, arrays) for part in value]
+    return value

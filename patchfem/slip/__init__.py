@@ -5,18 +5,14 @@ shear force against the displacement, and the traction and the slip of every nod
 
 `shear_modes` reduces the interface to parallel Jenkins elements, exact for laws that yield at a fixed force,
 or to a few modes of D^1/2 C D^1/2 for laws with memory; `fields` recovers traction and slip of the nodes from
-the states of both. `mesh_correction` estimates the error of elements that yield node by node; `edge_springs`
+the states of the former. `mesh_correction` estimates the error of elements that yield node by node; `edge_springs`
 gives a patch a prescribed stiffness in full stick. Read `shear_modes` first.
 """
 
 # Names that other folders use, by module
 PUBLIC = {
     "edge_springs": ("add_edge_springs",),
-    "fields": (
-        "bond_shear_modes",
-        "element_fields",
-        "point_fields",
-    ),
+    "fields": ("element_fields",),
     "mesh_correction": (
         "SPREAD_FACTOR",
         "spread_elements",

@@ -3,7 +3,6 @@
 In: the surface of a patch and the errors of its measures before and after. Out: `Wear`. Read `measure_wear` first.
 """
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -124,11 +123,10 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
 
 def _require_same_patch(first: PatchState, second: PatchState) -> None:
     """Raise PatchfemError unless the states are those of one patch, the less worn one first."""
-    tables = [dict(state.contact) for state in (first, second)]
-    for table, key in product(tables, LOADING_KEYS):
-        table.pop(key, None)
-    keys = {**tables[0], **tables[1]}
-    unlike = [f"contact.{key}" for key in keys if tables[0].get(key) != tables[1].get(key)]
+    unlike = []
+    for key in {**first.contact, **second.contact}:
+        if key not in LOADING_KEYS and first.contact.get(key) != second.contact.get(key):
+            unlike.append(f"contact.{key}")
     both = f"{first.source} and {second.source}: these are two different patches"
     if unlike:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
@@ -197,29 +195,29 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
     """
     from scipy.optimize import linprog
 
-    depth = np.atleast_2d(depth)
-    ends = (-1.0, 1.0) if y is None or len(y) == 1 else (-1.0, -1.0, 1.0, 1.0)
     scale = float(depth.max())
+    weights = np.kron(_weigh_ends(y), _weigh_ends(x))
+    n_corners = weights.shape[1]
     if not scale > 0:
-        return (0.0,) * len(ends)
+        return (0.0,) * n_corners
 
-    # coordinates from -1 to 1; the corners must not be negative
-    along = np.interp(x, (x[0], x[-1]), (-1, 1))
-    across = np.zeros(1) if len(ends) == 2 else np.interp(y, (y[0], y[-1]), (-1, 1))
-    column, row = np.meshgrid(along, across)
-    nodes = np.column_stack([np.ones(column.size), column.ravel(), row.ravel()])
-    corners = np.column_stack(
-        [
-            np.ones(len(ends)),
-            np.resize((-1.0, 1.0), len(ends)),
-            ends if len(ends) == 4 else (0.0, 0.0),
-        ]
-    )
-    limits = np.concatenate([np.maximum(depth, 0.0).ravel() / scale, np.zeros(len(ends))])
+    # The unknowns are the depths at the corners; four of them lie on a plane if the sums over the diagonals are equal.
     plane = linprog(
-        (-1.0, 0.0, 0.0), np.concatenate([nodes, -corners]), limits, bounds=(None, None)
-    ).x
-    return tuple(np.maximum(corners @ plane * scale, 0.0).tolist())
+        np.full(n_corners, -1 / n_corners),
+        weights,
+        np.maximum(depth, 0.0).ravel() / scale,
+        np.array([[1.0, -1.0, -1.0, 1.0]]) if n_corners == 4 else None,
+        [0.0] if n_corners == 4 else None,
+    )
+    return tuple((plane.x * scale).tolist())
+
+
+def _weigh_ends(positions) -> np.ndarray:
+    """Return the weights (k, 2) of both ends in a linear interpolation to positions (k,); (1, 1) without two of them."""
+    if positions is None or len(positions) == 1:
+        return np.ones((1, 1))
+    fraction = (positions - positions[0]) / (positions[-1] - positions[0])
+    return np.column_stack([1 - fraction, fraction])
 
 
 def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Quantity]:

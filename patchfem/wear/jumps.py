@@ -224,9 +224,7 @@ def _take_halves(
     depth, force = solve_jump(problem.press, half, rate, length / 2)
 
     # The depth of a run in whole jumps, whose difference from that of the halves gives the error of the run
-    coarse_depth = coarse
-    if state.coarse_depth is not state.depth:
-        coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)
+    coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)
     after = replace(
         state,
         cycle=state.cycle + length,
@@ -241,7 +239,7 @@ def _take_halves(
     depth_error = float(np.abs(depth - coarse).max()) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:
-        return after, max(depth_error, 0.0)
+        return after, depth_error
     force_error = (
         float(np.abs(force - coarse_force).sum()) / RICHARDSON_DIVISOR / (tolerance * load)
     )

@@ -406,15 +406,12 @@ def _make_result(
 
 def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences."""
-
-    def average(name: str, change: float) -> np.ndarray:
-        """Return the computed depths (b,) [m] after a change of one field of the place."""
-        place = best._replace(**{name: getattr(best, name) + change})
-        return history.average(bins.edges, place)
-
     columns = []
     for name, step in (("ratio", 0.01 * best.ratio), ("centre", bins.width / 2)):
-        columns.append((average(name, step) - average(name, -step)) / (2 * step))
+        value = getattr(best, name)
+        after = history.average(bins.edges, best._replace(**{name: value + step}))
+        before = history.average(bins.edges, best._replace(**{name: value - step}))
+        columns.append((after - before) / (2 * step))
     return np.column_stack(columns)
 
 

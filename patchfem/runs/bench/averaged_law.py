@@ -18,8 +18,8 @@ def _import_averaged_law():
     return import_effect("friction.law=convolution")
 
 
-def average_behind(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
-    """Return the averaged pressure (m,) [Pa] at the nodes of the upper piece.
+def find_tractions(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
+    """Return the averaged pressure (m,) [Pa] at the loaded nodes of the upper piece; 0 at open nodes.
 
     The law averages the pressure over the part of the surface that the node has just passed, that is, behind it in the
     direction of the motion.
@@ -33,17 +33,15 @@ def average_behind(model, patch, direction: float, offset: float = 0.0) -> np.nd
     direction : float
         Sign of the motion.
     offset : float
-        Displacement [m] of the upper piece over the pressure.
+        Displacement [m] of the upper piece over the pressure, which ends where the lower piece does.
     """
     friction = model.friction
-    return _import_averaged_law().average_pressure(
-        patch.x + offset,
-        patch.x,
-        patch.pressure.sigma_n,
-        direction,
-        friction.bond_length,
-        friction.order,
+    x = patch.x
+    sigma = patch.pressure.sigma_n
+    average = _import_averaged_law().average_pressure(
+        x + offset, x, sigma, direction, friction.bond_length, friction.order
     )
+    return np.where(np.interp(x + offset, x, sigma, left=0.0, right=0.0) > 0, average, 0.0)
 
 
 def slip_force_ratio(model, patch) -> float:
@@ -74,7 +72,7 @@ def slip_force_ratio(model, patch) -> float:
     return (forward + back) / 2 / patch.pressure.load
 
 
-def distribute_slip_force(model, patch, force) -> np.ndarray:
+def distribute_slip_force(model, patch, forces, offsets) -> np.ndarray:
     """Distribute the friction force of a slipping rigid block over its nodes.
 
     The tractions are proportional to the pressure averaged in the direction of the force.
@@ -85,18 +83,16 @@ def distribute_slip_force(model, patch, force) -> np.ndarray:
         Model with a law whose pressure is averaged along the motion.
     patch : Patch
         Solved patch, which gives nodes and pressure.
-    force : (f,)
-        Resultant forces [N].
+    forces, offsets : (f,)
+        Resultant forces [N], and displacements [m] of the upper piece over the pressure.
 
     Returns
     -------
     (f, m)
         Tractions [Pa].
     """
-    weight = patch.pieces.interface.weight
-    unit_tractions = []
-    for direction in (1.0, -1.0):
-        average = average_behind(model, patch, direction)
-        traction = np.where(patch.pressure.sigma_n > 0, average, 0.0)
-        unit_tractions.append(traction / max(weight @ traction, 1e-300))
-    return np.array([value * unit_tractions[0 if value >= 0 else 1] for value in force])
+    tractions = np.zeros((len(forces), patch.x.size))
+    for row, force, offset in zip(tractions, forces, offsets):
+        traction = find_tractions(model, patch, 1.0 if force >= 0 else -1.0, offset)
+        row += force * traction / max(patch.pieces.interface.weight @ traction, 1e-300)
+    return tractions

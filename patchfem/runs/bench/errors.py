@@ -7,7 +7,6 @@ discretization.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +15,7 @@ from ...effects import law_has_trait
 from ...friction.cells import CELL_MERGES, join_cells
 from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
 from ...response.errors import (
-    ERROR_MEASURES,
     FrictionScale,
-    absolute_change,
     convergence_errors,
     finer_errors,
     friction_errors,
@@ -86,12 +83,11 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
 
     def solve(variant: CoarseRun):
         """Compute a bench run with coarser settings."""
-        begin = process_time()
         coarse_model = model
         if variant.modes is not None:
             accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
             coarse_model = replace(model, accuracy=accuracy)
-        coarse_run = bench.run_bench(
+        return bench.run_bench(
             coarse_model,
             patches[variant.level],
             variant.steps,
@@ -99,11 +95,8 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
             springs=variant.springs,
             say=say,
         )
-        cpu_seconds[variant] = process_time() - begin
-        return coarse_run
 
     # The runs are stored by their settings, because several estimates share one run.
-    cpu_seconds = {}
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
@@ -112,9 +105,9 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
 
     # The history of step numbers serves the accuracy curve of the report.
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
-    for run in coarser_runs[0].runs:
-        values = bench_runs[run].values
-        step_runs.append(StepRun(run.steps, cpu_seconds[run], values))
+    for settings in coarser_runs[0].runs:
+        run = bench_runs[settings]
+        step_runs.append(StepRun(settings.steps, run.seconds, run.values))
     return BenchErrors(errors, seconds, step_runs)
 
 
@@ -152,7 +145,7 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         steps_on_coarse_mesh = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
-        out.append(CoarserRuns(runs, _estimate_mesh_errors, reference, "mesh"))
+        out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
@@ -192,14 +185,3 @@ def _estimate_bond_sum_errors(model, fine_run) -> Values:
         float(work[fine_run.first :].sum()),
     )
     return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)
-
-
-def _estimate_mesh_errors(*values: Values) -> Values:
-    """Estimate the mesh errors of the measures from their values on nested meshes.
-
-    Measures that are themselves errors, such as the energy balance, have their change as error.
-    """
-    changes = absolute_change(values[0], values[1])
-    errors = convergence_errors(*values)
-    errors.update({name: changes[name] for name in ERROR_MEASURES if name in changes})
-    return errors

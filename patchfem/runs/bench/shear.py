@@ -13,7 +13,6 @@ from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
 from ...points import contacts
 from ...slip import shear_modes
-from ...slip.fields import bond_shear_modes
 from ..patch import store
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
@@ -241,30 +240,39 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
 
 
-def compute_groove_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndarray]:
-    """Return traction (f, m) [Pa] and slip (f, m) [m] at the nodes of a patch over grooves.
+def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndarray]:
+    """Return traction (f, m) [Pa] and slip (f, m) [m] at the nodes of a patch from the states of its contact points.
+
+    Over grooves, the traction is the horizontal part of the forces on the flank of slope t, and the elastic stretch along
+    the flank is divided by sqrt(1 + t^2).
 
     Parameters
     ----------
     patch : Patch
-        Patch whose pieces deform in shear.
+        The pressed patch.
     contact : points.contacts.Contact
-        Points of the law on the flanks, reduced to shear modes.
+        Points at all nodes, or at those of its shear modes.
     snapshots : sequence of points.time_march.Snapshot
         States of the points in the f frames.
     """
-    index = contact.reduction.points
-    weight = patch.pieces.interface.weight[index]
-    shares = np.array([law.load for law in contact.point_sets[0].laws])
-    shares = shares / shares.sum()
+    reduction = contact.reduction
+    index = np.arange(patch.x.size) if reduction is None else reduction.points
+    slide = np.array([one.slide for one in snapshots])[:, None]
+    shape = (len(snapshots), index.size)
+    forces = np.reshape([one.forces for one in snapshots], shape)
+    elastic = np.reshape([one.stretch + one.bend for one in snapshots], shape)
+    if contact.grooves is not None:
+        slope = contact.grooves.slope(slide)
+        vertical = np.array([one.vertical for one in snapshots])[:, None]
+        loads = np.array([law.load for law in contact.point_sets[0].laws])
+        length = np.hypot(1.0, slope)
+        forces = vertical * loads / loads.sum() * slope + forces * length
+        elastic = elastic / length
+
     tau = np.zeros((len(snapshots), patch.x.size))
-    local = np.zeros((len(snapshots), patch.x.size))
-    for i, one in enumerate(snapshots):
-        t = float(contact.grooves.slope(one.slide))
-        length = np.hypot(1.0, t)
-        tau[i, index] = (one.vertical * shares * t + one.forces * length) / weight
-        local[i] = one.slide
-        local[i, index] -= (one.stretch + one.bend) / length
+    local = tau + slide
+    tau[:, index] = forces / patch.pieces.interface.weight[index]
+    local[:, index] -= elastic
     return tau, local
 
 
@@ -300,17 +308,19 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
     """
     law = model.bonds
     n_modes = n_modes or model.accuracy.shear_modes
-    tolerance = MODES_TOLERANCE_RATIO * model.accuracy.tolerance
+    tolerance = model.accuracy.tolerance
 
     def compute() -> "shear_modes.ShearModes":
         """Compute the modes, for all runs with the same Patch."""
+        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+        limit = law.static * patch.pieces.interface.weight
         sigma = patch.pressure.sigma_n
         if model.side == "lower":
             # A single mode is computed first, because this rejects a patch that could jump at constant
             # displacement.
-            bond_shear_modes(patch, law, 1, 1.0)
+            _choose_modes(patch, limit * sigma, law.length, 1, tolerance, weakening)
             sigma = np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch))
-        return bond_shear_modes(patch, law, n_modes, tolerance, sigma=sigma)
+        return _choose_modes(patch, limit * sigma, law.length, n_modes, tolerance, weakening)
 
     key = ("shear modes", patch, law, model.side, n_modes, tolerance)
     return store.get_or_compute(key, compute)

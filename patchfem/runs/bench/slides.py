@@ -102,7 +102,7 @@ def follow_path(task: SlideTask) -> SlideHistories:
     """
     if task.engine.method != CLOSED_FORM:
         return _follow_by_points(task)
-    histories = _climb_grooves(task) if task.model.grooves is not None else _slide_freely(task)
+    histories = _follow_without_memory(task)
     if task.progress is not None:
         task.progress(1.0)
     return histories
@@ -111,77 +111,85 @@ def follow_path(task: SlideTask) -> SlideHistories:
 # ---- laws without memory
 
 
-def _slide_freely(task: SlideTask) -> SlideHistories:
-    """Compute the histories of a law without memory: the force phi L of the step that ends at a sample.
+def _follow_without_memory(task: SlideTask) -> SlideHistories:
+    """Compute the histories of a law without memory from the force and the loss of each step.
 
-    L is the friction limit under the pressure at the sample, and phi its fraction, from the direction or the speed of
-    the step. The work of a step has the mean limit of both ends, and is dissipated.
+    The work of lifting the load on the flanks of grooves is stored energy; the friction work is dissipated.
     """
-    friction = task.model.friction
-    moves = np.diff(task.slide)
-    fraction = _find_limit_fraction(task.model, moves, np.diff(task.time))
-    limits = {sign: _find_limits(task, sign) for sign in (-1.0, 1.0)}
-    begin = np.where(moves > 0, limits[1.0][:-1], limits[-1.0][:-1])
-    end = np.where(moves > 0, limits[1.0][1:], limits[-1.0][1:])
-    force = np.append(0.0, fraction * end)
-    work = fraction * (begin + end) / 2 * moves
-
-    # At rest, a law that sticks keeps its force as far as the limit allows.
-    rests = np.flatnonzero(moves == 0) if law_has_trait(friction.law, "set-valued") else ()
-    for sample in rests:
-        before = force[sample]
-        limit = abs(before)
-        if limit > 0 and task.model.load_varies:
-            limit = limits[np.sign(before)][sample + 1]
-        force[sample + 1] = np.clip(before, -limit, limit)
-
-    # The tractions of a frame are in proportion to the friction limits.
-    tau = []
-    for sample in task.frames:
-        sign = 1.0 if force[sample] >= 0 else -1.0
-        limit = limits[sign][sample]
-        ratio = force[sample] / limit if limit > 0 else 0.0
-        tau.append(ratio * _find_limit_tractions(task, sample, sign))
+    model = task.model
+    slide = task.slide
+    grooves = model.grooves
+    load = task.compute_loads()
+    rises = np.zeros(slide.size - 1)
+    stored = np.zeros(slide.size)
+    if grooves is None:
+        force, losses = _slide_on_faces(task, load)
+    else:
+        force, losses = _climb_grooves(task, load)
+        rises = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
+        stored = load * grooves.height(slide)
 
     # A force at the end of a rest is that of the motion that begins there.
-    load = task.compute_loads()
-    for sample, sign in find_rest_ends(task.model, task.slide).items():
-        force[sample] = sign * friction.static * load[sample]
-        for frame in np.flatnonzero(task.frames == sample):
-            tau[frame] = sign * friction.static * task.evaluate_pressure([sample])[0]
-    shape = (task.frames.size, task.weight.size)
-    local = np.repeat(task.slide[task.frames, None], shape[1], axis=1)
-    ledger = stack_energies(work, np.zeros(force.size), work)
-    return SlideHistories(force, load, task.slide, ledger, np.reshape(tau, shape), local)
+    static = model.friction.static
+    for sample, sign in find_rest_ends(model, slide).items():
+        ratio = sign * static
+        if grooves is not None:
+            ratio = grooves.force_ratio(slide[sample], sign, static)
+        force[sample] = ratio * load[sample]
 
-
-def _find_limit_fraction(model, moves, durations) -> np.ndarray:
-    """Return the ratio (n,) of the friction force to its limit for displacements (n,) [m] in durations (n,) [s]."""
-    if law_has_trait(model.friction.law, "set-valued"):
-        return np.sign(moves)
-    return make_law(model.friction, 1.0).limit_fraction(moves, durations)
-
-
-def _find_limit_tractions(task: SlideTask, sample: int, direction: float) -> np.ndarray:
-    """Return the largest tractions (m,) [Pa] against a motion to +x (`direction` 1) or to -x (-1)."""
-    sigma = task.evaluate_pressure([sample])[0]
+    # The tractions of a frame are in proportion to the friction limits.
+    frames = task.frames
     if _averages_pressure(task):
-        offset = task.slide[sample] if task.model.side == "lower" else 0.0
-        average = averaged_law.average_behind(task.model, task.patch, direction, offset)
-        sigma = np.where(sigma > 0, average, 0.0)
-    return sigma * _find_coefficient(task)
+        offsets = slide[frames] * (model.side == "lower")
+        tau = averaged_law.distribute_slip_force(model, task.patch, force[frames], offsets)
+    else:
+        ratio = np.divide(force, load, out=np.zeros_like(force), where=load > 0)
+        tau = ratio[frames, None] * task.evaluate_pressure(frames)
+    local = np.repeat(slide[frames, None], task.weight.size, axis=1)
+    ledger = stack_energies(rises + losses, stored, losses)
+    return SlideHistories(force, load, slide, ledger, tau, local)
 
 
-def _find_limits(task: SlideTask, direction: float) -> np.ndarray:
-    """Return the largest forces (k,) [N] against a motion to +x (`direction` 1) or to -x (-1) at all samples."""
-    if not has_changing_pressure(task.model):
-        limit = float(_find_limit_tractions(task, 0, direction) @ task.weight)
-        return np.full(task.slide.size, limit)
-    # Only an averaged pressure depends on more than the load.
+def _slide_on_faces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force (k,) [N] and the loss of each step (k - 1,) [J] of a law without memory on flat faces.
+
+    The force is phi L, with the friction limit L under the pressure at the sample, and its fraction phi, from the
+    direction or the speed of the step that ends there. The loss has the mean limit of both ends of the step.
+    """
+    model = task.model
+    moves = np.diff(task.slide)
+    is_set_valued = law_has_trait(model.friction.law, "set-valued")
+    fraction = np.sign(moves)
+    if not is_set_valued:
+        fraction = make_law(model.friction, 1.0).limit_fraction(moves, np.diff(task.time))
+    forward = _find_limits(task, load, 1.0)
+    back = _find_limits(task, load, -1.0)
+    begin = np.where(moves > 0, forward[:-1], back[:-1])
+    end = np.where(moves > 0, forward[1:], back[1:])
+    force = np.append(0.0, fraction * end)
+
+    # At rest, a law that sticks keeps its force as far as the limit allows.
+    for sample in np.flatnonzero(moves == 0) if is_set_valued else ():
+        before = force[sample]
+        limit = (forward if before > 0 else back)[sample + 1]
+        force[sample + 1] = np.clip(before, -limit, limit)
+    return force, fraction * (begin + end) / 2 * moves
+
+
+def _find_limits(task: SlideTask, load, direction: float) -> np.ndarray:
+    """Return the largest forces (k,) [N] against a motion to +x (`direction` 1) or to -x (-1) at all samples.
+
+    Only an averaged pressure depends on more than the load (k,) [N].
+    """
+    coefficient = _find_coefficient(task)
     if not _averages_pressure(task):
-        return _find_coefficient(task) * task.compute_loads()
-    samples = range(task.slide.size)
-    return np.array([_find_limit_tractions(task, k, direction) @ task.weight for k in samples])
+        return coefficient * load
+    offsets = task.slide if task.model.side == "lower" else np.zeros(1)
+    limits = []
+    for offset in offsets:
+        traction = averaged_law.find_tractions(task.model, task.patch, direction, float(offset))
+        limits.append(coefficient * float(traction @ task.weight))
+    return np.broadcast_to(limits, load.shape)
 
 
 def _averages_pressure(task: SlideTask) -> bool:
@@ -216,56 +224,42 @@ def find_rest_ends(model, slide) -> dict[int, float]:
     return {int(k): float(moves[k]) for k in ends}
 
 
-def _climb_grooves(task: SlideTask) -> SlideHistories:
-    """Compute the histories of a law without memory on the flanks of grooves, without inertia.
+def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force (k,) [N] and the friction loss of each step (k - 1,) [J] on the flanks of grooves, without inertia.
 
-    The force is N (t + phi)/(1 - phi t), with the slope t and the friction ratio phi = f/R along the flank. The work of
-    lifting the load is stored energy; the friction work along the flank is dissipated.
+    The force is N (t + phi)/(1 - phi t) under the load N (k,), with the slope t and the friction ratio phi = f/R along
+    the flank.
     """
-    model = task.model
     slide = task.slide
-    grooves = model.grooves
-    friction = model.friction
-    load = task.compute_loads()
+    grooves = task.model.grooves
+    friction = task.model.friction
     moves = np.diff(slide)
-    durations = np.diff(task.time)
     if law_has_trait(friction.law, "set-valued"):
-        kinetic = friction.static if friction.kinetic is None else friction.kinetic
+        kinetic = _find_coefficient(task)
         last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
         ratio = grooves.force_ratio(slide, direction, kinetic)
-        lowest = grooves.force_ratio(slide[0], -1.0, friction.static)
-        highest = grooves.force_ratio(slide[0], 1.0, friction.static)
         # Before the motion starts, the friction on the flank balances the load as far as its limit allows.
+        lowest, highest = grooves.force_ratio(slide[0], np.array([-1.0, 1.0]), friction.static)
         ratio[direction == 0] = np.clip(0.0, lowest, highest)
-        loss = load[1:] * grooves.friction_loss(slide[:-1], slide[1:], kinetic)
-    else:
-        speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
+        return load * ratio, load[1:] * grooves.friction_loss(slide[:-1], slide[1:], kinetic)
 
-        def find_flank(places, speed) -> tuple[np.ndarray, np.ndarray]:
-            """Return the slope t of the flank and the friction ratio phi along it, at places [m] and speeds [m/s]."""
-            t = grooves.slope(places)
-            fraction = _find_limit_fraction(model, np.sqrt(1 + t**2) * speed, 1.0)
-            return t, friction.static * fraction
+    durations = np.diff(task.time)
+    speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
+    law = make_law(friction, 1.0)
 
-        def find_loss(places) -> np.ndarray:
-            """Return the dissipated energy per displacement [N] in each step, at places (k - 1,) [m]."""
-            t, phi = find_flank(places, speed)
-            return load[1:] * phi * (1 + t**2) / (1 - phi * t)
+    def find_flank(places, speed) -> tuple[np.ndarray, np.ndarray]:
+        """Return the slope t of the flank and the friction ratio phi along it, at places [m] and speeds [m/s]."""
+        t = grooves.slope(places)
+        return t, friction.static * law.limit_fraction(np.sqrt(1 + t**2) * speed, 1.0)
 
-        t, phi = find_flank(slide, np.append(0.0, speed))
-        ratio = (t + phi) / (1 - phi * t)
-        loss = integrate_steps(slide, find_loss)
+    def find_loss(places) -> np.ndarray:
+        """Return the dissipated energy per displacement [N] in each step, at places (k - 1,) [m]."""
+        t, phi = find_flank(places, speed)
+        return load[1:] * phi * (1 + t**2) / (1 - phi * t)
 
-    for sample, sign in find_rest_ends(model, slide).items():
-        ratio[sample] = grooves.force_ratio(slide[sample], sign, friction.static)
-    sigma = task.evaluate_pressure([0])
-    local = np.repeat(slide[task.frames, None], sigma.size, axis=1)
-    rise = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
-    ledger = stack_energies(rise + loss, load * grooves.height(slide), loss)
-    return SlideHistories(
-        load * ratio, load, slide, ledger, ratio[task.frames, None] * sigma, local
-    )
+    t, phi = find_flank(slide, np.append(0.0, speed))
+    return load * (t + phi) / (1 - phi * t), integrate_steps(slide, find_loss)
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:
@@ -327,14 +321,12 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     load = task.compute_loads()
     slip = motion.slip
     frames = task.frames
-    if model.partial_slip and model.grooves is not None:
-        tau, local = shear.compute_groove_fields(patch, contact, motion.snapshots)
-    elif jenkins_set is not None:
+    if jenkins_set is not None:
         states = [(one.slide, one.stretch) for one in motion.snapshots]
         length = make_law(model.friction, 1.0).element(1.0).length
         tau, local = fields.element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
-        tau, local = fields.point_fields(patch, contact.reduction, motion.snapshots)
+        tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
         ratio = np.divide(motion.force, load, out=np.zeros_like(load), where=load > 0)[frames]
         sigma = task.evaluate_pressure(frames)

@@ -18,7 +18,6 @@ from ...elasticity.elasticity import (
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 from . import store
-from .store import Key
 
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
 COUPLING_ROUND_OFF = 1e-7
@@ -152,78 +151,32 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     )
 
 
-def condense_on_shared_meshes(patch_model) -> tuple[CondensedPair, ...]:
-    """Return the condensed pieces of a model on all levels of its shared meshes."""
-    levels = range(len(patch_model.mesh.shared.levels))
-    return tuple(condense_on_shared_level(patch_model, level) for level in levels)
+def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
+    """Condense the two pieces of a `PatchModel` on meshes that several patches share, or return the result from before.
 
-
-def condense_on_shared_level(patch_model, level: int) -> CondensedPair:
-    """Return the condensed pieces of a model on one level of its shared meshes."""
-    bodies = patch_model.mesh.shared.levels[level]
-    return store.get_or_compute(
-        _condensed_pair_key(patch_model, patch_model.mesh.shared.name, level),
-        lambda: delete_matrix_factors(condense(patch_model, *bodies)),
-    )
-
-
-def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
-    """Store the condensed pieces on all levels of new shared meshes in the cache.
+    Its factorized stiffness matrices, which need far more memory than the compliance, are deleted. They are computed
+    again if fields are needed.
 
     Parameters
     ----------
     patch_model : PatchModel
-        One of the patches that use the meshes.
-    meshes : SharedMeshes
-        Meshes that the patches share, with their levels.
-    pairs : sequence of CondensedPair
-        From fine to coarse.
+        Patch whose materials, width and coatings the pieces have.
+    grid, upper_grid : TensorGrid or PieceMesh
+        Meshes of the lower and the upper piece; the upper one is None if the pieces are identical.
     """
-    for level, pair in enumerate(pairs):
-        store.store_result(
-            _condensed_pair_key(patch_model, meshes.name, level), delete_matrix_factors(pair)
-        )
 
+    def make() -> CondensedPair:
+        """Condense the pieces and delete their factors."""
+        pair = condense(patch_model, grid, upper_grid)
+        for piece in (pair.piece, pair.upper):
+            if not piece.round_off_error:
+                piece.computed.clear()
+        return pair
 
-def _condensed_pair_key(patch_model, name: str, level: int) -> Key:
-    """Return the cache key of the condensed pieces on one level of a shared mesh."""
     pieces = patch_model.pieces
-    return (
-        "pair",
-        name,
-        level,
-        pieces.lower,
-        pieces.upper,
-        pieces.plane,
-        pieces.width * pieces.pairs,
-    )
-
-
-def delete_matrix_factors(pair: CondensedPair) -> CondensedPair:
-    """Delete the factorized stiffness matrices of condensed pieces, and return the pieces.
-
-    The factors need far more memory than the compliance. They are computed again if fields are
-    needed.
-    """
-    for piece in (pair.piece, pair.upper):
-        if not piece.round_off_error:
-            piece.computed.clear()
-    return pair
-
-
-def condense_on_same_meshes(patch_model, pair: CondensedPair) -> CondensedPair:
-    """Condense the pieces of a `PatchModel` on the meshes of another CondensedPair.
-
-    On shared meshes the cached pieces are used.
-    """
-    for k, level in enumerate(
-        () if patch_model.mesh.shared is None else patch_model.mesh.shared.levels
-    ):
-        if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
-            pair.upper is pair.piece
-        ):
-            return condense_on_shared_level(patch_model, k)
-    return condense(patch_model, *pair.meshes)
+    width = pieces.width * pieces.pairs
+    key = ("pair", grid, upper_grid, pieces.lower, pieces.upper, pieces.plane, width)
+    return store.get_or_compute(key, make)
 
 
 def _nodes_match(lower_x, upper_x) -> bool:

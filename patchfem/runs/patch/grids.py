@@ -157,10 +157,8 @@ def _search_contact_region(patch_model) -> BaseGrids:
     for _ in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
         pair = condense(patch_model, *make_grids(patch_model, layout))
         x = pair.grid.x
-        extents = []
-        for loaded_model in loaded_models:
-            patch = solve_patch_contact(loaded_model, pair)
-            extents.append(find_contact_extent(patch, patch_model.mesh.slip))
+        patches = [solve_patch_contact(loaded_model, pair) for loaded_model in loaded_models]
+        extents = list(map(find_contact_extent, patches))
 
         # The next layout follows from this contact; the search compares the two.
         contact = extents[0]
@@ -251,7 +249,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         n_contact_cells = n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
     # contact set.
-    coating_cell = coating / 4 if coating and mesh.edge_motion != "load" else np.inf
+    coating_cell = coating / 4 if mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
 
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
@@ -279,7 +277,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     # At a loaded corner the pressure is singular or, under a coating, changes over its thickness.
     corner_cell = max(
         min(
-            coating / 16 if coating else np.inf,
+            coating / 16,
             width / n_edge_cells / corner_factor,
         ),
         MIN_CELL_RATIO * length,
@@ -315,35 +313,24 @@ def _make_edge_bands(edge_positions: list[tuple[float, ...]], min_cell: float) -
 
 
 def _min_coating_thickness(patch_model) -> float:
-    """Return the thickness [m] of the thinner coating; 0 without a coating."""
+    """Return the thickness [m] of the thinner coating; inf without a coating."""
     thicknesses = (piece.thickness for piece in patch_model.pieces.both)
-    return min(filter(None, thicknesses), default=0.0)
+    return min(filter(None, thicknesses), default=np.inf)
 
 
-def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
-    """Return the contact region of a patch; without contact, the cells around its smallest gap.
+def find_contact_extent(patch: Patch) -> ContactExtent:
+    """Return the contact region of a patch on a coarse grid; without contact, the cells around its smallest gap.
 
     A smooth asperity layer carries pressure everywhere, so that only pressures above a thousandth
     of the peak count.
-
-    Parameters
-    ----------
-    patch : Patch
-        Solved patch on a coarse grid.
-    slip : PrescribedSlip, optional
-        Prescribed displacement of the holders; None without partial slip.
     """
     x = patch.x
     sigma = patch.pressure.sigma_n
-    if not (sigma > 0).any():
-        closest_node = int(np.argmin(patch.pressure.gap))
-        low = float(x[max(closest_node - 1, 0)])
-        high = float(x[min(closest_node + 1, x.size - 1)])
-        return ContactExtent((low, high), (float(x[closest_node]),), (), np.inf)
-
     strips = patch.state.pressure
     is_loaded = strips > (1e-3 * strips.max() if patch.has_smooth_skin else 0.0)
     loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
+    if not loaded_nodes.size:
+        loaded_nodes = np.array([np.argmin(patch.pressure.gap)])
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
 
@@ -360,6 +347,7 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
     if len(edges) == edge_cells.size:
         edge_positions = np.array([end.position for end in edges])
 
+    slip = patch.model.mesh.slip
     corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[:, at].any())
     low = edge_positions[0] if loaded_nodes[0] else x[0]
     high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]
@@ -418,18 +406,44 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     pieces = patch_model.pieces.both
     grids = []
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
-        height = piece.height
-        coating = piece.thickness
         # The height of a row is at most a tenth of the length, or 1/24 of the height of a tall
         # piece, and never more than 1/6 of the height.
-        max_row = min(max(length / 10, height / 24), height / 6)
-        bands = [(0.0, 0.0, first_row), (height, height, min(height, length) / 60)]
-        if coating:
-            bands.append((coating, coating, max(coating / 4, first_row)))
-        rows = Layout(0.0, height, tuple(bands), (0.0, height), max_row, max_row, growth)
-        grid = TensorGrid(x, *divide_into_rows(rows, coating))
-        grids.append(extend_grid(patch_model, piece, grid, 1 + growth))
+        rows = divide_piece_into_rows(
+            piece,
+            first_row=first_row,
+            last_row=min(piece.height, length) / 60,
+            coating_row=piece.thickness / 4,
+            max_row=min(max(length / 10, piece.height / 24), piece.height / 6),
+            growth=growth,
+        )
+        grids.append(extend_grid(patch_model, piece, TensorGrid(x, *rows), 1 + growth))
     return grids
+
+
+def divide_piece_into_rows(
+    piece, first_row: float, last_row: float, coating_row: float, max_row: float, growth: float
+) -> tuple[np.ndarray, int]:
+    """Return the depths [m] of the element rows of a piece and the number of rows in the coating.
+
+    Parameters
+    ----------
+    piece : PatchPiece
+        Piece with its height and the thickness of its coating.
+    first_row, last_row, coating_row : float
+        Heights [m] of the rows at the interface, at the holder, and at the inner face of the coating, where they are at
+        least `first_row`.
+    max_row : float
+        Largest height of a row [m].
+    growth : float
+        Growth of the height with the distance from these places [1].
+    """
+    height = piece.height
+    coating = piece.thickness
+    bands = [(0.0, 0.0, first_row), (height, height, last_row)]
+    if coating:
+        bands.append((coating, coating, max(coating_row, first_row)))
+    rows = Layout(0.0, height, tuple(bands), (0.0, height), max_row, max_row, growth)
+    return divide_into_rows(rows, coating)
 
 
 def predict_condensing_seconds(bodies) -> float:

@@ -68,24 +68,21 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     """
     finest = values[-1]
     last_change = finest - values[-2]
+    previous_change = values[-2] - values[-3] if len(values) > 2 else 0.0
     last_size = abs(last_change)
-    if len(values) < 3:
-        error = IRREGULAR_ERROR_FACTOR * last_size
-        return Limit(finest, error, finest, error)
-    previous_change = values[-2] - values[-3]
     previous_size = abs(previous_change)
     ratio = inf if previous_change >= 0 else -inf
     if last_change != 0:
         ratio = previous_change / last_change
-    if not nested:
-        largest_change = max(last_size, previous_size / MAX_RATIO_NOT_NESTED)
-        bounded_ratio = min(max(ratio, MIN_RATIO), MAX_RATIO_NOT_NESTED)
-        error = IRREGULAR_ERROR_FACTOR * largest_change / (bounded_ratio - 1)
-        return Limit(finest, error, finest, error)
 
-    if not MIN_CONVERGING_RATIO <= ratio <= MAX_REGULAR_RATIO:
+    # Irregular series, and those of two values, are not extrapolated.
+    if not nested or not MIN_CONVERGING_RATIO <= ratio <= MAX_REGULAR_RATIO:
         largest_change = max(last_size, previous_size / MAX_RATIO)
-        if ratio > MAX_REGULAR_RATIO:
+        if not nested and len(values) > 2:
+            bounded_ratio = min(max(ratio, MIN_RATIO), MAX_RATIO_NOT_NESTED)
+            largest_change = max(last_size, previous_size / MAX_RATIO_NOT_NESTED)
+            largest_change = largest_change / (bounded_ratio - 1)
+        elif ratio > MAX_REGULAR_RATIO:
             largest_change = max(last_size / (MAX_RATIO - 1), previous_size / MAX_RATIO**2 * 2)
         error = IRREGULAR_ERROR_FACTOR * largest_change
         return Limit(finest, error, finest, error)

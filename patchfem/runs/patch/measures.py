@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import PatchfemError, compute_allowed_error
+from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
@@ -28,7 +28,7 @@ from ..results.patch_rows import (
     Values,
     make_measure,
 )
-from .condensed import condense_on_same_meshes
+from .condensed import condense_once
 from .limits import extrapolate_to_zero_cell_length
 from .press import Patch, Patches, solve_patch_contact
 from .values import (
@@ -195,7 +195,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch])
 
 def _count_contact_intervals(active) -> int:
     """Return the number of contact intervals in a contact set (m,)."""
-    return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
+    return int(np.count_nonzero(active & np.diff(active, prepend=False)))
 
 
 def _widen_errors_by_corner_pressure(
@@ -224,13 +224,8 @@ def _widen_errors_by_corner_pressure(
     error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
     if not pressure or error <= peak.error:
         return {}
-    fraction_error = increase_error_by_peak_error(
-        fraction.value, fraction.error, error / peak.value
-    )
-    return {
-        "pressure_peak": replace(peak, error=float(error)),
-        "loaded_fraction": replace(fraction, error=float(fraction_error)),
-    }
+    peak = replace(peak, error=float(error))
+    return dict(zip(PEAK_MEASURES, (peak, widen_fraction_error(peak, fraction))))
 
 
 def extrapolate_static_measures(
@@ -289,31 +284,19 @@ def extrapolate_static_measures(
         engine = FINEST_MESH_SOURCE if value == finest else EXTRAPOLATED_SOURCE
         out[name] = make_measure(name, value, error, engine)
 
-    # The loaded fraction is mean pressure / peak pressure, so that it has the relative error of the
-    # peak at least.
-    peak, fraction = (out[name] for name in PEAK_MEASURES)
-    relative = peak.error / peak.value if peak.value > 0 else 0.0
-    fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
-    out["loaded_fraction"] = replace(fraction, error=fraction_error)
+    out["loaded_fraction"] = widen_fraction_error(*(out[name] for name in PEAK_MEASURES))
     return out
 
 
-def increase_error_by_peak_error(
-    fraction: float, error: float, relative_peak_error: float
-) -> float:
-    """Increase the error of a loaded fraction to at least the part due to the peak pressure.
+def widen_fraction_error(peak: Measure, fraction: Measure) -> Measure:
+    """Return the loaded fraction with at least the part of its error that is due to the peak pressure.
 
     A loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
     relative error.
-
-    Parameters
-    ----------
-    fraction, error : float
-        Loaded fraction, and its error from the changes between meshes.
-    relative_peak_error : float
-        Relative error of the peak pressure.
     """
-    return max(error, fraction * relative_peak_error / (1 - min(relative_peak_error, 0.5)))
+    relative = peak.error / peak.value if peak.value > 0 else 0.0
+    error = fraction.value * relative / (1 - min(relative, 0.5))
+    return replace(fraction, error=max(fraction.error, error))
 
 
 def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:
@@ -559,7 +542,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     # them.
     other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
     try:
-        pair = condense_on_same_meshes(other_model, patch.pair)
+        pair = condense_once(other_model, *patch.pair.meshes)
         other_values = compute_static_values(solve_patch_contact(other_model, pair, coarse=patch))
     except PatchfemError as error:
         return [

@@ -12,7 +12,7 @@ from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
-from .condensed import condense, condense_on_shared_meshes
+from .condensed import condense, condense_once
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
@@ -54,25 +54,27 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
     mesh = patch_model.mesh
-    if mesh.shared is None:
-        if mesh.is_automatic:
-            return solve_on_refined_meshes(patch_model, tolerance, estimate)
-        meshes = make_given_meshes(patch_model)[: None if estimate else 1]
-        pairs = [condense(patch_model, *level) for level in meshes]
+    if mesh.shared is None and mesh.is_automatic:
+        return solve_on_refined_meshes(patch_model, tolerance, estimate)
+    levels = (mesh.shared or make_given_meshes(patch_model))[: None if estimate else 1]
+    condense_level = condense if mesh.shared is None else condense_once
+
+    def solve() -> Patches:
+        """Solve the patch on the given or shared meshes."""
+        pairs = [condense_level(patch_model, *level) for level in levels]
         return solve_on_pairs(patch_model, pairs, tolerance)
-    patches = store.get_or_compute(
-        ("patches", store.content_key(patch_model), tolerance, estimate),
-        lambda: solve_on_pairs(
-            patch_model, condense_on_shared_meshes(patch_model), tolerance, estimate
-        ),
-    )
+
+    if mesh.shared is None:
+        return solve()
+    key = ("patches", store.content_key(patch_model), tolerance, estimate)
+    patches = store.get_or_compute(key, solve)
     has_profile = mesh.is_automatic and patch_model.gap.profile is not None
     if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
         return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
 
-def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> Patches:
+def solve_on_pairs(patch_model, pairs, tolerance: float) -> Patches:
     """Solve a patch on given condensed pieces.
 
     Parameters
@@ -83,8 +85,6 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
         From fine to coarse.
     tolerance : float
         Relative error; measures that miss it are extrapolated if the mesh is automatic.
-    estimate : bool
-        Whether to use the coarser pieces as well.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
         Patches as in `solve_with_coarser`.
     """
     patches = []
-    for pair in reversed(pairs if estimate else pairs[:1]):
+    for pair in reversed(pairs):
         coarse = patches[0] if patches else None
         patches.insert(0, solve_patch_contact(patch_model, pair, coarse=coarse))
     return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
@@ -145,7 +145,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
     grids = make_base_grids(patch_model).bodies
     patches = ()
     points = None
-    has_failed_on_points = False
+    has_tried_points = False
     n_finer = patch_model.mesh.n_finer
     while True:
         patch = None
@@ -176,14 +176,13 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         if (
             not is_within
             and seconds > MAX_CONDENSING_SECONDS[False]
-            and points is None
-            and not has_failed_on_points
+            and not has_tried_points
             and profile_points.can_use_points(patch_model)
         ):
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
             points = profile_points.solve_on_points(patch_model, meets_tolerance)
             # points that do not converge do not do so on the next mesh either
-            has_failed_on_points = points is None
+            has_tried_points = True
             patches = with_static_measures(patches, tolerance, points)
 
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.

@@ -34,7 +34,7 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
     tolerance: relative error that the static measures have to meet.
     """
     if patch_model.mesh.shared is not None:
-        return patch_model.mesh.shared.levels[0]
+        return patch_model.mesh.shared[0]
     if not patch_model.mesh.is_automatic:
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)

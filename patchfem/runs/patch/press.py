@@ -64,20 +64,6 @@ class PointSolution(NamedTuple):
         return float(self.surface.x[1] - self.surface.x[0])
 
 
-class SolvedContact(NamedTuple):
-    """Contact solution of two pieces for a given unloaded gap.
-
-    - pieces: Compliance including the asperity layer of a patch without strips, a nonlinear layer being linearised
-      at the operating point.
-    - pressure: ContactState; for strips its mean over the width.
-    - state: StripsState; a patch without strips is a single one.
-    """
-
-    pieces: Compliance
-    pressure: ContactState
-    state: StripsState
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Patch:
     """Contact patch with the solution of its static contact problem.
@@ -86,7 +72,10 @@ class Patch:
 
     - model: PatchModel.
     - pair: condensed pieces.
-    - pieces, pressure, state: see `SolvedContact`.
+    - pieces: Compliance including the asperity layer of a patch without strips, a nonlinear layer being linearised
+      at the operating point.
+    - pressure: ContactState; for strips its mean over the width.
+    - state: StripsState; a patch without strips is a single one.
     - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
       the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
       holder spring, which is equal in all entries.
@@ -109,8 +98,8 @@ class Patch:
     state: StripsState
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
-    notes: tuple[str, ...]
-    seconds: Values
+    notes: tuple[str, ...] = ()
+    seconds: Values = field(default_factory=dict)
     averaging: float | None = None
     step_variants: "tuple[tuple[float, Patch], ...]" = ()
     points: PointSolution | None = None
@@ -239,21 +228,23 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
 
         sentences = [str(error), *advise_split(patch_model, float(np.diff(x).max()))]
         raise PatchfemError("; or ".join(sentences), error.key) from None
-    gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
+    unworn_gap = heights + pair.end_gap
+    worn = np.zeros(x.size) if worn is None else worn
 
     start = None
     if coarse is not None:
         rows = [np.interp(x, coarse.x, row > 0) for row in coarse.state.force]
         start = np.array(rows) > 0.5
 
-    def solve_gap(unloaded_gap) -> Patch:
-        """Solve the contact problem for an unloaded gap (m,) [m]."""
+    def solve_gap(gap) -> Patch:
+        """Solve the contact problem for an unloaded gap (m,) or (s, m) [m]."""
         begin = perf_counter()
-        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, start=start)
-        times = seconds | {"press": perf_counter() - begin}
-        return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
+        state = press_pieces(patch_model, pair.compliance, gap, start=start)
+        patch = _make_patch(patch_model, pair, gap, state)
+        times = pair.seconds | seconds | {"press": perf_counter() - begin}
+        return replace(patch, notes=notes, seconds=times)
 
-    patch = solve_gap(gap)
+    patch = solve_gap(unworn_gap + worn)
     half_steps = patch_model.gap.half_step_heights(x)
     if not half_steps.any():
         return patch
@@ -263,41 +254,23 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     bare_fraction = 1.0 if patch.skin_fraction is None else 1 - float(patch.skin_fraction[node])
     cell = float(np.diff(x[node - 1 : node + 2]).min())
     weight_shift = bare_fraction * edges.edge_offset(cell, cell, 0.0, pair.row) / cell
-    shifts = _gap_variants_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
-    weights = (0.5 + weight_shift, 0.5 - weight_shift)
-    variants = ((weight, solve_gap(gap + shift)) for weight, shift in zip(weights, shifts))
+
+    # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
+    # node takes the worn depth of its neighbour there; on the lower side likewise.
+    higher = node + 1
+    lower = node - 1
+    if unworn_gap[lower] < unworn_gap[higher]:
+        higher, lower = lower, higher
+    variants = []
+    for side, neighbour in ((-1, higher), (1, lower)):
+        moved = unworn_gap + side * half_steps + worn
+        moved[..., node] += worn[..., neighbour] - worn[..., node]
+        variants.append((0.5 - side * weight_shift, solve_gap(moved)))
     return replace(patch, step_variants=tuple(variants))
 
 
-def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple[np.ndarray, np.ndarray]:
-    """Return the two changes (m,) [m] of the gap that put a node on either side of a step.
-
-    The worn depth of the node belongs to a gap at half the height of the step. On the higher side
-    of the step, the node takes the worn depth of its neighbour there; on the lower side likewise.
-    """
-    if worn is None:
-        return -half_steps, half_steps
-    higher = node + 1
-    lower = node - 1
-    if np.mean(gap[..., lower]) < np.mean(gap[..., higher]):
-        higher, lower = lower, higher
-    shifts = []
-    for side, neighbour in ((-1, higher), (1, lower)):
-        shift = np.broadcast_to(side * half_steps, worn.shape).copy()
-        shift[..., node] += worn[..., neighbour] - worn[..., node]
-        shifts.append(shift)
-    return shifts[0], shifts[1]
-
-
-def make_patch(
-    patch_model,
-    pair: CondensedPair,
-    gap,
-    contact: SolvedContact,
-    notes: tuple[str, ...],
-    seconds: Values,
-) -> Patch:
-    """Assemble the Patch record of a solved contact.
+def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Patch:
+    """Return the Patch of a solved contact.
 
     Parameters
     ----------
@@ -305,36 +278,58 @@ def make_patch(
         Model that was solved.
     pair : CondensedPair
         Condensed pieces of the solution.
-    gap : (m,)
+    gap : (m,) or (s, m)
         Unloaded gap [m].
-    contact : SolvedContact
+    state : StripsState
         Solution on the nodes of the pieces.
-    notes : tuple
-        Sentences on the gap.
-    seconds : dict
-        CPU seconds by name.
-
-    Returns
-    -------
-    Patch
     """
-    slip_compliance = contact.pieces.tangential
-    if not patch_model.interface.has_shear:
+    loading = patch_model.loading
+    interface = patch_model.interface
+    skin = interface.skin
+
+    # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
+    pressure = state.pressure
+    if skin is not None and skin.law != "linear":
+        pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+
+    # The fields of a patch are means over its strips; the gap is the smallest one.
+    mean_state = ContactState(
+        frozen_array(pressure.mean(axis=0)),
+        frozen_array(state.gap.min(axis=0)),
+        state.position.delta,
+        state.position.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
+
+    # Without strips, the layer can be part of the compliance; without a tangential ratio it is rigid in shear.
+    pieces = pair.compliance
+    layer_shear = 0.0
+    if skin is not None and interface.strips is None:
+        layer = np.diag(compute_layer_compliance(skin, state)[0])
+        if skin.tangential_ratio is not None:
+            layer_shear = layer / skin.tangential_ratio
+        normal = frozen_array(pieces.normal + layer)
+        pieces = Compliance(pieces.interface, normal, frozen_array(pieces.tangential + layer_shear))
+
+    slip_compliance = pieces.tangential
+    if not interface.has_shear:
         slip_compliance = slip_compliance - pair.compliance.tangential
-    if patch_model.loading.tangential_stiffness:
-        slip_compliance = slip_compliance + 1 / patch_model.loading.tangential_stiffness
+    if loading.tangential_stiffness:
+        slip_compliance = slip_compliance + 1 / loading.tangential_stiffness
     slip_compliance.setflags(write=False)
-    x = contact.pieces.interface.x
-    averaging = patch_model.gap.averaging_length(x, contact.pressure.sigma_n > 0)
     return Patch(
         patch_model,
         pair,
-        *contact,
+        pieces,
+        mean_state,
+        state,
         slip_compliance=slip_compliance,
         unloaded_gap=frozen_array(gap),
-        notes=notes,
-        seconds=pair.seconds | seconds,
-        averaging=averaging,
+        averaging=patch_model.gap.averaging_length(pieces.interface.x, mean_state.sigma_n > 0),
     )
 
 
@@ -351,50 +346,25 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
     to the diagonal of the compliance, to nodal forces (m,) [N]. For strips all arrays are (s, m).
-    Terms that do not change between calls are computed once.
 
     Raises
     ------
     PatchfemError
         If a profile does not fit the mesh.
     """
-    bare = pair.compliance
-    gap = patch_model.gap.evaluate(bare.interface.x).heights + pair.end_gap
-    return ContactForceSolver(patch_model, bare, gap)
+    pieces = pair.compliance
+    gap = patch_model.gap.evaluate(pieces.interface.x).heights + pair.end_gap
 
-
-@dataclass(eq=False, slots=True)
-class ContactForceSolver:
-    """Solver for the contact forces of worn surfaces, started from the previous contact set.
-
-    A run that continues from a saved state calls `start_from_forces` first, so that its results are bitwise
-    those of an uninterrupted run.
-
-    - model: PatchModel.
-    - bare: compliance of the pieces without asperity layer.
-    - gap (m,): unloaded gap [m].
-    - contact_set (m,): nodes in contact of the previous solution, (s, m) for strips; None before the first one.
-    """
-
-    model: PatchModel
-    bare: Compliance
-    gap: np.ndarray
-    contact_set: np.ndarray | None = None
-
-    def start_from_forces(self, force) -> None:
-        """Start the next solution from the contact set of given nodal forces."""
-        self.contact_set = np.asarray(force) > 0
-
-    def __call__(self, worn, softening) -> np.ndarray:
-        """Return the contact forces [N] for worn depth [m] and softening [m/N], (m,) each, or (s, m) for strips."""
+    def compute_forces(worn, softening) -> np.ndarray:
+        """Return the contact forces [N] for a worn depth [m] and a softening [m/N]."""
         added = np.atleast_2d(softening) if softening.any() else None
-        gap = self.gap + worn
-        force = solve_contact(self.model, self.bare, gap, added, self.contact_set).state.force
-        self.contact_set = force > 0
-        return force.reshape(np.shape(worn))
+        state = press_pieces(patch_model, pieces, gap + worn, added)
+        return state.force.reshape(np.shape(worn))
+
+    return compute_forces
 
 
-def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) -> SolvedContact:
+def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -> StripsState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
@@ -415,10 +385,9 @@ def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) 
 
     Returns
     -------
-    SolvedContact
+    StripsState
     """
     loading = patch_model.loading
-    skin = patch_model.interface.skin
     count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
     strip = split_into_strips(pieces, count)
     offsets = strip_offsets(patch_model.pieces.width, count)
@@ -426,7 +395,7 @@ def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) 
     strips = StripModel(
         StripCompliance(strip.normal, added),
         StripLayout(pieces.interface.x, strip.weight, offsets),
-        None if skin is None else make_skin_law(patch_model),
+        None if patch_model.interface.skin is None else make_skin_law(patch_model),
     )
 
     # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
@@ -439,30 +408,7 @@ def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) 
         rotation=patch_model.gap.angle,
         roll=roll,
     )
-
-    state = press_strips(strips, gap, holder, start)
-    pressure = state.pressure
-    # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
-    if strips.is_smooth:
-        pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
-
-    # The fields of a patch are means over its strips; the gap is the smallest one.
-    mean_state = ContactState(
-        frozen_array(pressure.mean(axis=0)),
-        frozen_array(state.gap.min(axis=0)),
-        state.position.delta,
-        state.position.theta,
-        state.load,
-        state.moment,
-        state.outcome,
-        state.iterations,
-        state.residuals,
-    )
-
-    # Without strips, the layer can be part of the compliance.
-    if skin is not None and patch_model.interface.strips is None:
-        pieces = _add_layer(skin, pieces, compute_layer_compliance(skin, state)[0])
-    return SolvedContact(pieces, mean_state, state)
+    return press_strips(strips, gap, holder, start)
 
 
 def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
@@ -474,12 +420,3 @@ def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
         return np.broadcast_to(1 / (skin.normal_stiffness * state.layout.weight), state.force.shape)
     stiffness = np.maximum(state.stiffness * state.layout.weight, 1e-300)
     return 1 / np.maximum(stiffness, edges.MIN_RELATIVE_PRESSURE * stiffness.max())
-
-
-def _add_layer(skin, pieces: Compliance, layer) -> Compliance:
-    """Return the compliance of pieces in series with a layer (m,) [m/N]; without a tangential ratio it is rigid in shear."""
-    tangential = pieces.tangential
-    if skin.tangential_ratio is not None:
-        tangential = tangential + np.diag(layer / skin.tangential_ratio)
-    normal = pieces.normal + np.diag(layer)
-    return Compliance(pieces.interface, frozen_array(normal), frozen_array(tangential))

@@ -24,19 +24,20 @@ from ...contact.half_space.point_compliance import (
 from ...core import NotConverged
 from ...elasticity.elasticity import Piece
 from ...elasticity.lapack import use_one_blas_thread
-from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
+from ...mesh.grading import Layout, divide_into_columns
 from ...mesh.grid import TensorGrid
 from ...model import profile
 from ...model.patch import PatchPiece
 from ...model.pieces import make_elastic_layers
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
+from .grids import divide_piece_into_rows
 from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
-    increase_error_by_peak_error,
+    widen_fraction_error,
 )
 from .press import PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
@@ -96,26 +97,20 @@ class FreeEnds(NamedTuple):
 
 
 class PointForces(NamedTuple):
-    """Nodal forces at equally spaced points, with approach and rotation of the holder.
+    """Nodal forces at equally spaced points, with the state of the holder.
 
     - force (n,): nodal forces [N].
-    - approach, rotation: [m] and [rad]; the rotation adds to that of the gap.
+    - load, moment: sum [N] and moment [N m] of the forces.
+    - approach, rotation: [m] and [rad]; the rotation includes that of the gap.
     - n_iterations: iterations of the solver.
     """
 
     force: np.ndarray
-    approach: float
-    rotation: float
-    n_iterations: int
-
-
-class HolderState(NamedTuple):
-    """Load [N], moment [N m], approach [m] and rotation [rad] of the upper holder."""
-
     load: float
     moment: float
     approach: float
     rotation: float
+    n_iterations: int
 
 
 def can_use_points(patch_model) -> bool:
@@ -209,8 +204,8 @@ def _combine_refinement_series(
     peak = out.get(peak_name)
     if peak is not None and peak.value > 0:
         fraction = finest.values[fraction_name] * finest.values[peak_name] / peak.value
-        error = increase_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
-        out[fraction_name] = make_measure(fraction_name, fraction, error, HALF_SPACE_SOURCE)
+        measure = make_measure(fraction_name, fraction, 0.0, HALF_SPACE_SOURCE)
+        out[fraction_name] = widen_fraction_error(peak, measure)
     return out
 
 
@@ -237,8 +232,16 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     # Two equal pieces count twice.
     changes = 0.0
     for piece, multiplicity in _distinct_pieces(patch_model):
-        grid = TensorGrid(x, *_row_depths(piece, layout))
-        body = Piece(grid, make_elastic_layers(patch_model, piece))
+        middle_row = piece.height * layout.max_length / length
+        rows = divide_piece_into_rows(
+            piece,
+            first_row=layout.bands[0][2],
+            last_row=middle_row / 2,
+            coating_row=piece.thickness * layout.slope / 4,
+            max_row=2 * middle_row,
+            growth=layout.slope,
+        )
+        body = Piece(TensorGrid(x, *rows), make_elastic_layers(patch_model, piece))
         changes = changes + multiplicity * np.array(end_compliance(body))
     return FreeEnds(x, *changes)
 
@@ -284,22 +287,6 @@ def make_point_compliances(
     return normal, tangential
 
 
-def _row_depths(piece, layout: Layout) -> tuple[np.ndarray, int]:
-    """Return the depths [m] of the element rows of a piece and the number of rows in the coating."""
-    height = piece.height
-    coating = piece.thickness
-    end_cell = layout.bands[0][2]
-    max_cell = 2 * height * layout.max_length / (layout.stop - layout.start)
-    bands = [
-        (0.0, 0.0, end_cell),
-        (height, height, height * layout.max_length / (layout.stop - layout.start) / 2),
-    ]
-    if coating:
-        bands.append((coating, coating, max(coating * layout.slope / 4, end_cell)))
-    rows = Layout(0.0, height, tuple(bands), (0.0, height), max_cell, max_cell, layout.slope)
-    return divide_into_rows(rows, coating)
-
-
 def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
     """Solve the contact problem of a patch on equally spaced points.
 
@@ -324,7 +311,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     solution = _solve_nodal_forces(patch_model, normal, gap, start)
     force = solution.force
     deflection = normal.product(force)
-    opening = gap + solution.rotation * x - solution.approach + deflection
+    turn = solution.rotation - patch_model.gap.angle
+    opening = gap + turn * x - solution.approach + deflection
     largest_deflection = np.abs(deflection).max()
     active = force > 0
     if not opening.min() >= -MAX_OVERLAP_RATIO * largest_deflection:
@@ -341,30 +329,21 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     # The edges between the points follow from the forces on the points in contact.
     contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
     intervals = _contact_intervals(active, contact_edges, length)
-    state = HolderState(
-        float(force.sum()),
-        float(force @ x),
-        solution.approach,
-        patch_model.gap.angle + solution.rotation,
-    )
-
-    # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
-    # displacement, which is not computed here.
-    tangential = np.nan
-    if patch_model.pieces.are_alike:
-        tangential = set_stiffness(shear, active, unit, contact_edges)
+    are_alike = patch_model.pieces.are_alike
     edge_values = EdgeValues(
         length=float(np.maximum(np.diff(intervals).ravel(), 0.0).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
         normal=set_stiffness(normal, active, unit, contact_edges),
-        tangential=tangential,
+        tangential=set_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
 
     # At an end of the interface the pressure is that of the point there.
     peak = estimate_peak_pressure(x, sigma, node_fraction=unit)
-    values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
-    if np.isnan(tangential):
+    values = assemble_static_values(length, normal.area * count, solution, peak, edge_values)
+    # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
+    # displacement, which is not computed here.
+    if not are_alike:
         del values["tangential_stiffness"]
 
     # What this level resolves, for the errors that a finer level does not show.
@@ -434,12 +413,17 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
 
     # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).
     active = force > 0
-    if has_approach or not active.any():
-        return PointForces(force, float(offset), 0.0, n_iterations)
-    displacement = (gap + normal.product(force))[active]
-    if moment is None:
-        return PointForces(force, float(displacement.mean()), 0.0, n_iterations)
-    middle = x[active].mean()
-    arms = x[active] - middle
-    slope = float(arms @ displacement) / max(float(arms @ arms), 1e-300)
-    return PointForces(force, float(displacement.mean() - slope * middle), -slope, n_iterations)
+    approach = float(offset)
+    rotation = patch_model.gap.angle
+    if not has_approach and active.any():
+        displacement = (gap + normal.product(force))[active]
+        approach = float(displacement.mean())
+        if moment is not None:
+            middle = x[active].mean()
+            arms = x[active] - middle
+            slope = float(arms @ displacement) / max(float(arms @ arms), 1e-300)
+            approach -= float(slope * middle)
+            rotation -= slope
+    return PointForces(
+        force, float(force.sum()), float(force @ x), approach, rotation, n_iterations
+    )

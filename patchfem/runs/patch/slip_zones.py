@@ -35,56 +35,37 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
         return ()
 
     jenkins_set = elements(patch, slip.static, slip.bond_length)
-    yield_by_node = dict(zip(jenkins_set.points.tolist(), jenkins_set.point_yields.tolist()))
     edge_by_node = {(end.node, end.side): end.position for end in ends}
+    breaks = 1 + np.flatnonzero(np.diff(jenkins_set.points) > 1)
+    intervals = np.split(jenkins_set.points, breaks), np.split(jenkins_set.point_yields, breaks)
     out = []
 
     # Each interval of neighbouring nodes in contact is interpolated by itself.
-    for nodes in np.split(jenkins_set.points, 1 + np.flatnonzero(np.diff(jenkins_set.points) > 1)):
-        positions = patch.x[nodes].tolist()
-        yield_displacements = [yield_by_node[node] for node in nodes.tolist()]
-        if slip.bond_length == 0:
-            first = edge_by_node.get((int(nodes[0]), -1))
-            last = edge_by_node.get((int(nodes[-1]), 1))
-            if first is not None and first < positions[0]:
-                positions = [first, *positions]
-                yield_displacements = [0.0, *yield_displacements]
-            if last is not None and last > positions[-1]:
-                positions = [*positions, last]
-                yield_displacements = [*yield_displacements, 0.0]
-
-        out += _yielding_intervals(
-            np.array(positions), np.array(yield_displacements), slip.amplitude
-        )
+    for nodes, yield_displacements in zip(*intervals):
+        positions = patch.x[nodes]
+        for node, side in ((nodes[0], -1), (nodes[-1], 1)):
+            edge = edge_by_node.get((int(node), side))
+            if slip.bond_length == 0 and edge is not None and side * (edge - patch.x[node]) > 0:
+                at = positions.size if side > 0 else 0
+                positions = np.insert(positions, at, edge)
+                yield_displacements = np.insert(yield_displacements, at, 0.0)
+        out += _yielding_intervals(positions, yield_displacements, slip.amplitude)
     return tuple(out)
 
 
 def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
     """Return the intervals of x [m] in which the yield displacement is below an amplitude."""
-    is_yielding = yield_displacement < amplitude
-    starts = np.flatnonzero(is_yielding & ~np.append(False, is_yielding[:-1]))
-    stops = np.flatnonzero(is_yielding & ~np.append(is_yielding[1:], False))
-    out = []
-    for first, last in zip(starts.tolist(), stops.tolist()):
-        low = float(x[first])
-        high = float(x[last])
-        if first > 0:
-            low = _interpolate_zone_end(
-                x[first - 1 : first + 1], yield_displacement[first - 1 : first + 1], amplitude
-            )
-        if last < x.size - 1:
-            high = _interpolate_zone_end(
-                x[last : last + 2], yield_displacement[last : last + 2], amplitude
-            )
-        if high > low:
-            out.append((low, high))
-    return out
-
-
-def _interpolate_zone_end(x, yield_displacement, amplitude: float) -> float:
-    """Interpolate the position [m] at which the yield displacement equals a given amplitude."""
-    fraction = (amplitude - yield_displacement[0]) / (yield_displacement[1] - yield_displacement[0])
-    return float(x[0] + fraction * (x[1] - x[0]))
+    is_yielding = np.concatenate([[False], yield_displacement < amplitude, [False]])
+    ends = []
+    for node in np.flatnonzero(is_yielding[1:] != is_yielding[:-1]):
+        # A zone ends between two nodes, or with the interval.
+        if 0 < node < x.size:
+            low, high = yield_displacement[node - 1 : node + 1]
+            fraction = (amplitude - low) / (high - low)
+            ends.append(float(x[node - 1] + fraction * (x[node] - x[node - 1])))
+        else:
+            ends.append(float(x[min(node, x.size - 1)]))
+    return [(start, stop) for start, stop in zip(ends[::2], ends[1::2]) if stop > start]
 
 
 def friction_work_per_cycle(jenkins_set: JenkinsSet, amplitude: float) -> float:

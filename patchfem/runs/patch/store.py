@@ -6,7 +6,6 @@ the same patch. The least recently used result is discarded beyond MAX_ENTRIES.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, TypeVar
 
 # Largest number of cached results. A patch has about seven of them with its measures and elements,
@@ -57,8 +56,7 @@ def content_key(patch_model) -> Key:
         patch_model.loading,
         (interface.strips, interface.has_shear, interface.partial_slip),
         interface.skin and tuple(interface.skin),
-        replace(mesh, shared=None),
-        mesh.shared and mesh.shared.name,
+        mesh,
         tuple((name, tuple(part)) for name, part in gap.shapes),
         (gap.average, gap.limit, gap.is_rough, gap.side),
     )

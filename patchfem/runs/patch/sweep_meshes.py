@@ -1,27 +1,26 @@
 """Meshes for all cases of a sweep, with short cells wherever the contact of any case ends.
 
-In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to its
-own contact. At each position the shared mesh has the cells of the case that needs the shortest ones
-there. It is refined until all cases meet the tolerance. Pieces with prescribed elements or with a
-mesh file have equal meshes in all cases anyway.
+In: the `PatchModel`s of the cases. Out: the meshes of all levels (`PatchMesh.shared`). The mesh of a
+single case is graded to its own contact. At each position the shared mesh has the cells of the case
+that needs the shortest ones there. It is refined until all cases meet the tolerance. Pieces with
+prescribed elements or with a mesh file have equal meshes in all cases anyway.
 """
 
-from dataclasses import replace
-from itertools import chain, pairwise
-from uuid import uuid4
+from dataclasses import astuple, replace
+from itertools import chain
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...mesh import pieces as piece_meshes
 from ...mesh.grading import Layout
-from ...model.patch import PatchModel, SharedMeshes
+from ...model.patch import PatchModel
 from . import grids, mesh_levels
-from .condensed import CondensedPair, cache_condensed_pairs, condense
+from .condensed import CondensedPair, condense, condense_once
 from .press import solve_patch_contact
 from .store import Key
 
-# Largest number of cases that determine the mesh; of more cases, the most different ones are
-# selected.
+# Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
 MAX_LAYOUT_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
@@ -32,8 +31,6 @@ MAX_INTERFACE_NODES = 400
 # are of second order in their length.
 SINGLE_CASE_TOL = 1e-3
 MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
-# Largest ratio of the cell lengths of neighbouring cases that are joined by a single band.
-MAX_CELL_RATIO = 2.0
 
 
 def geometry_key(patch_model) -> Key:
@@ -62,7 +59,7 @@ def geometry_key(patch_model) -> Key:
 
 def choose_shared_meshes(
     patches, tolerance: float, is_complete: bool = True
-) -> SharedMeshes | None:
+) -> "tuple[tuple[piece_meshes.Mesh, piece_meshes.Mesh | None], ...] | None":
     """Choose meshes that suit all patches of equal geometry, independently of their order.
 
     Parameters
@@ -76,43 +73,38 @@ def choose_shared_meshes(
 
     Returns
     -------
-    SharedMeshes or None
-        None if no case can be solved.
+    tuple or None
+        Meshes of the lower and the upper piece on each level, from fine to coarse (`PatchMesh.shared`). None if no case
+        can be solved.
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return name_shared_meshes(mesh_levels.make_given_meshes(patch_model))
+        return tuple(mesh_levels.make_given_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
-    layout = _make_common_layout([*cases, *load_variants], not (are_all_patches and is_complete))
+    layout = _make_common_layout([*cases, *load_variants])
     if layout is None:
         return None
     # If the contact edges move or the patch slips partially, the initial contact does not determine
-    # the measures.
+    # the measures. Cases between the given ones have longer cells at their own contact edges.
     cell_factor = 1.0
-    if not (patch_model.mesh.edge_motion or has_partial_slip):
+    is_known = are_all_patches and is_complete
+    if is_known and not (patch_model.mesh.edge_motion or has_partial_slip):
         cell_factor = np.clip((tolerance / SINGLE_CASE_TOL) ** 0.5, 1.0, MAX_CELL_FACTOR)
     pairs = _refine_until_tolerance_is_met(
         cases,
         grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
         tolerance,
     )
-    meshes = name_shared_meshes([pair.meshes for pair in pairs])
-    cache_condensed_pairs(cases[0], meshes, pairs)
-    return meshes
-
-
-def name_shared_meshes(levels) -> SharedMeshes:
-    """Return SharedMeshes with a name of their own, which stays the same in all processes of a sweep."""
-    return SharedMeshes(tuple(levels), uuid4().hex)
+    return tuple(pair.meshes for pair in pairs)
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
-    """Select the patches that differ most from each other, by farthest-point selection.
+    """Select patches that differ from each other by load or surface shape, and those with the extremes of every number.
 
-    The patches are compared by load and surface shape. The result does not depend on their order.
-    The second result is True if all patches are selected.
+    Of many patches, those at equal distances in their order by these numbers are selected. The result does not depend
+    on the order in which they are given. The second result is True if all patches are selected.
 
     Parameters
     ----------
@@ -124,52 +116,31 @@ def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
     if len(keys) <= MAX_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
-    scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
-    coordinates = np.arcsinh(
-        np.divide(numbers, scale, out=np.zeros_like(numbers), where=np.isfinite(scale))
-    )
-    coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
-    selected = [int(np.argmin(coordinates.sum(axis=1)))]
-    distances = np.full(len(keys), np.inf)
-    while len(selected) < MAX_LAYOUT_CASES:
-        distances = np.minimum(
-            distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
-        )
-        selected.append(int(np.argmax(distances)))
-    return [rows[keys[k]] for k in sorted(selected)], False
+    even = np.linspace(0, len(keys) - 1, MAX_LAYOUT_CASES).round().astype(int)
+    selected = np.unique([*even, *numbers.argmin(axis=0), *numbers.argmax(axis=0)])
+    return [rows[keys[k]] for k in selected], False
 
 
 def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     """Return the load and gap parameters that may differ between patches of one mesh geometry."""
-    loading = patch_model.loading
-    shapes = []
-    for _, part in patch_model.gap.shapes:
-        shapes += [float(value) for _, value in part if isinstance(value, int | float)]
-    skin_values = [value for _, value in patch_model.interface.skin or ()]
-    skin = [float(value or 0.0) for value in skin_values if isinstance(value, int | float | None)]
-    loading_numbers = (
-        loading.load,
-        loading.approach,
-        loading.offset,
-        loading.line_moment,
-        loading.can_rotate,
-        loading.rotational_stiffness,
-        *(patch_model.mesh.slip or ()),
-        *(patch_model.interface.strips or ()),
-    )
-    return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
+    interface = patch_model.interface
+    shapes = tuple(tuple(part) for _, part in patch_model.gap.shapes)
+    skin = tuple(interface.skin or ())
+    own = (astuple(patch_model.loading), patch_model.mesh.slip, interface.strips, shapes, skin)
+    return tuple(_list_numbers(own))
 
 
-def _make_common_layout(cases: list[PatchModel], has_intermediate_cases: bool) -> Layout | None:
-    """Return column layouts of the coarsest grids merged for all patches; None on failure.
+def _list_numbers(value) -> list[float]:
+    """Return the numbers in nested tuples in their order; None counts as 0, and texts are left out."""
+    if value is None or isinstance(value, int | float):
+        return [float(value or 0.0)]
+    if not isinstance(value, tuple):
+        return []
+    return list(chain.from_iterable(map(_list_numbers, value)))
 
-    Parameters
-    ----------
-    cases : list of PatchModel
-        Patches of equal geometry.
-    has_intermediate_cases : bool
-        Whether the sweep contains cases between the given ones.
-    """
+
+def _make_common_layout(cases: list[PatchModel]) -> Layout | None:
+    """Return column layouts of the coarsest grids merged for all patches of equal geometry; None on failure."""
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = grids.make_search_layout(first)
@@ -184,7 +155,7 @@ def _make_common_layout(cases: list[PatchModel], has_intermediate_cases: bool) -
                 largest_ratio = max(largest_ratio, extent.cell / extent.width)
         if not layouts:
             return None
-        layout = _merge_layouts(layouts, has_intermediate_cases)
+        layout = _merge_layouts(layouts)
         if largest_ratio <= max_cell_ratio:
             break
     return layout
@@ -197,18 +168,16 @@ def _find_contact_extent(patch_model, pair):
     """
     try:
         patch = solve_patch_contact(patch_model, pair)
-        return grids.find_contact_extent(patch, patch_model.mesh.slip)
+        return grids.find_contact_extent(patch)
     except PatchfemError:
         return None
 
 
-def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layout:
+def _merge_layouts(layouts: list[Layout]) -> Layout:
     """Merge column layouts, taking the shortest cell of all layouts at each position."""
     bands = set()
     for layout in layouts:
         bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
-    if has_intermediate_cases:
-        bands |= set(_interpolate_bands(layouts))
 
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
@@ -235,25 +204,6 @@ def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layou
     return replace(merged, bands=tuple(needed_bands))
 
 
-def _interpolate_bands(layouts: list[Layout]) -> grids.Bands:
-    """Return bands of short columns between the contact edges of neighbouring cases."""
-    bands = []
-    half_length = max(layout.stop for layout in layouts)
-    for side in (-1, 1):
-        contact_ends = set()
-        for low, high, min_cell in chain.from_iterable(layout.bands for layout in layouts):
-            if low == high and low * side >= 0 and abs(low) < half_length:
-                contact_ends.add((low, min_cell))
-        for (low, a), (high, b) in pairwise(sorted(contact_ends)):
-            count = (
-                1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
-            )
-            positions = np.linspace(low, high, count + 1).tolist()
-            cell_lengths = np.geomspace(a, b, count + 1).tolist()
-            bands += zip(positions[:-1], positions[1:], map(max, pairwise(cell_lengths)))
-    return bands
-
-
 def _refine_until_tolerance_is_met(
     cases: list[PatchModel], bodies, tolerance: float
 ) -> list[CondensedPair]:
@@ -275,7 +225,7 @@ def _refine_until_tolerance_is_met(
     """
     pairs = []
     while True:
-        pairs.insert(0, condense(cases[0], *bodies))
+        pairs.insert(0, condense_once(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
         if len(pairs) < grids.MIN_LEVELS:
             continue

@@ -74,22 +74,19 @@ def _vertex_height(x, sigma, node: int) -> float:
     if not (sigma[node - 1] > 0 and sigma[node + 1] > 0):
         return 0.0
 
-    def fit_parabola(middle: int) -> tuple[float, float]:
-        """Return the slope at the middle of three nodes, and half the second derivative."""
-        left = x[middle] - x[middle - 1]
-        right = x[middle + 1] - x[middle]
-        slope_left = (sigma[middle] - sigma[middle - 1]) / left
-        slope_right = (sigma[middle + 1] - sigma[middle]) / right
-        slope = (slope_left * right + slope_right * left) / (left + right)
-        return slope, (slope_right - slope_left) / (left + right)
-
-    slope, curvature = fit_parabola(node)
+    # Slope and half the second derivative of the parabola at the middle of its three nodes.
+    cells = np.diff(x)
+    slopes = np.diff(sigma) / cells
+    curvatures = np.diff(slopes) / (x[2:] - x[:-2])
+    slope = np.average(slopes[node - 1 : node + 1], weights=cells[[node, node - 1]])
+    curvature = curvatures[node - 1]
     if not curvature < 0:
         return 0.0
+
     # At an end of the interface, the parabola itself stands in for the missing neighbour.
-    neighbours = [min(max(k, 1), x.size - 2) for k in (node - 1, node + 1)]
-    similar = min(1.0, *(fit_parabola(k)[1] / curvature for k in neighbours))
-    fraction = min(max(MAX_CURVATURE_RATIO * similar, 0.0), 1.0)
+    neighbours = curvatures[np.clip([node - 2, node], 0, curvatures.size - 1)]
+    similar = (neighbours / curvature).min()
+    fraction = np.clip(MAX_CURVATURE_RATIO * similar, 0.0, 1.0)
     return float(fraction * slope**2 / (-4 * curvature))
 
 

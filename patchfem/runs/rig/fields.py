@@ -50,7 +50,8 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         at = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
         tau = np.outer(window.force[at] / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            tau = averaged_law.distribute_slip_force(model, patch, window.force[at])
+            force = window.force[at]
+            tau = averaged_law.distribute_slip_force(model, patch, force, np.zeros(at.size))
         slip = np.repeat(window.slip[at][:, None], sigma.size, axis=1)
         return make_interface_frames(patch, window.time[at], tau, slip, window.slide[at])
 
@@ -61,10 +62,10 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     has_node_bonds = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
     has_points = is_march and snapshots[0].forces.size > 1
 
-    if model.partial_slip and model.grooves is not None:
-        tau, local = bench_shear.compute_groove_fields(patch, solution.contact, snapshots)
-    elif has_points and law_has_trait(f.law, "bonds") and (model.partial_slip or has_node_bonds):
-        tau, local = fields.point_fields(patch, reduction, snapshots)
+    has_bonds = has_points and law_has_trait(f.law, "bonds")
+    has_shear = model.partial_slip
+    if (has_shear and model.grooves is not None) or (has_bonds and (has_shear or has_node_bonds)):
+        tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif model.partial_slip:
         length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
         states = [(one.slide, one.stretch) for one in snapshots]

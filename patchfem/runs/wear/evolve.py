@@ -5,8 +5,6 @@ The state is saved after every jump. A run that continues from a saved state giv
 results as an uninterrupted run.
 """
 
-import json
-import os
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -18,7 +16,8 @@ import numpy as np
 
 from ...contact.press import strip_offsets
 from ...core import PatchfemError, frozen_array
-from ...disk.atomic_write import write_atomically
+from ...model.patch import PatchPiece
+from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
 from ..patch.measures import with_other_strip_count, with_static_measures
@@ -30,6 +29,7 @@ from ..patch.press import (
     solve_patch_contact,
 )
 from ..patch.values import compute_static_values
+from ..results.patch_rows import Values
 from .slip import (
     CycleSlip,
     choose_frame_count,
@@ -38,9 +38,6 @@ from .slip import (
     strips_slide_independently,
 )
 
-STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
-# Arrays of a saved WearMoment.
-MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 THIN_FRACTION = 1e-6
 # Smallest distance to the next row of the friction table, relative to the row spacing, at which a
@@ -48,8 +45,7 @@ THIN_FRACTION = 1e-6
 MIN_RELATIVE_ROW_DISTANCE = 0.1
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class WearMoment:
+class WearMoment(NamedTuple):
     """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
@@ -80,7 +76,6 @@ class WornPatch:
     - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
     - stripped: (patch, depth (t, m) [m]) after the same jumps with another number of strips
       (`measures.with_other_strip_count`); None without strips.
-    - frame_error: relative error of the slip path due to the finite number of frames.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
     """
@@ -91,7 +86,6 @@ class WornPatch:
     moments: tuple[WearMoment, ...]
     depths: tuple[np.ndarray, ...]
     stripped: tuple[Patch, np.ndarray] | None
-    frame_error: float
     seconds: float
     stopped: str
 
@@ -159,20 +153,19 @@ def make_worn_model(model, patch, depth):
         Worn depth [m].
     """
     wear = model.wear
-    changes = {}
+    mean_depth = compute_mean_worn_depth(patch, depth)
     if model.grooves is not None:
-        changes["grooves"] = model.grooves.after_wear(
-            compute_mean_worn_depth(patch, depth), wear.upper_share
-        )
-    if wear.friction is not None:
-        law = changes["friction"] = wear.friction.compute_worn_law(
-            model.friction, compute_mean_worn_depth(patch, depth)
-        )
-        if model.rig is not None:
-            friction = model.rig.friction
-            interfaces = tuple(replace(interface, numbers=law) for interface in friction.interfaces)
-            changes["rig"] = replace(model.rig, friction=replace(friction, interfaces=interfaces))
-    return replace(model, **changes) if changes else model
+        model = replace(model, grooves=model.grooves.after_wear(mean_depth, wear.upper_share))
+    if wear.friction is None:
+        return model
+
+    # The friction of a rig is also that of its interface.
+    law = wear.friction.compute_worn_law(model.friction, mean_depth)
+    rig = model.rig
+    if rig is not None:
+        interfaces = tuple(replace(face, numbers=law) for face in rig.friction.interfaces)
+        rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
+    return replace(model, friction=law, rig=rig)
 
 
 def compute_wear(
@@ -213,23 +206,23 @@ def compute_wear(
     )
 
     # A motion without bound has no slip path, so that no wear is computed for it.
+    state, moments = initial or (None, ())
     stop_reason = ""
     try:
         if initial is None:
             patch = _add_earlier_wear(model, patch)
-            state, moments = _make_initial_state(model, patch, problem, motion)
+            earlier_depth = model.wear.compute_earlier_depth(patch.x, problem.area)
+            state = make_initial_wear_state(problem, earlier_depth)
+            moments = (_record_moment(patch, state, motion),)
         else:
-            state, moments = initial
             patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
-        worn = [mesh and _add_earlier_wear(model, mesh) for mesh in coarse]
-        patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
         stop_reason = f"nothing was worn: {reason}"
-        seconds = perf_counter() - clock
-        return WornPatch(patch, tuple(worn), None, (), (), None, 0.0, seconds, stop_reason)
 
     # Jumps over many cycles, each with the contact solved on the worn gap.
-    while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
+    while state is not None and state.cycle < n_cycles:
+        if find_worn_through_coating(model, state.depth) is not None:
+            break
         try:
             state = _take_next_jump(model, problem, state)
         except _UnboundedMotion as reason:
@@ -244,7 +237,8 @@ def compute_wear(
         if progress is not None:
             progress(state.cycle / n_cycles)
 
-    # The jumps are repeated on coarser meshes and with other strips for the errors.
+    # The jumps are repeated on coarser meshes and with other strips for the errors. Without any jump, this adds the wear
+    # of an earlier run.
     replayed = []
     for mesh in coarse:
         if mesh is not None:
@@ -263,7 +257,6 @@ def compute_wear(
         moments,
         tuple(depth for _, depth in replayed),
         stripped,
-        moments[-1].miss,
         perf_counter() - clock,
         stop_reason,
     )
@@ -296,18 +289,30 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
     The fraction is 0 if there are no coatings.
     """
-    max_depth = float(depth.max(initial=0.0))
-    upper_share = model.wear.upper_share
-    pieces = model.patch.pieces
     coatings = [WornCoating(0.0, "", 0.0)]
-    for share, piece, name in (
-        (upper_share, pieces.upper, "upper"),
-        (1 - upper_share, pieces.lower, "lower"),
-    ):
+    for piece, name, piece_depth in list_worn_pieces(model, depth):
         if piece.coating is not None:
-            fraction = share * max_depth / piece.thickness
-            coatings.append(WornCoating(fraction, name, piece.thickness))
+            coatings.append(WornCoating(piece_depth / piece.thickness, name, piece.thickness))
     return max(coatings)
+
+
+class WornPiece(NamedTuple):
+    """Piece of a patch, its name "upper" or "lower", and the largest depth [m] that is worn off it."""
+
+    piece: PatchPiece
+    name: str
+    depth: float
+
+
+def list_worn_pieces(model, depth) -> list[WornPiece]:
+    """Return both pieces with their parts of a worn depth (m,) [m], (s, m) for strips, of both together."""
+    largest = float(depth.max(initial=0.0))
+    share = model.wear.upper_share
+    pieces = model.patch.pieces
+    return [
+        WornPiece(pieces.upper, "upper", share * largest),
+        WornPiece(pieces.lower, "lower", (1 - share) * largest),
+    ]
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
@@ -322,7 +327,6 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
         end = state if cycle == state.cycle else jump_to(cycle)
         return _most_worn_coating(model, end.depth).fraction - 1
 
-    problem.press.start_from_forces(state.force)
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
     if _most_worn_coating(model, next_state.depth).fraction <= 1 + THIN_FRACTION:
         return next_state
@@ -397,26 +401,12 @@ def _add_earlier_wear(model, patch):
     return solve_patch_contact(model.patch, patch.pair, depth)
 
 
-def _make_initial_state(model, patch, problem: WearProblem, motion: _SlipPathFunction) -> History:
-    """Return the initial wear state and the initial history of a patch.
-
-    They contain the wear of an earlier run only.
-    """
-    state = make_initial_wear_state(
-        problem, model.wear.compute_earlier_depth(patch.x, problem.area)
-    )
-    return state, (_record_moment(patch, state, motion),)
-
-
 def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
     """Return contact, slip path and measures of a worn patch as a WearMoment."""
     model = motion.model
-    area = nodal_areas(model.patch, patch.pieces.interface)
     worn = make_worn_model(model, patch, state.depth)
-
     measures = compute_static_values(patch) | motion.last.values
-    measures["worn_volume"] = float(np.vdot(state.depth, area))
-    measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
+    measures |= compute_worn_volume_and_depth(model.patch, patch, state.depth)
 
     # Wear changes the grooves and, by a table, the friction law.
     if model.grooves is not None:
@@ -437,6 +427,24 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     )
 
 
+def compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
+    """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Model of the patch, with its number of strips.
+    patch : Patch
+        Patch on whose nodes the depth is given.
+    depth : (m,) or (s, m)
+        Worn depth [m].
+    """
+    return {
+        "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
+        "worn_depth_max": float(depth.max(initial=0.0)),
+    }
+
+
 def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
     """Repeat the jumps of a run on another mesh or with another number of strips.
 
@@ -454,16 +462,15 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
         States after each jump of the run.
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
+    width = patch_model.pieces.width
+    offsets = strip_offsets(width, len(np.atleast_2d(area)))
 
     def interpolate_path(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of the other patch."""
-        if patch_model.interface.strips is None:
-            return np.interp(other_patch.x, patch.x, path)
-        rows = np.array([np.interp(other_patch.x, patch.x, row) for row in path])
-        width = patch_model.pieces.width
-        offsets = strip_offsets(width, len(area))
+        """Interpolate a slip path to the nodes and strips of the other patch; without strips there is a single row."""
+        rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
         row_offsets = strip_offsets(width, len(rows))
-        return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
+        columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
+        return np.array(columns).T.reshape(area.shape)
 
     jumps = []
     for before, after in pairwise(moments):
@@ -520,25 +527,8 @@ def save_wear_state(
     moments : tuple of WearMoment
         States after each jump so far.
     """
-    arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE_FIELDS}
-    for name in MOMENT_FIELDS:
-        arrays[f"moment_{name}"] = np.array([getattr(moment, name) for moment in moments])
-    values = json.dumps([moment.values for moment in moments], default=float)
-    with write_atomically(path) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), values=np.array(values), **arrays)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def make_missing_state_error(path: Path) -> PatchfemError:
-    """Return the exception for a run folder that has no saved state.
-
-    path: path of the missing file.
-    """
-    return PatchfemError(
-        f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
-        "without --resume"
-    )
+    rows = [(*moment[:-1], list(moment.values.items())) for moment in moments]
+    write_state(path, key, ([getattr(state, name) for name in WearState.__slots__], rows))
 
 
 def load_wear_state(path: Path, key: str) -> History:
@@ -549,33 +539,18 @@ def load_wear_state(path: Path, key: str) -> History:
     PatchfemError
         If the state belongs to another scene or cannot be read.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if str(arrays["key"]) != key:
-            raise PatchfemError(
-                f"{path.parent.name}: the state saved there belongs to another scene or to another "
-                "version of patchfem; run without --resume"
-            )
+    if not path.is_file():
+        raise make_missing_state_error(path)
+    fields, rows = read_state(path, key)
+    moments = (WearMoment(*fields_of_moment, dict(values)) for *fields_of_moment, values in rows)
+    return WearState(*fields), tuple(moments)
 
-        fields = {name: arrays[f"state_{name}"] for name in STATE_FIELDS}
-        for name, value in fields.items():
-            if value.ndim == 0:
-                fields[name] = float(value)
-        state = WearState(**fields)
 
-        columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
-        moments = []
-        all_values = json.loads(str(arrays["values"]))
-        for cycle, *nodal_fields, miss, values in zip(*columns, all_values, strict=True):
-            moments.append(WearMoment(float(cycle), *nodal_fields, float(miss), values))
-    except FileNotFoundError:
-        raise make_missing_state_error(path) from None
-    except PatchfemError:
-        raise
-    except Exception as error:  # A damaged archive may raise any exception.
-        raise PatchfemError(
-            f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
-            "--resume"
-        ) from None
-    return state, tuple(moments)
+def make_missing_state_error(path: Path) -> PatchfemError:
+    """Return the exception for a run folder that has no saved state.
+
+    path: path of the missing file.
+    """
+    return PatchfemError(
+        f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; {RETRY_ADVICE}"
+    )

@@ -15,9 +15,15 @@ from ...response.errors import convergence_error, convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
-from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, Values, make_measure
+from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import WearHistory
-from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
+from .evolve import (
+    THIN_FRACTION,
+    compute_mean_worn_depth,
+    compute_worn_volume_and_depth,
+    find_worn_through_coating,
+    list_worn_pieces,
+)
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
 N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
@@ -65,7 +71,9 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
 
-    notes = [*result.notes, *_note_on_earlier_run(model)]
+    notes = list(result.notes)
+    if model.wear.start is not None:
+        notes.append(model.wear.start.sentence)
     if "worn_through_cycle" in worn:
         notes += _note_on_worn_through_coating(model, evolved)
         if result.outcome not in UNBOUNDED_OUTCOMES:
@@ -95,11 +103,6 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
     name = "worn_through_cycle"
     return {name: make_measure(name, last.cycle, cycle_error)}
-
-
-def _note_on_earlier_run(model) -> list[str]:
-    """Return a list with a note on the earlier run whose wear is continued."""
-    return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
 def _note_on_worn_through_coating(model, evolved) -> list[str]:
@@ -151,31 +154,14 @@ def _widen_errors_by_jumps(result, evolved):
     return replace(result, measures=measures)
 
 
-def find_wear_period(model, result) -> float:
-    """Return the duration [s] of a wear cycle.
-
-    It is the period of the drive or of the prescribed displacement, or the duration of a path that
-    does not repeat.
-    """
-    if model.rig is not None:
-        return model.rig.drive.signal.period
-    return model.slide.period or float(result.response.time[-1])
-
-
 def _warn_of_worn_depth(model, evolved) -> list[str]:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
-    depth = float(evolved.state.depth.max(initial=0.0))
-    pieces = model.patch.pieces
     warnings = []
-    for fraction, piece, name in (
-        (model.wear.upper_share, pieces.upper, "upper"),
-        (1 - model.wear.upper_share, pieces.lower, "lower"),
-    ):
-        if fraction * depth > MAX_WORN_FRACTION * (piece.thickness or piece.height):
+    for piece, name, depth in list_worn_pieces(model, evolved.state.depth):
+        if depth > MAX_WORN_FRACTION * (piece.thickness or piece.height):
             size = "its height" if piece.coating is None else "the thickness of its coating"
             warnings.append(
-                f"up to {format_length(fraction * depth, 3)} is worn off the {name} piece, more than 0.2 of "
-                f"{size}, but the "
+                f"up to {format_length(depth, 3)} is worn off the {name} piece, more than 0.2 of {size}, but the "
                 "computation still uses the stiffness of the unworn piece"
             )
     return warnings
@@ -207,40 +193,38 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
         Whether to estimate the errors.
     """
     state = evolved.state
+    first = evolved.moments[0]
+    last = evolved.moments[-1]
     area = nodal_areas(model.patch, evolved.patch.pieces.interface)
-    slip_error = (
-        evolved.frame_error + _relative_slip_error(motion) + _relative_slip_change(evolved, motion)
-    )
-
-    # Values on the coarser meshes and with another number of strips, for the errors.
-    fine_values = _compute_worn_volume_and_depth(model.patch, evolved.patch, state.depth)
-    coarse = []
-    for patch, depth in zip(evolved.coarse, evolved.depths):
-        coarse.append(_compute_worn_volume_and_depth(model.patch, patch, depth))
-    other_model, ratio = with_other_strip_count(model.patch)
-    strips = fine_values
-    if evolved.stripped:
-        strips = _compute_worn_volume_and_depth(other_model, *evolved.stripped)
-
+    slip_error = last.miss + _relative_slip_error(motion) + _relative_slip_change(last, motion)
     jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
 
-    mesh_errors = convergence_errors(fine_values, *coarse) if coarse else {}
-    before = evolved.moments[0].values
-    start = model.wear.start
-    measures = {}
+    # Values on the coarser meshes and with another number of strips, for the errors.
+    values = {name: last.values[name] for name in jump_errors}
+    coarse = []
+    for patch, depth in zip(evolved.coarse, evolved.depths):
+        coarse.append(compute_worn_volume_and_depth(model.patch, patch, depth))
+    mesh_errors = convergence_errors(values, *coarse) if coarse else {}
+    other_model, ratio = with_other_strip_count(model.patch)
+    strips = values
+    if evolved.stripped:
+        strips = compute_worn_volume_and_depth(other_model, *evolved.stripped)
 
     # The errors of jumps, slip path, mesh, round-off, earlier run and strips add up.
-    for name, value in fine_values.items():
+    start = model.wear.start
+    measures = {}
+    for name, value in values.items():
         error = None
-        start_error = 0.0 if start is None else start.measure_error(name, before[name])
+        worn_before = first.values[name]
+        start_error = 0.0 if start is None else start.measure_error(name, worn_before)
         if coarse and estimate and start_error is not None:
             error = (
                 jump_errors[name]
-                + slip_error * max(value - before[name], 0.0)
+                + slip_error * max(value - worn_before, 0.0)
                 + float(mesh_errors[name])
                 + WORN_ROUND_OFF * value
                 + start_error
@@ -248,7 +232,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
             )
         measures[name] = make_measure(name, value, error, WORN_SOURCE)
 
-    amplitude = evolved.moments[-1].values.get("groove_amplitude")
+    amplitude = last.values.get("groove_amplitude")
     if amplitude is not None:
         error = measures["worn_volume"].error
         error = None if error is None else error / float(area.sum())
@@ -275,44 +259,35 @@ def _measure_worn_friction(model, evolved, motion: Measures, error: float | None
     error : float or None
         Error of the worn volume [m3].
     """
-    table = model.wear.friction
     area = float(evolved.patch.pieces.interface.weight.sum())
     last_moments = evolved.moments[-3:]
     depths = [compute_mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
-    depth = depths[-1]
+    depth_error = None if error is None else error / area
 
     # The table of friction is evaluated at the bounds of the mean depth.
-    depth_error = None if error is None else error / area
-    bounds = [] if error is None else [depth - depth_error, depth + depth_error]
+    bounds = [] if error is None else [depths[-1] - depth_error, depths[-1] + depth_error]
+    table = model.wear.friction
     bound_laws = [table.compute_worn_law(model.friction, max(bound, 0.0)) for bound in bounds]
-
-    law = table.compute_worn_law(model.friction, depth)
+    values = last_moments[-1].values
     measures = {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
-        value = getattr(law, key)
-        if value is not None:
-            changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
-            measures[name] = make_measure(name, value, max(changes, default=None))
-
-    if depth_error is None:
+        if name in values:
+            changes = [abs(getattr(law, key) - values[name]) for law in bound_laws]
+            measures[name] = make_measure(name, values[name], max(changes, default=None))
+    if error is None:
         return measures
 
     # Rate of a measure: change per change of the mean worn depth in a jump.
-    jumps = []
-    for pair in pairwise(zip(last_moments, depths)):
-        (before, depth_before), (after, depth_after) = pair
-        if depth_after > depth_before:
-            jumps.append((before.values, after.values, depth_after - depth_before))
-
     static_names = compute_static_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
             continue
-        rates = [0.0]
-        for before, after, change in jumps:
-            if name in before and name in after:
-                rates.append(abs(after[name] - before[name]) / change)
-        measures[name] = replace(measure, error=measure.error + depth_error * max(rates))
+        rate = 0.0
+        for (before, depth_before), (after, depth) in pairwise(zip(last_moments, depths)):
+            if depth > depth_before and name in before.values and name in after.values:
+                change = abs(after.values[name] - before.values[name])
+                rate = max(rate, change / (depth - depth_before))
+        measures[name] = replace(measure, error=measure.error + depth_error * rate)
     return measures
 
 
@@ -340,20 +315,12 @@ def _warn_of_friction_table(model, evolved) -> list[str]:
     return warnings
 
 
-def _compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
-    """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch."""
-    return {
-        "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
-        "worn_depth_max": float(depth.max(initial=0.0)),
-    }
-
-
-def _relative_slip_change(evolved, motion: Measures) -> float:
+def _relative_slip_change(moment, motion: Measures) -> float:
     """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
 
     The final run, on the worn patch, may have used smaller time steps.
     """
-    wear_amplitude = evolved.moments[-1].values.get("slip_amplitude")
+    wear_amplitude = moment.values.get("slip_amplitude")
     final_amplitude = motion.get("slip_amplitude")
     if wear_amplitude is None or final_amplitude is None or not final_amplitude.value:
         return 0.0
@@ -389,40 +356,41 @@ def _add_wear_frames(result, evolved):
     The time of a wear frame is its cycle number times the period; the last cycle follows. The worn
     depth of strips is (frame, strip, x).
     """
-    period = find_wear_period(result.plan.model, result)
-    motion = result.fields
-    n_motion = len(motion["time"])
+    model = result.plan.model
+    if model.rig is not None:
+        period = model.rig.drive.signal.period
+    else:
+        # A path that does not repeat is a cycle.
+        period = model.slide.period or float(result.response.time[-1])
     states = [evolved.moments[number] for number in _select_stored_moments(evolved.moments)[:-1]]
-    n_states = len(states)
-    depth = evolved.state.depth
+    n_motion = len(result.fields["time"])
 
     # Frames of the wear history: contact after each stored jump, at rest.
-    pressure = np.array([state.pressure for state in states])
-    pressure = pressure.reshape(n_states, evolved.patch.x.size)
     wear = {
-        "time": np.array([state.cycle for state in states]) * period,
-        "normal_stress": pressure,
-        "gap": np.array([state.gap for state in states]).reshape(pressure.shape),
-        "status": (pressure > 0).astype(np.int8),
-        "worn_depth": np.array([state.depth for state in states]).reshape(n_states, *depth.shape),
+        "time": [state.cycle * period for state in states],
+        "normal_stress": [state.pressure for state in states],
+        "gap": [state.gap for state in states],
+        "status": [(state.pressure > 0).astype(np.int8) for state in states],
+        "worn_depth": [state.depth for state in states],
     }
 
     # The last cycle follows all cycles of wear, and its worn depth stays as it is.
-    motion = motion | {
-        "time": motion["time"] + evolved.state.cycle * period,
-        "worn_depth": np.repeat(depth[None], n_motion, axis=0),
+    motion = result.fields | {
+        "time": result.fields["time"] + evolved.state.cycle * period,
+        "worn_depth": np.repeat(evolved.state.depth[None], n_motion, axis=0),
     }
     for field, name in HOLDER_MEASURES.items():
-        wear[f"holder_{field}"] = np.array([state.values[name] for state in states])
-        value = getattr(evolved.patch.pressure, name)
-        motion[f"holder_{field}"] = np.full(n_motion, value)
+        wear[f"holder_{field}"] = [state.values[name] for state in states]
+        motion[f"holder_{field}"] = np.full(n_motion, getattr(evolved.patch.pressure, name))
 
     # Fields that exist only in motion are 0 in the frames of wear.
-    fields = {}
-    for name, field in motion.items():
-        zeros = np.zeros((n_states, *np.shape(field)[1:]))
-        fields[name] = np.concatenate([wear.get(name, zeros), field])
-    history = WearHistory(_collect_wear_history(evolved), n_states, period)
+    fields = motion
+    if states:
+        fields = {}
+        for name, field in motion.items():
+            before = wear.get(name, np.zeros((len(states), *field.shape[1:])))
+            fields[name] = np.concatenate([before, field])
+    history = WearHistory(_collect_wear_history(evolved), len(states), period)
     return replace(result, fields=fields, wear=history)
 
 
@@ -445,14 +413,12 @@ def _collect_wear_history(evolved) -> Arrays:
     The entries `cycle` and `EDGE_PEAK` are included.
     """
     moments = evolved.moments
-    history = {"cycle": np.array([moment.cycle for moment in moments])}
+    history = {"cycle": [moment.cycle for moment in moments]}
     for name in moments[-1].values:
         if all(name in moment.values for moment in moments):
-            history[name] = np.array([moment.values[name] for moment in moments], float)
-    history[EDGE_PEAK] = np.array(
-        [compute_edge_pressure_excess(moment.pressure) for moment in moments]
-    )
-    return history
+            history[name] = [moment.values[name] for moment in moments]
+    history[EDGE_PEAK] = [compute_edge_pressure_excess(moment.pressure) for moment in moments]
+    return {name: np.array(values, float) for name, values in history.items()}
 
 
 def compute_edge_pressure_excess(pressure) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
+from ...response.rows import AMPLITUDE
 from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
@@ -55,12 +56,14 @@ class _Cycle(NamedTuple):
 
     - slide, slip: relative displacement and slip [m].
     - force, load: friction force and normal load [N].
+    - is_closed: whether the first sample follows the last one.
     """
 
     slide: np.ndarray
     slip: np.ndarray
     force: np.ndarray
     load: np.ndarray
+    is_closed: bool = False
 
 
 class _NodeFrames(NamedTuple):
@@ -76,6 +79,23 @@ class _NodeFrames(NamedTuple):
     slip: np.ndarray
     shear_stress: np.ndarray
     is_closed: bool
+
+
+class _Motion(NamedTuple):
+    """Motion of a bench or a rig.
+
+    - window: histories of its last cycles.
+    - slide (k,): relative displacement [m] during the whole run.
+    - values: measures by name.
+    - frames: _NodeFrames of the last cycle; None if no frames were asked for.
+    - outcome: outcome of a motion without periodic cycle, else None.
+    """
+
+    window: object
+    slide: np.ndarray
+    values: Values
+    frames: _NodeFrames | None
+    outcome: Outcome | None = None
 
 
 class _PointSlip(NamedTuple):
@@ -157,10 +177,25 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     patch : Patch
         Patch at the present wear.
     frames : int
-        Number of frames per cycle from which the path is computed.
+        Number of frames per cycle from which the path is computed, if the nodes do not slip alike.
     """
-    follow = _compute_bench_slip if model.rig is None else _compute_rig_slip
-    return follow(model, patch, frames)
+    follow = _follow_slide if model.rig is None else _follow_rig
+    motion = follow(model, patch, 0 if slips_uniformly(model) else frames)
+    load = patch.pressure.load
+    cycle = _select_last_cycle(model, motion.window, load)
+
+    # The slip follows from the histories if it is uniform, else from the frames of the cycle.
+    if motion.frames is not None:
+        path, error = _integrate_node_slip(model, patch, motion.frames)
+    elif strips_slide_independently(model):
+        path, error = _integrate_strip_slip(model, patch, motion.window)
+    else:
+        path, error = _integrate_uniform_slip(model, cycle, load)
+        path = np.full(nodal_areas(model.patch, patch.pieces.interface).shape, path)
+    if model.rig is not None:
+        error += _slip_amplitude_change(motion.values, cycle)
+    outcome = check_pieces_overlap(motion.outcome, model.patch, patch, motion.slide)
+    return CycleSlip(path, error, motion.values, outcome)
 
 
 def compute_point_slip_path(model, window, values: Values) -> tuple[float, float]:
@@ -185,30 +220,12 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
     return path, error
 
 
-def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
-    """Compute the slip path of the interface nodes in the last cycle of a bench.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench.
-    patch : Patch
-        Solved patch.
-    frames : int
-        Number of frames per cycle, if the nodes do not slip alike.
-    """
+def _follow_slide(model, patch, frames: int) -> _Motion:
+    """Compute the motion of a bench, with a number of frames in each of its cycles."""
     cycles = max(1, round(model.slide.cycles or 1))
-    is_uniform = slips_uniformly(model)
-    n_frames = 0 if is_uniform else frames * cycles
-    run = bench.run_bench(model, patch, steps_per_cycle(model), n_frames)
-    outcome = check_pieces_overlap(None, model.patch, patch, run.slide)
-
-    # Pieces that do not deform in shear slip alike at all nodes: one path for all.
-    if is_uniform:
-        cycle = _select_last_cycle(model, run)
-        path, error = _integrate_uniform_slip(model, cycle, cycle.load[0])
-        return CycleSlip(_spread_over_nodes(model, patch, path), error, run.values, outcome)
-
+    run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
+    if not frames:
+        return _Motion(run, run.slide, run.values, None)
     is_last = run.frames >= run.first
     slide = run.slide[run.frames[is_last]]
     local = run.local[is_last]
@@ -223,66 +240,37 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
 
     load = np.full(slide.size, patch.pressure.load)
-    path, error = _integrate_node_slip(model, patch, _NodeFrames(slide, load, local, tau, False))
-    return CycleSlip(path, error, run.values, outcome)
+    return _Motion(run, run.slide, run.values, _NodeFrames(slide, load, local, tau, False))
 
 
-def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
-    """Compute the slip path of the interface nodes in the last cycle of a rig.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a rig.
-    patch : Patch
-        Solved patch.
-    frames : int
-        Number of frames in the last cycle, if the nodes do not slip alike.
-    """
+def _follow_rig(model, patch, frames: int) -> _Motion:
+    """Compute the motion of a rig, with a number of frames in its last cycle."""
     settings = numerics.choose_numerics(model)
-    is_uniform = slips_uniformly(model)
-    solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
+    solution = solve.solve_rig(model, settings, patch, frames)
+    response = solution.response
 
     # A motion without bound has no slip path (the caller stops the wear).
-    amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)
+    amplitude = Measure(solution.values[AMPLITUDE], "m", 0.0)
     outcome, _ = judge_outcome(
-        solution,
-        {"relative_displacement_amplitude": amplitude},
-        model.accuracy.tolerance,
-        model.rig.drive.signal,
+        solution, {AMPLITUDE: amplitude}, model.accuracy.tolerance, model.rig.drive.signal
     )
-    outcome = check_pieces_overlap(
-        outcome if outcome in UNBOUNDED_OUTCOMES else None,
-        model.patch,
-        patch,
-        solution.response.slide,
-    )
-
-    # The slip follows from the histories if it is uniform, else from the frames of the cycle.
-    load = patch.pressure.load
-    cycle = _select_last_cycle(model, solution.window, load)
-    if not is_uniform:
-        node_frames = _collect_rig_frames(model, settings, patch, solution)
-        path, error = _integrate_node_slip(model, patch, node_frames)
-    elif strips_slide_independently(model):
-        path, error = _integrate_strip_slip(model, patch, solution.window)
-    else:
-        path, error = _integrate_uniform_slip(model, cycle, load)
-        path = _spread_over_nodes(model, patch, path)
-    error += _slip_amplitude_change(solution.values, cycle)
-    return CycleSlip(path, error, solution.values, outcome)
-
-
-def _collect_rig_frames(model, settings, patch, solution) -> _NodeFrames:
-    """Return the frames of the last cycle of a rig; over grooves the load varies with the lift."""
-    frames = fields.collect_interface_fields(model, settings, patch, solution)
-    frames = {name: values[1:] for name, values in frames.items()}
-    response = solution.response
-    loads = np.full(response.time.size, patch.pressure.load)
-    if model.grooves is not None:
-        loads = response.extra.get("normal_load", loads)
-    load = np.interp(frames["time"], response.time, loads)
-    return _NodeFrames(frames["holder_slide"], load, frames["slip"], frames["shear_stress"], True)
+    node_frames = None
+    if frames:
+        frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
+        in_cycle = {name: values[1:] for name, values in frame_fields.items()}
+        # Over grooves the load varies with the lift.
+        loads = np.full(response.time.size, patch.pressure.load)
+        if model.grooves is not None:
+            loads = response.extra.get("normal_load", loads)
+        node_frames = _NodeFrames(
+            slide=in_cycle["holder_slide"],
+            load=np.interp(in_cycle["time"], response.time, loads),
+            slip=in_cycle["slip"],
+            shear_stress=in_cycle["shear_stress"],
+            is_closed=True,
+        )
+    outcome = outcome if outcome in UNBOUNDED_OUTCOMES else None
+    return _Motion(solution.window, response.slide, solution.values, node_frames, outcome)
 
 
 def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
@@ -317,8 +305,10 @@ def _is_in_last_cycle(model, window) -> np.ndarray:
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
-def _compute_wearing_traction(model, slope, normal, friction) -> np.ndarray:
-    """Return the traction that wears a point, per unit of relative displacement.
+def _make_point_slip(
+    model, motion: _Cycle | _NodeFrames, slip, friction, pressure, normal
+) -> _PointSlip:
+    """Return the slip of points with the traction that wears them.
 
     On flat faces it is the normal traction V, or with form 'energy' |F| of the friction traction F, which opposes the
     slip also in a step with a reversal. On a flank of slope t = dz/dq with the path ds, it is R ds/dq = V + F t of the
@@ -328,24 +318,22 @@ def _compute_wearing_traction(model, slope, normal, friction) -> np.ndarray:
     ----------
     model : Model
         Model with [wear].
-    slope : ndarray
-        Slope of the flank; 0 for flat faces.
-    normal, friction : ndarray
-        Vertical and horizontal tractions [Pa], or forces [N].
+    motion : _Cycle or _NodeFrames
+        Motion of the whole interface.
+    slip : (k, p) ndarray
+        Slip of the points [m].
+    friction, normal : (k, p) ndarray
+        Horizontal and vertical tractions [Pa], or forces [N].
+    pressure : (p,) ndarray
+        Traction or force to which they are related; an open point, with 0, does not wear.
     """
+    slope = 0.0 if model.grooves is None else model.grooves.slope(motion.slide)[:, None]
     if model.wear.uses_friction_work:
-        return np.abs(friction - slope * normal)
-    return np.maximum(normal + slope * friction, 0.0)
-
-
-def _slope_of_grooves(model, slide) -> np.ndarray:
-    """Return the slope (k,) of the groove flanks at displacements [m]; zero for flat faces."""
-    return np.zeros(slide.size) if model.grooves is None else model.grooves.slope(slide)
-
-
-def _divide_by_pressure(traction, pressure) -> np.ndarray:
-    """Return tractions (k, p) as fractions of the pressures (p,) of points; zero for open points."""
-    return np.divide(traction, pressure, out=np.zeros(traction.shape), where=pressure > 0)
+        traction = np.abs(friction - slope * normal)
+    else:
+        traction = np.maximum(normal + slope * friction, 0.0)
+    weight = np.divide(traction, pressure, out=np.zeros(slip.shape), where=pressure > 0)
+    return _PointSlip(slip, weight, motion.is_closed)
 
 
 def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, float]:
@@ -354,20 +342,13 @@ def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, f
     The samples of the histories contain every reversal. Only the slope of grooves varies between them.
     load: normal load [N] to which the tractions are related.
     """
-    slope = _slope_of_grooves(model, cycle.slide)
-    traction = _compute_wearing_traction(model, slope, cycle.load, cycle.force)
-    weight = _divide_by_pressure(traction[:, None], np.array([load]))
-    slip = _PointSlip(cycle.slip[:, None], weight)
-    path = float(slip.path[0])
+    slip, force, loads = (row[:, None] for row in (cycle.slip, cycle.force, cycle.load))
+    points = _make_point_slip(model, cycle, slip, force, np.array([load]), loads)
+    path = float(points.path[0])
     if model.grooves is None or not path > 0:
         return path, 0.0
-    coarse = float(slip.integrate_path(np.arange(0, len(weight), 2))[0])
+    coarse = float(points.integrate_path(np.arange(0, len(slip), 2))[0])
     return path, abs(path - coarse) / path
-
-
-def _spread_over_nodes(model, patch, path: float) -> np.ndarray:
-    """Return one path [m] at all nodes, (m,) or (s, m)."""
-    return np.full(nodal_areas(model.patch, patch.pieces.interface).shape, path)
 
 
 def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
@@ -379,11 +360,11 @@ def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
     is_last = _is_in_last_cycle(model, window)
     slips = window.extra.get("slips", window.extra["slides"])[is_last]
     forces = window.extra["forces"][is_last]
-    traction = _compute_wearing_traction(model, 0.0, np.broadcast_to(loads, slips.shape), forces)
-    slip = _PointSlip(slips, _divide_by_pressure(traction, loads))
-    nearest = _find_nearest_contact(patch.strips.offsets, loads > 0)
-    path = np.repeat(slip.path[nearest, None], patch.x.size, axis=1)
-    return path, slip.estimate_reversal_error(loads)
+    cycle = _select_last_cycle(model, window, patch.pressure.load)
+    points = _make_point_slip(model, cycle, slips, forces, loads, loads)
+    path = points.path[_find_nearest_contact(patch.strips.offsets, loads > 0)]
+    path = np.repeat(path[:, None], patch.x.size, axis=1)
+    return path, points.estimate_reversal_error(loads)
 
 
 def _integrate_node_slip(model, patch, frames: _NodeFrames) -> tuple[np.ndarray, float]:
@@ -403,25 +384,20 @@ def _integrate_node_slip(model, patch, frames: _NodeFrames) -> tuple[np.ndarray,
         Slip and shear stress of the nodes along the cycle.
     """
     sigma = patch.pressure.sigma_n
-    slope = _slope_of_grooves(model, frames.slide)[:, None]
-    load_ratio = (
-        np.ones(frames.load.size) if model.grooves is None else frames.load / patch.pressure.load
-    )
-    normal = load_ratio[:, None] * sigma
-    traction = _compute_wearing_traction(model, slope, normal, frames.shear_stress)
-    local = frames.slip
-
-    if model.grooves is not None:
+    normal = np.outer(frames.load / patch.pressure.load, sigma)
+    points = _make_point_slip(model, frames, frames.slip, frames.shear_stress, sigma, normal)
+    grooves = model.grooves
+    if grooves is not None:
         # ds/dq, the path along the flank by the relative displacement.
-        path_ratio = np.sqrt(1 + slope**2)
-        steps = integrate_steps(frames.slide, lambda q: np.hypot(1, model.grooves.slope(q)))
+        path_ratio = np.sqrt(1 + grooves.slope(frames.slide)[:, None] ** 2)
+        steps = integrate_steps(frames.slide, lambda q: np.hypot(1, grooves.slope(q)))
         along_flank = np.append(0.0, np.cumsum(steps))[:, None]
-        local = along_flank - (frames.slide[:, None] - local) * path_ratio
-        traction = traction / path_ratio
-
-    slip = _PointSlip(local, _divide_by_pressure(traction, sigma), frames.is_closed)
-    error = slip.estimate_reversal_error(sigma * patch.pieces.interface.weight)
-    return slip.path[_find_nearest_contact(patch.x, sigma > 0)], error
+        elastic = frames.slide[:, None] - frames.slip
+        points = _PointSlip(
+            along_flank - elastic * path_ratio, points.weight / path_ratio, points.is_closed
+        )
+    error = points.estimate_reversal_error(sigma * patch.pieces.interface.weight)
+    return points.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 
 def _find_nearest_contact(x, active) -> np.ndarray:
