@@ -435,37 +435,3 @@ def measure_half_range(time, position, rate) -> float:
     """
     reversals = find_reversal_steps(time, position, rate)
     return float(np.ptp(np.concatenate([position, reversals.position]))) / 2
-
-
-def window_amplitudes(extremes, window: int) -> np.ndarray:
-    """Return half the peak-to-peak output [m] of each window, oldest first.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
-    window : int
-        Number of cycles per window. An incomplete window at the start is ignored, unless it is the only
-        one.
-    """
-    count = len(extremes) // window
-    if count == 0:
-        return np.array([(extremes[:, 1].max() - extremes[:, 0].min()) / 2])
-    complete_windows = extremes[len(extremes) - count * window :].reshape(count, window, 2)
-    return (complete_windows[:, :, 1].max(axis=1) - complete_windows[:, :, 0].min(axis=1)) / 2
-
-
-def window_end_values(extremes, phasors, window: int) -> ArrayPair:
-    """Return amplitude [m] and phasor [m] of the last cycle of each window.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
-    phasors : (c,)
-        Phasor of each cycle [m].
-    window : int
-        Number of cycles per window.
-    """
-    last_cycles = np.arange(len(phasors) - 1, -1, -window)[::-1]
-    return (extremes[last_cycles, 1] - extremes[last_cycles, 0]) / 2, phasors[last_cycles]

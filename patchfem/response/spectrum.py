@@ -7,7 +7,7 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
-from .measures import ArrayPair, Values
+from .measures import Values
 
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
@@ -18,8 +18,8 @@ GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a st
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
-def harmonic_weights(time, omega: float) -> ArrayPair:
-    """Return the weights of values and rates in a Fourier coefficient of a piecewise cubic motion.
+def motion_harmonic(time, value, rate, omega: float) -> complex:
+    """Return the Fourier coefficient of the piecewise cubic motion through samples.
 
     With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
     the fourth derivative.
@@ -27,45 +27,21 @@ def harmonic_weights(time, omega: float) -> ArrayPair:
     Parameters
     ----------
     time : (k,)
-        Times of the samples [s], at any spacing.
+        Times [s], at any spacing.
+    value, rate : (k,)
+        Samples of a motion and of its rate.
     omega : float
         Angular frequency [rad/s].
-
-    Returns
-    -------
-    tuple
-        Weights of the values [1] and of the rates [s], (k,) each.
     """
     step = np.diff(time)
-    uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    # for equal steps, the phase factors of the Gauss points are the same in each step
-    length = step.mean(keepdims=True) if uniform else step
+    rise = np.diff(value)
+    # The cubic of a step is its chord plus s (1 - s) (a (1 - s) + b s), with the excess slopes a and b of its ends.
+    first_excess = rate[:-1] * step - rise
+    last_excess = rise - rate[1:] * step
     s = GAUSS_POINTS[:, None]
-    gauss = GAUSS_WEIGHTS[:, None] * np.exp(-1j * omega * s * length)
-    phases = 2 / (time[-1] - time[0]) * step * np.exp(-1j * omega * time[:-1])
-    value_weights = np.zeros(len(time), complex)
-    value_weights[:-1] = (gauss * (1 - 3 * s**2 + 2 * s**3)).sum(axis=0) * phases
-    value_weights[1:] += (gauss * (3 * s**2 - 2 * s**3)).sum(axis=0) * phases
-    rate_weights = np.zeros(len(time), complex)
-    rate_weights[:-1] = (gauss * (s - 2 * s**2 + s**3)).sum(axis=0) * step * phases
-    rate_weights[1:] += (gauss * (s**3 - s**2)).sum(axis=0) * step * phases
-    return value_weights, rate_weights
-
-
-def motion_harmonic(time, value, rate, omega: float):
-    """Return the Fourier coefficient of the piecewise cubic motion through samples.
-
-    Parameters
-    ----------
-    time : (k,)
-        Times [s], at any spacing.
-    value, rate : (k,) or (k, n)
-        Samples of one motion or of n motions, and their rates.
-    omega : float
-        Angular frequency [rad/s].
-    """
-    value_weights, rate_weights = harmonic_weights(time, omega)
-    return value_weights @ value + rate_weights @ rate
+    motion = value[:-1] + s * (rise + (1 - s) * ((1 - s) * first_excess + s * last_excess))
+    phases = np.exp(-1j * omega * (time[:-1] + s * step))
+    return 2 / (time[-1] - time[0]) * np.sum(GAUSS_WEIGHTS @ (motion * phases) * step)
 
 
 def differentiate_harmonic(harmonic, values, time, omega: float):
@@ -75,9 +51,9 @@ def differentiate_harmonic(harmonic, values, time, omega: float):
 
     Parameters
     ----------
-    harmonic : complex or (n,)
+    harmonic : complex
         Coefficient of the motion.
-    values : (k,) or (k, n)
+    values : (k,)
         Samples of the motion.
     time : (k,)
         Times over whole cycles [s].
@@ -96,8 +72,8 @@ def acceleration_harmonic(time, value, rate, omega: float):
     ----------
     time : (k,)
         Times over whole cycles [s].
-    value, rate : (k,) or (k, n)
-        Displacements [m] and velocities [m/s] of one motion or of n motions.
+    value, rate : (k,)
+        Displacements [m] and velocities [m/s].
     omega : float
         Angular frequency [rad/s].
     """
