@@ -77,21 +77,13 @@ class LastCycles:
         return self.window.time[-1] - self.window.time[0]
 
     @cached_property
-    def has_full_cycle(self) -> bool:
-        """Whether the window contains complete cycles of the drive."""
-        return drive_sizes.has_full_cycle(self.span, self.drive)
-
-    @cached_property
     def slip_measures(self) -> Values:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
         window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-        values = compute_slip_measures(window, self.drive, steps)
-        if not self.is_sine:
-            values.pop("slip_start_phase", None)
-        return values
+        return compute_slip_measures(window, self.drive, steps)
 
     @cached_property
     def reversals(self) -> list[tuple[Reversal, ...]]:
@@ -122,12 +114,12 @@ class LastCycles:
 
     @cached_property
     def acceleration_measures(self) -> Values:
-        """Harmonic measures of the acceleration as a dict; empty unless the drive ends as a sinusoid.
+        """Harmonic measures of the acceleration as a dict; empty without a complete cycle.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
         """
-        if not (self.is_sine and self.has_full_cycle):
+        if not drive_sizes.has_full_cycle(self.span, self.drive):
             return {}
         return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
@@ -149,7 +141,9 @@ class LastCycles:
         return measures
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure; None if it has none."""
+        """Return the value of a measure; None if it has none, as one of a sine under another drive."""
+        if row.has("sine") and not self.is_sine:
+            return None
         if isinstance(row.function, str):
             return getattr(self, row.function).get(row.name)
         return row.function(self)
