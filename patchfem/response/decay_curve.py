@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .errors import MAX_ORDER, convergence_error
 from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
@@ -93,16 +94,16 @@ class DecayCurve(NamedTuple):
         return np.where(inside, interpolated, np.nan)
 
     def add_change(self, coarse: "DecayCurve", reference: "DecayCurve") -> "DecayCurve":
-        """Return the curve with its errors increased by the change from one curve to another at the same amplitudes.
+        """Return the curve with the errors that follow from the change of a coarser run at the same amplitudes.
 
-        The error is infinite where either curve has no value.
+        They are of second order, and infinite where either curve has no value.
         """
         errors = {}
         for name in ("frequency", "damping"):
             curves = [curve.interpolate(name, self.amplitude) for curve in (coarse, reference)]
-            change = np.abs(curves[0] - curves[1])
+            added = convergence_error(curves[0] - curves[1], order=MAX_ORDER)
             error = getattr(self, f"{name}_error")
-            errors[f"{name}_error"] = error + np.where(np.isnan(change), np.inf, change)
+            errors[f"{name}_error"] = error + np.where(np.isnan(added), np.inf, added)
         return self._replace(**errors)
 
 
