@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
@@ -223,11 +224,9 @@ def _invert_normal_matrix(jacobian, norms) -> tuple[np.ndarray, np.ndarray]:
     """
     if not norms.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, values, directions = np.linalg.svd(jacobian / norms, full_matrices=True)
-    values = np.append(values, np.zeros(directions.shape[0] - values.size))
-    is_known = values > MIN_SINGULAR_VALUE * values[0]
-    inverse_root = directions[is_known].T / values[is_known] / norms[:, None]
-    return inverse_root @ inverse_root.T, directions[~is_known]
+    scaled = jacobian / norms
+    inverse_root = np.linalg.pinv(scaled, rcond=MIN_SINGULAR_VALUE) / norms[:, None]
+    return inverse_root @ inverse_root.T, null_space(scaled, rcond=MIN_SINGULAR_VALUE).T
 
 
 def _list_unknown_directions(model: UnitCubeResidual, u, free, changes) -> np.ndarray:

@@ -133,12 +133,9 @@ class LastCycles:
         """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
-        measures = stationary.random_response_measures(self.window, self.drive)
-        if self.load is None:
-            names = [name for name in measures if name.startswith("friction_power")]
-            for name in names:
-                del measures[name]
-        return measures
+        return stationary.random_response_measures(
+            self.window, self.drive, has_friction=self.load is not None
+        )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
         """Return the value of a measure; None if it has none, as one of a sine under another drive."""

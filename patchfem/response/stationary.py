@@ -79,7 +79,7 @@ def make_record(window, drive) -> Record:
     )
 
 
-def random_response_measures(window, drive) -> Values:
+def random_response_measures(window, drive, *, has_friction: bool = False) -> Values:
     """Return the measures of the response to a stationary random drive, by name."""
     record = make_record(window, drive)
     measures = {}
@@ -93,7 +93,7 @@ def random_response_measures(window, drive) -> Values:
     if fit is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *fit):
             measures |= {name: value, f"{name}_scatter": scatter}
-    if "ledger" in window.extra:
+    if has_friction and "ledger" in window.extra:
         measures["friction_power"], measures["friction_power_scatter"] = mean_power(
             window.time, window.extra["ledger"][0]
         )
