@@ -209,11 +209,11 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         )
     # The factor includes a step that ends at the end of a cycle except for round-off.
     near = period * (1 + 1e-9)
-    first = time <= time[0] + near
-    last = time >= time[-1] - near
-    first_mean = np.abs(np.trapezoid(forces[first], time[first], axis=0)) / period
-    last_mean = np.abs(np.trapezoid(forces[last], time[last], axis=0)) / period
-    return bool(np.any(last_mean - first_mean > tolerance * largest_force))
+    first, last = (
+        np.abs(np.trapezoid(forces[is_inside], time[is_inside], axis=0)) / period
+        for is_inside in (time <= time[0] + near, time >= time[-1] - near)
+    )
+    return bool(np.any(last - first > tolerance * largest_force))
 
 
 def find_ringing(solution, measures: Measures, limits: tuple[float, float], drive) -> float:

@@ -144,10 +144,9 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
         return classes
     change = np.abs(amplitudes[:, -1] - amplitudes[:, -2])
     scale = tolerance * np.abs(amplitudes[:, -1]) + floor
-    if amplitudes.shape[1] == 2:
-        classes[change <= scale] = STEADY_CLASS
-        return classes
-    remainder = np.abs(geometric_remainders(amplitudes[:, -3:]))
+    remainder = np.full(change.shape, np.nan)
+    if amplitudes.shape[1] > 2:
+        remainder = np.abs(geometric_remainders(amplitudes[:, -3:]))
     has_limit = np.isfinite(remainder)
     is_increasing = _increases_steadily(amplitudes)
     is_growing = is_increasing & (change > 0.05 * scale)  # slower growth counts as steady
@@ -438,8 +437,7 @@ def slip_period(time, rate) -> float:
 def _increases_steadily(amplitudes) -> np.ndarray:
     """Return whether the amplitudes of the last windows (n, w) grow by similar increments."""
     steps = np.diff(amplitudes[:, -6:], axis=1)
-    if amplitudes.shape[1] < 4:
-        return np.zeros(len(amplitudes), bool)
-    is_increasing = np.all(steps > 0, axis=1)
-    ratios = steps[:, 1:] / np.where(steps[:, :-1] > 0, steps[:, :-1], 1.0)
-    return is_increasing & np.all((ratios > 0.5) & (ratios < 3), axis=1)
+    before = steps[:, :-1]
+    after = steps[:, 1:]
+    is_similar = (before > 0) & (after > 0.5 * before) & (after < 3 * before)
+    return is_similar.all(axis=1) & (amplitudes.shape[1] > 3)

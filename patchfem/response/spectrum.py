@@ -10,7 +10,6 @@ import numpy as np
 from .measures import Values
 
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
-READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
@@ -81,16 +80,6 @@ def acceleration_harmonic(time, value, rate, omega: float):
     return differentiate_harmonic(velocity, rate, time, omega)
 
 
-def _find_last_segment(window, drive):
-    """Return the segment of a drive at the end of a window, a sinusoid."""
-    return [part for part in drive.segments if part.start < window.time[-1]][-1]
-
-
-def _drive_harmonic(segment) -> complex:
-    """Return the Fourier coefficient -i a exp(i (phase - omega start)) [m s-2] of a segment of a drive."""
-    return -1j * segment.amplitude * np.exp(1j * (segment.phase - segment.omega * segment.start))
-
-
 def absolute_harmonic(window, drive, n: int) -> complex:
     """Return the n-th harmonic [m s-2] of the absolute acceleration at the sensor.
 
@@ -103,11 +92,15 @@ def absolute_harmonic(window, drive, n: int) -> complex:
     n : int
         Number of the harmonic, from 1.
     """
-    segment = _find_last_segment(window, drive)
+    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
     displacement = window.extra.get("sensor", window.output)
     rate = window.extra.get("sensor_rate", window.output_rate)
     harmonic = acceleration_harmonic(window.time, displacement, rate, n * segment.omega)
-    return harmonic + _drive_harmonic(segment) if n == 1 and drive.moving else harmonic
+    if n == 1 and drive.moving:
+        # The acceleration a sin(omega (t - start) + phase) of the base is added.
+        phase = segment.phase - segment.omega * segment.start
+        harmonic -= 1j * segment.amplitude * np.exp(1j * phase)
+    return harmonic
 
 
 def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
@@ -115,10 +108,8 @@ def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
-    return (
-        float(abs(absolute_harmonic(window, drive, 1))),
-        float(abs(absolute_harmonic(window, drive, 3))),
-    )
+    first, third = (float(abs(absolute_harmonic(window, drive, n))) for n in (1, 3))
+    return first, third
 
 
 def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> Values:
@@ -157,11 +148,6 @@ def read_instrument(
         1/(1 + sqrt2 s + s^2) with s = i f/cutoff, for N_FILTER_HARMONICS harmonics.
     cutoff : float, optional
         Cutoff frequency of the filter [Hz].
-
-    Raises
-    ------
-    ValueError
-        If the kind is not in READINGS.
     """
     if kind == "peak":
         return peak
@@ -170,8 +156,6 @@ def read_instrument(
         return float(np.sqrt(np.trapezoid(window.acceleration**2, window.time) / span))
     if kind == "fundamental":
         return abs(absolute_harmonic(window, drive, 1))
-    if kind != "lowpass":
-        raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
     n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
     filtered_harmonics = np.array([absolute_harmonic(window, drive, k) for k in n]) / (
