@@ -170,7 +170,7 @@ def compute_intervals(
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
     half_width = quantile * np.sqrt(np.diag(covariance))
-    ends = np.full((n, 2), np.nan)
+    offsets = np.full((2, n), np.nan)
     open_ends = np.zeros((n, 2), bool)
     methods = np.full(n, "none", object)
     for k in np.flatnonzero(has_effect & ~is_unknown):
@@ -194,10 +194,8 @@ def compute_intervals(
         if open_ends[k].all():
             methods[k] = "none"
             continue
-        for side, end in enumerate((u[k] - steps[0], u[k] + steps[1])):
-            point = u.copy()
-            point[k] = end
-            ends[k, side] = model.space.to_values(point)[k]
+        offsets[:, k] = steps
+    ends = [model.space.to_values(u - offsets[0]), model.space.to_values(u + offsets[1])]
 
     covariance[is_unknown] = np.nan
     covariance[:, is_unknown] = np.nan
@@ -205,7 +203,7 @@ def compute_intervals(
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(scale, scale)
     return FitIntervals(
-        ends=ends,
+        ends=np.transpose(ends),
         methods=tuple(methods),
         open_ends=open_ends,
         correlation=correlation,
