@@ -244,7 +244,7 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapo
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-ONE = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
+UNIT_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
 # Order of convergence of values that are interpolated by cubics between samples.
 CUBIC_CONVERGENCE_ORDER = 4.0
 ROWS = (
@@ -284,7 +284,7 @@ ROWS = (
         "sum of the exchanged energy and the largest stored energy",
         lambda s: energy_balance(s.run_energies),
         group="energy",
-        larger_term=ONE,
+        larger_term=UNIT_TERM,
         flags="error",
         friction_scale=lambda _: 0.0,
     ),
@@ -339,7 +339,7 @@ ROWS = (
         "slip_measures",
         0.35,
         group="friction",
-        larger_term=ONE,
+        larger_term=UNIT_TERM,
         flags="interface level",
     ),
     MeasureDefinition(
@@ -478,7 +478,7 @@ ROWS = (
         lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
         4.0,
         group="friction",
-        larger_term=ONE,
+        larger_term=UNIT_TERM,
     ),
     MeasureDefinition(
         "relative_displacement_amplitude_steady",

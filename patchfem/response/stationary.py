@@ -80,7 +80,17 @@ def make_record(window, drive) -> Record:
 
 
 def random_response_measures(window, drive, *, has_friction: bool = False) -> Values:
-    """Return the measures of the response to a stationary random drive, by name."""
+    """Return the measures of the response to a stationary random drive, by name.
+
+    Parameters
+    ----------
+    window : Response
+        Record without its initial transient.
+    drive
+        Random drive with its `band` [Hz].
+    has_friction : bool
+        Whether the power of friction is one of the measures.
+    """
     record = make_record(window, drive)
     measures = {}
     for name, values, samples in (
