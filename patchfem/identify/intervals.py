@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
@@ -169,7 +170,7 @@ def compute_intervals(
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
     half_width = quantile * np.sqrt(np.diag(covariance))
-    ends = np.full((n, 2), np.nan)
+    offsets = np.full((2, n), np.nan)
     open_ends = np.zeros((n, 2), bool)
     methods = np.full(n, "none", object)
     for k in np.flatnonzero(has_effect & ~is_unknown):
@@ -193,10 +194,8 @@ def compute_intervals(
         if open_ends[k].all():
             methods[k] = "none"
             continue
-        for side, end in enumerate((u[k] - steps[0], u[k] + steps[1])):
-            point = u.copy()
-            point[k] = end
-            ends[k, side] = model.space.to_values(point)[k]
+        offsets[:, k] = steps
+    ends = [model.space.to_values(u - offsets[0]), model.space.to_values(u + offsets[1])]
 
     covariance[is_unknown] = np.nan
     covariance[:, is_unknown] = np.nan
@@ -204,7 +203,7 @@ def compute_intervals(
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(scale, scale)
     return FitIntervals(
-        ends=ends,
+        ends=np.transpose(ends),
         methods=tuple(methods),
         open_ends=open_ends,
         correlation=correlation,
@@ -223,11 +222,9 @@ def _invert_normal_matrix(jacobian, norms) -> tuple[np.ndarray, np.ndarray]:
     """
     if not norms.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, values, directions = np.linalg.svd(jacobian / norms, full_matrices=True)
-    values = np.append(values, np.zeros(directions.shape[0] - values.size))
-    is_known = values > MIN_SINGULAR_VALUE * values[0]
-    inverse_root = directions[is_known].T / values[is_known] / norms[:, None]
-    return inverse_root @ inverse_root.T, directions[~is_known]
+    scaled = jacobian / norms
+    inverse_root = np.linalg.pinv(scaled, rcond=MIN_SINGULAR_VALUE) / norms[:, None]
+    return inverse_root @ inverse_root.T, null_space(scaled, rcond=MIN_SINGULAR_VALUE).T
 
 
 def _list_unknown_directions(model: UnitCubeResidual, u, free, changes) -> np.ndarray:

@@ -184,9 +184,9 @@ class Problem:
         trials = []
         if max_points > 1 or not given:
             trials = list(make_space_filling_points(N_TRIALS_PER_VALUE * n, n))
-        costs = {tuple(point): model.sum_of_squares(point) for point in trials}
-        trials = [point for point in trials if np.isfinite(costs[tuple(point)])]
-        points = given + sorted(trials, key=lambda point: costs[tuple(point)])
+        costs = np.array([model.sum_of_squares(point) for point in trials])
+        order = np.argsort(costs, kind="stable")
+        points = given + [trials[k] for k in order if np.isfinite(costs[k])]
         if not points:
             raise NotConverged(
                 f"the model failed at all {model.counts.evaluations} starting points of the search: {model.counts.reason}"

@@ -274,19 +274,16 @@ def _convert_to_displacement(half_cycles: HalfCycles, order: int) -> HalfCycles:
     half_periods = fit_slopes(half_cycles.middle, half_cycles.middle_noise)
     log_sizes = np.log(half_cycles.size)
     decrements = fit_slopes(log_sizes, half_cycles.size_noise / half_cycles.size)
-    omega = _extend_to_ends(np.hypot(np.pi, decrements.slope) / half_periods.slope)
+    omega = np.hypot(np.pi, decrements.slope) / half_periods.slope
     # The half-width of a 95 % interval is about two standard deviations.
-    omega_noise = order * _extend_to_ends(half_periods.error / half_periods.slope) / 2
+    omega_noise = order * half_periods.error / half_periods.slope / 2
+    # Odd reflection extrapolates linearly from the inner half cycles to the first and the last one.
+    omega, omega_noise = np.pad(
+        [omega, omega_noise], [(0, 0), (1, 1)], "reflect", reflect_type="odd"
+    )
     size = half_cycles.size / omega**order
     relative_noise = np.hypot(half_cycles.size_noise / half_cycles.size, omega_noise)
     return half_cycles._replace(size=size, size_noise=relative_noise * size)
-
-
-def _extend_to_ends(values: np.ndarray) -> np.ndarray:
-    """Return values (n,) at inner half cycles extrapolated linearly to the first and the last half cycle, (n + 2,)."""
-    first = 2 * values[0] - values[min(1, values.size - 1)]
-    last = 2 * values[-1] - values[max(-2, -values.size)]
-    return np.concatenate([[first], values, [last]])
 
 
 def identify_decay_modes(values: dict[str, np.ndarray], begin: float | None = None) -> ListedModes:

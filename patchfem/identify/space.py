@@ -29,8 +29,8 @@ class SearchSpace(NamedTuple):
 
     def _scale(self, values) -> np.ndarray:
         """Return the parameters (n,), or their logarithms where the scale is logarithmic."""
-        values = np.asarray(values, float)
-        return np.where(self.is_log, np.log(np.where(self.is_log, values, 1.0)), values)
+        scaled = np.array(values, float)
+        return np.log(scaled, out=scaled, where=self.is_log)
 
     @property
     def _span(self) -> np.ndarray:
@@ -40,8 +40,8 @@ class SearchSpace(NamedTuple):
     def to_values(self, u) -> np.ndarray:
         """Return the parameters (n,) of a point u of the unit cube, exactly at the bounds."""
         u = np.asarray(u, float)
-        scaled = self._scale(self.low) + self._span * u
-        inside = np.where(self.is_log, np.exp(np.where(self.is_log, scaled, 0.0)), scaled)
+        inside = self._scale(self.low) + self._span * u
+        np.exp(inside, out=inside, where=self.is_log)
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def to_unit_cube(self, values) -> np.ndarray:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .errors import MAX_ORDER, convergence_error
 from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
@@ -75,43 +76,27 @@ class DecayCurve(NamedTuple):
         """Return the curve at selected points."""
         return DecayCurve(*(column[selection] for column in self))
 
-    def interpolate(self, amplitudes) -> "DecayCurve":
-        """Interpolate the curve at given amplitudes (k,) [m]; NaN outside its range.
-
-        Monotone cubics in the logarithm of the amplitude are used. Their difference from linear
-        interpolation is added to the errors.
-        """
-        if not self.amplitude.size:
-            return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(
-                amplitude=np.asarray(amplitudes)
-            )
+    def interpolate(self, name: str, amplitudes) -> np.ndarray:
+        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m]; NaN outside the range of the curve."""
         knots, indices = np.unique(np.log(self.amplitude), return_index=True)
+        if not knots.size:
+            return np.full(len(amplitudes), np.nan)
         x = np.log(amplitudes)
-        curve = self.select(indices)
         inside = (x > knots[0] - RANGE_TOL) & (x < knots[-1] + RANGE_TOL)
-        columns = {name: np.interp(x, knots, getattr(curve, name)) for name in DecayCurve._fields}
-        for name in ("frequency", "damping"):
-            linear = columns[name]
-            columns[name] = _interpolate_monotone(x, knots, getattr(curve, name))
-            columns[f"{name}_error"] = columns[f"{name}_error"] + np.abs(columns[name] - linear)
-        return DecayCurve(
-            **{name: np.where(inside, column, np.nan) for name, column in columns.items()}
-        )._replace(amplitude=np.asarray(amplitudes))
+        return np.where(inside, np.interp(x, knots, getattr(self, name)[indices]), np.nan)
 
-    def add_difference(self, first_curve: "DecayCurve", second_curve: "DecayCurve") -> "DecayCurve":
-        """Return the curve with its errors increased by the differences between two other curves.
+    def add_change(self, coarse: "DecayCurve", reference: "DecayCurve") -> "DecayCurve":
+        """Return the curve with the errors that follow from the change of a coarser run at the same amplitudes.
 
-        The error is infinite where either curve has no value.
+        They are of second order, and infinite where either curve has no value.
         """
-
-        def increased_error(name: str) -> np.ndarray:
-            """Return the error of a quantity plus its difference between the two curves."""
-            change = np.abs(getattr(first_curve, name) - getattr(second_curve, name))
-            return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
-
-        return self._replace(
-            frequency_error=increased_error("frequency"), damping_error=increased_error("damping")
-        )
+        errors = {}
+        for name in ("frequency", "damping"):
+            curves = [curve.interpolate(name, self.amplitude) for curve in (coarse, reference)]
+            added = convergence_error(curves[0] - curves[1], order=MAX_ORDER)
+            error = getattr(self, f"{name}_error")
+            errors[f"{name}_error"] = error + np.where(np.isnan(added), np.inf, added)
+        return self._replace(**errors)
 
 
 def locate_reversals(time, position, speed) -> ArrayPair:
@@ -160,27 +145,16 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     last_range = float(np.ptp(position[time >= time[-1] - period * (1 + STEP_END_TOL)]))
     if last_range <= MIN_HALF_CYCLE * np.ptp(position):
         return last_range / 2
-    # The loop runs backwards from the end of the motion. It collects reversals, and tracks the direction and
-    # the extreme position since the last one.
-    reversal_positions = []
-    direction = 0
-    farthest = float(position[-1])
-
+    # Turning points backwards from the end of the motion, where the first one is not a reversal.
+    turns = [float(position[-1])]
     for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
-        if direction == 0:
-            if abs(reversal - farthest) > MAX_RIPPLE * last_range:
-                direction = int(np.sign(reversal - farthest))
-                farthest = reversal
-        elif direction * (reversal - farthest) > 0:
-            farthest = reversal
-        elif direction * (farthest - reversal) > MAX_RIPPLE * last_range:
-            reversal_positions.append(farthest)
-            farthest = reversal
-            direction = -direction
-
-        if len(reversal_positions) == 3:
-            return float(np.abs(np.diff(reversal_positions)).max()) / 2
-
+        goes_on = len(turns) > 1 and (reversal - turns[-1]) * (turns[-1] - turns[-2]) > 0
+        if goes_on:
+            turns[-1] = reversal
+        elif abs(reversal - turns[-1]) > MAX_RIPPLE * last_range:
+            turns.append(reversal)
+        if len(turns) == 5:
+            return float(np.abs(np.diff(turns[1:4])).max()) / 2
     return None
 
 
@@ -257,13 +231,13 @@ def _select_overlapping_spans(span) -> np.ndarray:
 
 
 def _smooth_values(values, indices, span) -> np.ndarray:
-    """Return the midpoint values of parabolas that are fitted over spans around each index."""
+    """Return the midpoint values of least-squares parabolas that are fitted over spans around each index."""
     smoothed = np.empty(indices.size)
     for m in np.unique(span):
         has_span = span == m
-        smoothed[has_span] = sliding_window_view(values, 2 * m + 1)[
-            indices[has_span] - m
-        ] @ _parabola_weights(m)
+        weights = np.linalg.pinv(np.vander(np.arange(-m, m + 1), 3))[-1]
+        windows = sliding_window_view(values, 2 * m + 1)
+        smoothed[has_span] = windows[indices[has_span] - m] @ weights
     return smoothed
 
 
@@ -302,61 +276,43 @@ def fit_slopes(values, noise) -> Slopes:
     Slopes
         Slopes at the n - 2 inner points.
     """
+    # Slopes of the least-squares lines over 2 m + 1 values and their standard deviations, one row for each span.
     count = values.size - 2
-    slope = np.empty(count)
-    spread = np.zeros(count)
-    bias = np.full(count, np.nan)
-    # change of the slope from the next shorter span to the current one, minus its noise
-    shorter_change = np.full(count, np.nan)
-    span = np.zeros(count, int)
-    is_growing = np.ones(count, bool)
-    shorter_fits: list[ArrayPair] = []
-
-    for m in SPAN_LENGTHS:
-        if 2 * m >= values.size or not is_growing.any():
-            break
-
-        # Slope of the least-squares line over 2 m + 1 values, and its standard deviation.
+    spans = np.array([m for m in SPAN_LENGTHS if 2 * m < values.size])
+    # The last row is that of a span that exists nowhere; it follows the longest span and precedes the shortest one.
+    slopes, noises = np.full((2, spans.size + 1, count), np.nan)
+    for k, m in enumerate(spans):
         offsets = np.arange(-m, m + 1)
         weight = offsets / np.sum(offsets**2)
         inside = slice(m - 1, count - m + 1)
-        candidate, candidate_noise = np.full((2, count), np.nan)
-        candidate[inside] = np.correlate(values, weight, "valid")
-        candidate_noise[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
+        slopes[k, inside] = np.correlate(values, weight, "valid")
+        noises[k, inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
 
-        # The noise of a difference of two nested fits has the difference of their variances.
-        exists = is_growing & ~np.isnan(candidate)
-        is_consistent = exists.copy()
-        for shorter_slope, shorter_noise in shorter_fits:
-            excess = np.sqrt(np.maximum(shorter_noise**2 - candidate_noise**2, 0.0))
-            limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(shorter_slope)
-            is_consistent &= ~(np.abs(candidate - shorter_slope) > limit)
+    # The noise of a difference of two nested fits has the difference of their variances.
+    is_accepted = ~np.isnan(slopes)
+    for k in range(1, spans.size):
+        excess = np.sqrt(np.maximum(noises[:k] ** 2 - noises[k] ** 2, 0.0))
+        limits = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
+        differs = (np.abs(slopes[k] - slopes[:k]) > limits).any(axis=0)
+        is_accepted[k] &= is_accepted[k - 1] & ~differs
+    longest = is_accepted.sum(axis=0) - 1
+    points = np.arange(count)
+    slope = slopes[longest, points]
+    spread = noises[longest, points]
+    span = spans[longest]
 
-        # A span that is too long shows the bias b m^2 of the longest accepted one.
-        change = np.abs(candidate - slope)
-        stops = exists & ~is_consistent
-        bias[stops] = change[stops]
-        is_longer = is_consistent & (span > 0)
-        shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
-        is_noisy = stops & (spread > 0)
-        bias[is_noisy] /= (m / span[is_noisy]) ** 2 - 1
-
-        slope[is_consistent] = candidate[is_consistent]
-        spread[is_consistent] = candidate_noise[is_consistent]
-        span[is_consistent] = m
-        is_growing = is_consistent
-        shorter_fits.append((candidate, candidate_noise))
-
-    lacks_longer_span = np.isnan(bias)
-    bias[lacks_longer_span] = shorter_change[lacks_longer_span]
+    # A span that is too long shows the bias b m^2 of the longest accepted one.
+    bias = np.abs(slopes[longest + 1, points] - slope)
+    next_span = np.append(spans, 0)[longest + 1]
+    bias /= np.where(spread > 0, (next_span / span) ** 2 - 1, 1.0)
+    shorter_change = np.abs(slopes[longest - 1, points] - slope) - noises[longest - 1, points]
+    bias = np.where(np.isnan(bias), np.maximum(shorter_change, 0.0), bias)
     # At the first and the last inner point, only the shortest span exists. There, the bias of values without
     # noise is estimated from the second difference.
-    is_unknown = np.isnan(bias)
-    curvature = np.abs(np.diff(values, 2)) / 2
-    bias[is_unknown] = np.where(spread > 0, 0.0, curvature)[is_unknown]
-    return Slopes(
-        slope, INTERVAL_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope), span
-    )
+    curvature = np.where(spread > 0, 0.0, np.abs(np.diff(values, 2)) / 2)
+    bias = np.where(np.isnan(bias), curvature, bias)
+    error = INTERVAL_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
+    return Slopes(slope, error, span)
 
 
 def _add_damping_error(curve: DecayCurve) -> DecayCurve:
@@ -379,8 +335,7 @@ def _add_damping_error(curve: DecayCurve) -> DecayCurve:
 
 def smooth_slopes(values, noise) -> np.ndarray:
     """Return the fitted slopes (n,) of values per half cycle; end values repeat their neighbours."""
-    slope = fit_slopes(values, noise).slope
-    return np.concatenate([slope[:1], slope, slope[-1:]])
+    return np.pad(fit_slopes(values, noise).slope, 1, "edge")
 
 
 def _limit_noise(noise, values) -> np.ndarray:
@@ -397,23 +352,3 @@ def _limit_noise(noise, values) -> np.ndarray:
     last = np.clip(middle + NOISE_HALF_WIDTH, 0, variance.size)
     sums = np.concatenate([[0.0], np.cumsum(variance)])
     return np.sqrt(np.maximum(noise**2, (sums[last] - sums[first]) / np.maximum(last - first, 1)))
-
-
-def _parabola_weights(half_width: int) -> np.ndarray:
-    """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
-    x = np.arange(-half_width, half_width + 1)
-    if half_width <= 1:
-        return (x == 0) * 1.0
-    x2 = x**2
-    return (np.sum(x2**2) - np.sum(x2) * x2) / (x.size * np.sum(x2**2) - np.sum(x2) ** 2)
-
-
-def _interpolate_monotone(x, knots, values) -> np.ndarray:
-    """Interpolate values (n,) at knots (n,) to positions x (k,) by monotone cubics.
-
-    The method is that of Fritsch and Butland (1984); x is clipped to the range of the knots.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    x = np.clip(x, knots[0], knots[-1])
-    return PchipInterpolator(knots, values)(x) if knots.size > 1 else np.interp(x, knots, values)

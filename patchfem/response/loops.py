@@ -290,40 +290,14 @@ def mean_drift(time, slide, rate, period: float) -> float:
     period : float
         Period [s].
     """
-    end = time[-1]
-    start = time[0]
-    cycles = (end - start) / period
+    cycles = (time[-1] - time[0]) / period
     if cycles < 1.5:
         return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
-    first = time_mean(time, slide, rate, start, start + period)
-    last_begin = end - period
-    last = time_mean(time, slide, rate, last_begin, last_begin + period)
-    return float(last - first) / (cycles - 1)
 
-
-def time_mean(time, value, rate, begin: float, end: float) -> float:
-    """Return the time average of a quantity on the cubics through its values and rates.
-
-    Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, which is of fourth order at any spacing.
-
-    Parameters
-    ----------
-    time, value, rate : (k,)
-        Samples.
-    begin, end : float
-        Time span [s].
-    """
-    time_tolerance = EVENT_TIME_TOL * (end - begin)
-    span = slice(
-        np.searchsorted(time, begin - time_tolerance),
-        np.searchsorted(time, end + time_tolerance, side="right"),
-    )
-    t = time[span]
-    y = value[span]
-    v = rate[span]
-    step = np.diff(t)
-    y = y - y[0]
-    area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
-    # between the ends of the span and the nearest samples, the value is that of the samples
-    area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (t[0] - begin)
-    return float(value[span][0]) + area / (end - begin)
+    # The cubic of a step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, which is of fourth order at any spacing.
+    step = np.diff(time)
+    y = slide - slide[0]
+    areas = step * (y[1:] + y[:-1]) / 2 + step**2 * (rate[:-1] - rate[1:]) / 12
+    area = np.append(0.0, np.cumsum(areas))
+    first_end, last_begin = np.interp([time[0] + period, time[-1] - period], time, area)
+    return float(area[-1] - last_begin - first_end) / period / (cycles - 1)

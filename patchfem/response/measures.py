@@ -113,11 +113,6 @@ def compute_step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(phase_factor)) / (-1j * omega))
 
 
-def largest_distance(x) -> float:
-    """Return the largest distance [m] between two points of equally spaced samples (k,) (`interpolate_ranges`)."""
-    return float(interpolate_ranges(x[:, None])[0][0])
-
-
 def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Values:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
 
@@ -134,34 +129,37 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     steps_per_cycle : int
         Number of samples per cycle.
     """
-    if largest_distance(window.slide) <= MIN_SLIDE_RANGE:
+    if interpolate_range(window.slide)[0] <= MIN_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
 
     slip = window.slip
-    measures = {"slip_amplitude": largest_distance(slip) / 2}
+    amplitude = interpolate_range(slip)[0] / 2
     # A single sample, or a slip within round-off, counts as stick.
-    if slip.size < 2 or 2 * measures["slip_amplitude"] <= slip_round_off(window):
-        return measures | {"stick_fraction": 1.0}
+    if slip.size < 2 or 2 * amplitude <= slip_round_off(window):
+        return {"slip_amplitude": amplitude, "stick_fraction": 1.0}
 
+    # Excess of the ratio slip/displacement of each step; a step at rest counts as a step without slip.
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
-    last_cycles = (
-        slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
-    )
+    last_cycles = slice(-min(slip.size, cycles * steps_per_cycle + 1), None)
     slip_steps = np.abs(np.diff(slip[last_cycles]))
     slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
-    is_at_rest = slide_steps <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
-    excess = compute_slip_excess(slip_steps, slide_steps, is_at_rest)
+    is_moving = slide_steps > COORDINATE_ROUND_OFF * np.abs(window.slide).max()
+    ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
+    excess = ratio - SLIP_FRACTION
 
     # The excess is known at the midpoints of the steps and linear in between.
     before = excess[:-1]
     after = excess[1:]
-    below = compute_negative_fraction(before, after)
     middles = (time[1:] + time[:-1]) / 2
-    measures["stick_fraction"] = (
-        float(np.average(below, weights=np.diff(middles))) if below.size else float(excess[0] < 0)
-    )
+    stick_fraction = float(excess[0] < 0)
+    if before.size:
+        size = np.maximum(np.abs(before) + np.abs(after), 1e-300)
+        changes = before * after < 0
+        below = np.where(changes, -np.minimum(before, after) / size, np.minimum(before, after) < 0)
+        stick_fraction = float(np.average(below, weights=np.diff(middles)))
+    measures = {"slip_amplitude": amplitude, "stick_fraction": stick_fraction}
 
     onsets = np.flatnonzero((before < 0) & (after >= 0))
     if onsets.size:
@@ -169,30 +167,6 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
         onset_times = middles[onsets] - before[onsets] / rise * np.diff(middles)[onsets]
         measures |= slip_start_measure(2 * np.pi / drive.period * onset_times)
     return measures
-
-
-def compute_slip_excess(slip_steps, slide_steps, is_at_rest) -> np.ndarray:
-    """Return the excess of the ratio slip/displacement of each step over SLIP_FRACTION.
-
-    A step at rest counts as a step without slip.
-
-    Parameters
-    ----------
-    slip_steps, slide_steps : (k, ...)
-        Absolute increments of slip and of relative displacement [m].
-    is_at_rest : (k, ...)
-        Mask of the steps without motion.
-    """
-    ratio = slip_steps / np.where(is_at_rest, 1.0, slide_steps)
-    return np.where(is_at_rest, 0.0, ratio) - SLIP_FRACTION
-
-
-def compute_negative_fraction(before, after) -> np.ndarray:
-    """Return the fraction of each interval in which linearly interpolated values are negative."""
-    rise = np.abs(after - before)
-    low = np.minimum(before, after)
-    high = np.maximum(before, after)
-    return np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
 
 
 def slip_round_off(window: Response) -> float:
@@ -251,92 +225,74 @@ def work_difference(work, loops, jumps: bool = False) -> float:
 
 
 def compute_peak(values) -> float:
-    """Return the largest magnitude of equally spaced samples (k,) (`interpolate_peaks`)."""
-    return float(interpolate_peaks(np.abs(values)[:, None])[0][0])
+    """Return the largest magnitude of equally spaced samples (k,) (`interpolate_peak`)."""
+    return interpolate_peak(np.abs(values))[0]
 
 
-def interpolate_peaks(magnitude) -> ArrayPair:
-    """Return the largest values of n curves, and bounds on the errors due to sampling.
+def interpolate_peak(samples) -> tuple[float, float]:
+    """Return the largest value of a curve, and a bound on its error due to sampling.
 
-    If a curve is smooth, its peak is the vertex of the parabola through the largest sample and its
-    neighbours. A curve is smooth if neighbouring second differences around its largest sample differ by
+    If the curve is smooth, its peak is the vertex of the parabola through the largest sample and its
+    neighbours. It is smooth if neighbouring second differences around its largest sample differ by
     at most a factor of MAX_SMOOTH_RATIO; next to a jump, their signs differ. With a jump at the largest
     sample, the error is the change over one step on the smooth side. With a kink between two samples, it is the
     distance of the largest sample from the crossing of the lines through the samples on both sides.
 
     Parameters
     ----------
-    magnitude : (k, n)
+    samples : (k,)
         Equally spaced samples.
-
-    Returns
-    -------
-    tuple
-        Peaks and errors, (n,) each.
     """
-    columns = np.arange(magnitude.shape[1])
-    last = len(magnitude) - 1
-    largest = magnitude.argmax(axis=0)
-    # The peak beside an end of the window lies on the parabola through its last three samples.
-    middle = np.clip(largest, 1, max(last - 1, 1))
-    samples = magnitude[np.clip(middle + np.arange(-2, 3)[:, None], 0, last), columns]
-    curvatures = samples[:-2] - 2 * samples[1:-1] + samples[2:]
+    largest = int(np.argmax(samples))
+    value = float(samples[largest])
+    last = len(samples) - 1
+    if last < 2:
+        return value, 0.0
 
-    # only second differences of samples inside the window are compared
-    curvatures[0] = np.where(middle >= 2, curvatures[0], curvatures[1])
-    curvatures[2] = np.where(middle <= last - 2, curvatures[2], curvatures[1])
-    is_smooth = curvatures.max(axis=0) * MAX_SMOOTH_RATIO <= curvatures.min(axis=0)
-    left, centre, right = samples[1:4]
-    # The slope at the middle sample vanishes within one step of it.
-    is_peak = is_smooth & (curvatures[1] < 0) & (np.abs(right - left) <= -2 * curvatures[1])
-    is_peak &= last >= 2
-    vertex = centre - (right - left) ** 2 / (8 * np.where(is_peak, curvatures[1], np.inf))
-    value = magnitude[largest, columns]
-    # a larger increase indicates a jump, not a smooth peak
-    is_peak &= vertex < 1.01 * value
+    # The peak beside an end of the window lies on the parabola through its last three samples.
+    middle = min(max(largest, 1), last - 1)
+    left, centre, right = samples[middle - 1 : middle + 2].tolist()
+    curvature = left - 2 * centre + right
+    curvatures = np.diff(samples[max(middle - 2, 0) : middle + 3], 2)
+    if curvatures.max() * MAX_SMOOTH_RATIO <= curvatures.min():
+        # The slope at the middle sample vanishes within one step of it.
+        if curvature < 0 and abs(right - left) <= -2 * curvature:
+            vertex = centre - (right - left) ** 2 / (8 * curvature)
+            # a larger increase indicates a jump, not a smooth peak
+            value = vertex if vertex < 1.01 * value else value
+        return value, 0.0
 
     # Beside a jump or a kink, the largest sample is not the peak.
-    jump = centre - np.maximum(left, right)
-    kink = np.maximum(
-        _extrapolate_to_kink(left, centre, right, samples[4]),
-        _extrapolate_to_kink(right, centre, left, samples[0]),
-    )
-    errors = np.where((middle == largest) & ~is_smooth, np.maximum(jump, kink), 0.0)
-    return np.where(is_peak, vertex, value), errors
+    if middle != largest:
+        return value, 0.0
+    jump = centre - max(left, right)
+    kink_after = _extrapolate_to_kink(left, centre, right, float(samples[min(middle + 2, last)]))
+    kink_before = _extrapolate_to_kink(right, centre, left, float(samples[max(middle - 2, 0)]))
+    return value, max(jump, kink_after, kink_before)
 
 
-def _extrapolate_to_kink(before, top, after, last) -> np.ndarray:
-    """Return by how much a kink exceeds the largest of four samples (n,), if it lies in the step after it.
+def _extrapolate_to_kink(before: float, top: float, after: float, last: float) -> float:
+    """Return by how much a kink exceeds the largest of four samples, if it lies in the step after it.
 
     The lines through the first two and through the last two samples cross at the kink. The result is 0 if they do not
     cross in this step.
     """
     rise = top - before
     fall = after - last
-    slopes = rise + fall
-    fraction = (after - top + fall) / np.where(slopes > 0, slopes, 1.0)
-    crosses = (slopes > 0) & (rise > 0) & (fall > 0) & (fraction > 0) & (fraction < 1)
-    return np.where(crosses, rise * fraction, 0.0)
+    crosses = rise > 0 and fall > 0 and 0 < after - top + fall < rise + fall
+    return rise * (after - top + fall) / (rise + fall) if crosses else 0.0
 
 
-def interpolate_ranges(values) -> ArrayPair:
-    """Return the ranges of n curves between their peaks, and bounds on the errors due to sampling.
+def interpolate_range(values) -> tuple[float, float]:
+    """Return the range of a curve between its peaks, and a bound on its error due to sampling.
 
-    Parameters
-    ----------
-    values : (k, n)
-        Equally spaced samples.
-
-    Returns
-    -------
-    tuple
-        Ranges and errors, (n,) each, in the unit of the values.
+    values (k,): equally spaced samples.
     """
-    low = values.min(axis=0)
-    high = values.max(axis=0)
-    rises, rise_errors = interpolate_peaks(values - low)
-    falls, fall_errors = interpolate_peaks(high - values)
-    return rises + falls - (high - low), rise_errors + fall_errors
+    low = values.min()
+    high = values.max()
+    rise, rise_error = interpolate_peak(values - low)
+    fall, fall_error = interpolate_peak(high - values)
+    return float(rise + fall - (high - low)), rise_error + fall_error
 
 
 def peak_sampling_errors(window: Response) -> Values:
@@ -344,7 +300,7 @@ def peak_sampling_errors(window: Response) -> Values:
 
     Runs with fewer steps may not show these errors, because they contain some of the same instants.
 
-    - Acceleration, friction forces and slips: see `interpolate_peaks`.
+    - Acceleration, friction forces and slips: see `interpolate_peak`.
     - Variable normal load: an eighth of the second difference at the smallest and the largest sample.
 
     Parameters
@@ -352,28 +308,22 @@ def peak_sampling_errors(window: Response) -> Values:
     window : Response
         Equally spaced samples.
     """
-    forces = np.abs(window.forces)
-    errors = {
-        "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
-    }
-
-    for name, sampling_errors in (
-        ("friction_force_peak", interpolate_peaks(forces)[1]),
-        ("slip_amplitude", interpolate_ranges(window.slips)[1] / 2),
-    ):
-        for k, error in enumerate(sampling_errors):
-            errors[f"{name}_{k + 1}" if k else name] = error
-    errors = {name: float(error) for name, error in errors.items() if error > 0}
+    errors = {"absolute_acceleration_peak": interpolate_peak(np.abs(window.acceleration))[1]}
+    for k, (force, slip) in enumerate(zip(np.abs(window.forces).T, window.slips.T)):
+        number = f"_{k + 1}" if k else ""
+        errors[f"friction_force_peak{number}"] = interpolate_peak(force)[1]
+        errors[f"slip_amplitude{number}"] = interpolate_range(slip)[1] / 2
+    errors = {name: error for name, error in errors.items() if error > 0}
 
     # A parabola through three samples of distance h exceeds the middle one by at most an eighth of h^2 y''.
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
+        bends = np.abs(np.diff(load, 2)) / 8
         for name, index in (
-            ("normal_load_least", int(np.argmin(load))),
-            ("normal_load_peak", int(np.argmax(load))),
+            ("normal_load_least", np.argmin(load)),
+            ("normal_load_peak", np.argmax(load)),
         ):
-            index = min(max(index, 1), len(load) - 2)
-            errors[name] = abs(float(load[index - 1] - 2 * load[index] + load[index + 1])) / 8
+            errors[name] = float(bends[np.clip(index - 1, 0, bends.size - 1)])
     return errors
 
 
@@ -435,37 +385,3 @@ def measure_half_range(time, position, rate) -> float:
     """
     reversals = find_reversal_steps(time, position, rate)
     return float(np.ptp(np.concatenate([position, reversals.position]))) / 2
-
-
-def window_amplitudes(extremes, window: int) -> np.ndarray:
-    """Return half the peak-to-peak output [m] of each window, oldest first.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
-    window : int
-        Number of cycles per window. An incomplete window at the start is ignored, unless it is the only
-        one.
-    """
-    count = len(extremes) // window
-    if count == 0:
-        return np.array([(extremes[:, 1].max() - extremes[:, 0].min()) / 2])
-    complete_windows = extremes[len(extremes) - count * window :].reshape(count, window, 2)
-    return (complete_windows[:, :, 1].max(axis=1) - complete_windows[:, :, 0].min(axis=1)) / 2
-
-
-def window_end_values(extremes, phasors, window: int) -> ArrayPair:
-    """Return amplitude [m] and phasor [m] of the last cycle of each window.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
-    phasors : (c,)
-        Phasor of each cycle [m].
-    window : int
-        Number of cycles per window.
-    """
-    last_cycles = np.arange(len(phasors) - 1, -1, -window)[::-1]
-    return (extremes[last_cycles, 1] - extremes[last_cycles, 0]) / 2, phasors[last_cycles]

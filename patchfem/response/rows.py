@@ -77,21 +77,13 @@ class LastCycles:
         return self.window.time[-1] - self.window.time[0]
 
     @cached_property
-    def has_full_cycle(self) -> bool:
-        """Whether the window contains complete cycles of the drive."""
-        return drive_sizes.has_full_cycle(self.span, self.drive)
-
-    @cached_property
     def slip_measures(self) -> Values:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
         window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-        values = compute_slip_measures(window, self.drive, steps)
-        if not self.is_sine:
-            values.pop("slip_start_phase", None)
-        return values
+        return compute_slip_measures(window, self.drive, steps)
 
     @cached_property
     def reversals(self) -> list[tuple[Reversal, ...]]:
@@ -122,12 +114,12 @@ class LastCycles:
 
     @cached_property
     def acceleration_measures(self) -> Values:
-        """Harmonic measures of the acceleration as a dict; empty unless the drive ends as a sinusoid.
+        """Harmonic measures of the acceleration as a dict; empty without a complete cycle.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
         """
-        if not (self.is_sine and self.has_full_cycle):
+        if not drive_sizes.has_full_cycle(self.span, self.drive):
             return {}
         return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
@@ -141,15 +133,14 @@ class LastCycles:
         """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
-        measures = stationary.random_response_measures(self.window, self.drive)
-        if self.load is None:
-            names = [name for name in measures if name.startswith("friction_power")]
-            for name in names:
-                del measures[name]
-        return measures
+        return stationary.random_response_measures(
+            self.window, self.drive, has_friction=self.load is not None
+        )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure; None if it has none."""
+        """Return the value of a measure; None if it has none, as one of a sine under another drive."""
+        if row.has("sine") and not self.is_sine:
+            return None
         if isinstance(row.function, str):
             return getattr(self, row.function).get(row.name)
         return row.function(self)
@@ -253,6 +244,7 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapo
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
+UNIT_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
 # Order of convergence of values that are interpolated by cubics between samples.
 CUBIC_CONVERGENCE_ORDER = 4.0
 ROWS = (
@@ -292,7 +284,7 @@ ROWS = (
         "sum of the exchanged energy and the largest stored energy",
         lambda s: energy_balance(s.run_energies),
         group="energy",
-        larger_term=("1", lambda _: 1.0),
+        larger_term=UNIT_TERM,
         flags="error",
         friction_scale=lambda _: 0.0,
     ),
@@ -347,7 +339,7 @@ ROWS = (
         "slip_measures",
         0.35,
         group="friction",
-        larger_term=("1", lambda _: 1.0),
+        larger_term=UNIT_TERM,
         flags="interface level",
     ),
     MeasureDefinition(
@@ -486,7 +478,7 @@ ROWS = (
         lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
         4.0,
         group="friction",
-        larger_term=("1", lambda _: 1.0),
+        larger_term=UNIT_TERM,
     ),
     MeasureDefinition(
         "relative_displacement_amplitude_steady",

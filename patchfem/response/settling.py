@@ -1,43 +1,121 @@
-"""Criteria for a steady motion: amplitudes per window, extrapolation, and remaining free motion.
+"""Criteria for the end of n motions: steady, transient or growing, steady amplitude, and remaining free motion.
 
-In: amplitudes, phasors or extremes of the cycles of n motions. Out: their classes (transient,
-steady, grows), extrapolated steady amplitudes with errors, and the remaining free motion.
+In: extremes and phasors of the cycles of n motions. Out: `MotionEnds` (`judge_motions`), with the classes of the motions and
+their extrapolated steady amplitudes with errors. Runs and sweeps use the same criteria.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Outcome
-from .measures import ArrayPair
 
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
 MIN_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
+# Number of the last windows from which a steady amplitude is extrapolated.
+N_FINAL_WINDOWS = 5
 # Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
 SLIP_SPEED_TOL = 1e-3
 # Largest sine of the angle between two phasor differences that count as collinear.
 COLLINEAR_SINE = 0.02
 # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
 PERIODIC_TOL = 0.1
+# Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
+# reported.
+ESTIMATE_TOL = 0.02
 
 
-def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
-    """Classify a motion as steady, growing or transient by the amplitudes of its windows.
+class MotionEnds(NamedTuple):
+    """How n motions under periodic drives end.
+
+    - classes (n,): indices of CLASSES.
+    - steady (2, n): steady amplitudes and their errors [m]; NaN if unknown.
+    """
+
+    classes: np.ndarray
+    steady: np.ndarray
+
+
+def judge_motions(extremes, phasors, window: int, tolerance, floor=0.0, decay=0.0) -> MotionEnds:
+    """Classify n motions under periodic drives, and estimate their steady amplitudes.
+
+    A motion is steady only if both the difference from its steady estimate and the remaining free motion are
+    within the tolerance. The change from window to window alone is no criterion, because it is small near the
+    maximum of a beat.
 
     Parameters
     ----------
-    amplitudes : (w,)
-        Amplitudes of successive windows [m].
-    tolerance : float
+    extremes : (n, c, 2)
+        Smallest and largest output of each cycle [m].
+    phasors : (n, c)
+        Fourier coefficient of the output at the drive frequency in each cycle [m].
+    window : int
+        Number of cycles per window.
+    tolerance : float or (n,)
         Relative tolerance of the scene.
-    floor : float
-        Largest amplitude that is round-off [m].
+    floor : float or (n,)
+        Amplitude that is round-off [m].
+    decay : float or (n,)
+        Logarithmic decay of the slowest mode over a window [1].
+    """
+    windows = measure_windows(extremes, window)
+    amplitude = windows.amplitude
+    last = amplitude[:, -1]
+    allowed = tolerance * last + floor
+
+    # The last cycles of the windows are extrapolated to infinite time.
+    steady = np.full((2, last.size), np.nan)
+    first = (N_FINAL_WINDOWS - 1) * window
+    if phasors.shape[1] > first:
+        ends = slice(-1 - first, None, window)
+        steady = extrapolate_steady_amplitudes(
+            np.ptp(extremes[:, ends], axis=2) / 2, phasors[:, ends]
+        )
+
+    classes = classify_motions(amplitude, tolerance, floor)
+    change = np.abs(np.where(np.isnan(steady[0]), last, steady[0]) - last)
+    classes[(classes == STEADY_CLASS) & (change > allowed)] = 0
+    free_motion = remaining_free_motion(windows, decay)
+    classes[(classes != GROWS_CLASS) & (free_motion > allowed)] = 0
+
+    # Without a visible transient, the steady amplitude is the mean over the cycles of the last window.
+    steady = np.where(np.isnan(steady), beat_mean_amplitudes(windows), steady)
+    mean = windows.cycle_amplitude[:, -1]
+    means = np.stack([mean, free_motion + np.abs(last - mean)])
+    is_filled = np.isnan(steady) & (classes == STEADY_CLASS)
+    return MotionEnds(classes, np.where(is_filled, means, steady))
+
+
+def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> np.ndarray:
+    """Return the steady amplitudes that are measures of n motions, with the errors of the computed amplitudes added.
+
+    They are those of transient motions, and of steady motions whose amplitude will still change by more than
+    ESTIMATE_TOL times the tolerance. The relative error of the computed amplitude is also that of the steady one.
+
+    Parameters
+    ----------
+    steady : (2, n)
+        Steady amplitudes and their errors [m].
+    outcomes : (n,)
+        Outcomes of the motions.
+    amplitude, amplitude_error : (n,)
+        Amplitudes of the last cycles and their errors [m].
+    tolerance : float or (n,)
+        Relative tolerance of the scene.
 
     Returns
     -------
-    Outcome
+    (2, n) array
+        Amplitudes and their errors [m]; NaN where they are no measures.
     """
-    return CLASSES[classify_motions(np.asarray(amplitudes, float)[None], tolerance, floor)[0]]
+    value, error = steady
+    change = np.abs(value - amplitude) + error
+    is_changing = change > ESTIMATE_TOL * tolerance * np.abs(amplitude)
+    is_reported = (outcomes == Outcome.TRANSIENT) | ((outcomes == Outcome.STEADY) & is_changing)
+    total = error + amplitude_error * value / np.maximum(np.abs(amplitude), 1e-300)
+    return np.where(is_reported, [value, total], np.nan)
 
 
 def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
@@ -66,10 +144,9 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
         return classes
     change = np.abs(amplitudes[:, -1] - amplitudes[:, -2])
     scale = tolerance * np.abs(amplitudes[:, -1]) + floor
-    if amplitudes.shape[1] == 2:
-        classes[change <= scale] = STEADY_CLASS
-        return classes
-    remainder = np.abs(geometric_remainders(amplitudes[:, -3:]))
+    remainder = np.full(change.shape, np.nan)
+    if amplitudes.shape[1] > 2:
+        remainder = np.abs(geometric_remainders(amplitudes[:, -3:]))
     has_limit = np.isfinite(remainder)
     is_increasing = _increases_steadily(amplitudes)
     is_growing = is_increasing & (change > 0.05 * scale)  # slower growth counts as steady
@@ -93,18 +170,7 @@ def geometric_remainders(values):
     return np.where(converges, change * ratio / np.where(converges, 1 - ratio, 1.0), np.nan)[()]
 
 
-def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple[float | None, ...]:
-    """Extrapolate the window amplitudes of a motion to its steady amplitude and error [m].
-
-    Return (None, None) if no bounded limit can be estimated.
-    """
-    estimates = extrapolate_steady_amplitudes(
-        np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None]
-    )
-    return tuple(None if np.isnan(number) else float(number) for (number,) in estimates)
-
-
-def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
+def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
     """Extrapolate the window amplitudes of n motions to steady amplitudes and errors.
 
     In a linear rig, the remaining free motion is multiplied by a complex factor per window, and the phasors
@@ -119,20 +185,17 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
 
     Parameters
     ----------
-    amplitudes, phasors : (n, w)
-        Amplitudes [m] and phasors [m] of the last cycle of successive windows. A phasor is the Fourier
+    amplitudes, phasors : (n, N_FINAL_WINDOWS)
+        Amplitudes [m] and phasors [m] of the last cycle of the last windows. A phasor is the Fourier
         coefficient of the motion at the drive frequency.
 
     Returns
     -------
-    tuple
-        Steady amplitudes and their errors (n,) [m]; NaN if no bounded limit can be estimated.
+    (2, n) array
+        Steady amplitudes and their errors [m]; NaN if no bounded limit can be estimated.
     """
-    count, n_windows = amplitudes.shape
-    if n_windows < 5:
-        return np.full(count, np.nan), np.full(count, np.nan)
     magnitude = np.abs(phasors)
-    is_moving = np.all(magnitude[:, -5:] > 0, axis=1)
+    is_moving = np.all(magnitude > 0, axis=1)
     waveform = amplitudes[:, -2:] / np.where(magnitude[:, -2:] > 0, magnitude[:, -2:], 1.0)
 
     # The ratio of amplitude to |phasor| approaches its limit as the phasors do.
@@ -163,7 +226,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
         & (error < np.maximum(np.abs(value - amplitudes[:, -1]), 1e-6 * value))
         & (value < 20 * amplitudes[:, -1])
     )
-    return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
+    return np.where(is_known, [value, error], np.nan)
 
 
 def _extrapolate_magnitudes(phasors, find_remainders, n_points: int, n_limits: int) -> np.ndarray:
@@ -203,32 +266,57 @@ def plane_map_remainders(p) -> np.ndarray:
     )
 
 
-def window_amplitude_means(extremes, window: int) -> ArrayPair:
-    """Return the amplitude [m] of each window, and the mean amplitude [m] of its cycles.
+class Windows(NamedTuple):
+    """Ranges of the output in successive windows, oldest first; (..., w) each.
+
+    - low, high: smallest and largest output in each window [m].
+    - cycle_amplitude: mean amplitude of the cycles of each window [m].
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    cycle_amplitude: np.ndarray
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """Half the peak-to-peak output (..., w) [m]."""
+        return (self.high - self.low) / 2
+
+    @property
+    def excess(self) -> np.ndarray:
+        """Excess (..., w) [m] of the amplitude over that of the cycles: a beat that is shorter than the window."""
+        return self.amplitude - self.cycle_amplitude
+
+    def find_drift(self, window: int):
+        """Return the drift per cycle [m] of the midpoint between the last two windows of `window` cycles.
+
+        The result is inf with fewer than two windows.
+        """
+        if self.low.shape[-1] < 2:
+            return np.inf
+        return (np.diff(self.low + self.high)[..., -1] / 2 / window)[()]
+
+
+def measure_windows(extremes, window: int) -> Windows:
+    """Return the ranges of the output in windows that end at the last cycle.
 
     Parameters
     ----------
     extremes : (..., c, 2)
         Smallest and largest output of each cycle [m].
     window : int
-        Number of cycles per window; an incomplete window at the start is ignored.
-
-    Returns
-    -------
-    tuple
-        Two arrays (..., w) [m].
+        Number of cycles per window; an incomplete window at the start is ignored, unless it is the only one.
     """
-    cycle_extremes = np.asarray(extremes, float)
-    count = cycle_extremes.shape[-2] // window
-    windows = cycle_extremes[..., cycle_extremes.shape[-2] - count * window :, :].reshape(
-        *cycle_extremes.shape[:-2], count, window, 2
-    )
-    low = windows[..., 0]
-    high = windows[..., 1]
-    return (high.max(axis=-1) - low.min(axis=-1)) / 2, (high.mean(axis=-1) - low.mean(axis=-1)) / 2
+    extremes = np.asarray(extremes, float)
+    n_cycles = extremes.shape[-2]
+    size = min(window, n_cycles)
+    first = n_cycles % size
+    low, high = (extremes[..., first:, side] for side in (0, 1))
+    low, high = (side.reshape(*side.shape[:-1], -1, size) for side in (low, high))
+    return Windows(low.min(axis=-1), high.max(axis=-1), (high - low).mean(axis=-1) / 2)
 
 
-def remaining_free_motion(extremes, window: int, decay=0.0):
+def remaining_free_motion(windows: Windows, decay=0.0):
     """Return the amplitude [m] of the decaying free motion that remains in the last window.
 
     A free motion near the drive frequency causes a beat. If the beat is shorter than a window, the amplitude
@@ -242,48 +330,58 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
 
     Parameters
     ----------
-    extremes : (..., c, 2)
-        Smallest and largest output of each cycle [m].
-    window : int
-        Number of cycles per window.
+    windows : Windows
+        Ranges of the output.
     decay : (...)
         Logarithmic decay of the slowest mode over a window [1].
     """
-    amplitude, mean = window_amplitude_means(extremes, window)
+    amplitude = windows.amplitude
     count = amplitude.shape[-1]
     if count < MIN_WINDOWS:
         return np.zeros(amplitude.shape[:-1])[()]
 
     n_third = max(1, count // 3)
+    last = slice(-n_third, None)
+    previous = slice(-2 * n_third, -n_third)
 
     # A beat within a window: its excess is free motion unless it persists while the modes decay.
-    excess = amplitude - mean
-    previous_excess = excess[..., -2 * n_third : -n_third].max(axis=-1)
-    last_excess = excess[..., -n_third:].max(axis=-1)
+    excess = windows.excess
     decayed_fraction = 1 - np.exp(-np.asarray(decay) * n_third)
-    persists = (decayed_fraction > PERIODIC_TOL) & (
-        last_excess > (1 - decayed_fraction / 2) * previous_excess
-    )
+    least_excess = (1 - decayed_fraction / 2) * excess[..., previous].max(axis=-1)
+    persists = (decayed_fraction > PERIODIC_TOL) & (excess[..., last].max(axis=-1) > least_excess)
 
     # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
-    previous_difference = differences[..., -2 * n_third : -n_third].max(axis=-1, initial=0.0)
-    last_difference = differences[..., -n_third:].max(axis=-1)
-    ratio = np.minimum(
-        1.0,
-        np.divide(
-            last_difference,
-            previous_difference,
-            out=np.ones_like(last_difference),
-            where=previous_difference > 0,
-        ),
+    previous_difference = differences[..., previous].max(axis=-1, initial=0.0)
+    last_difference = differences[..., last].max(axis=-1)
+    ratio = np.divide(
+        last_difference,
+        previous_difference,
+        out=np.ones_like(last_difference),
+        where=previous_difference > 0,
     )
-    ratio = np.maximum(ratio, 1 - decayed_fraction)
+    ratio = np.maximum(np.minimum(ratio, 1.0), 1 - decayed_fraction)
 
     return (last_difference * ratio + np.where(persists, 0.0, excess[..., -1]))[()]
 
 
-def beat_mean_amplitudes(extremes, window: int) -> ArrayPair:
+def remaining_ringing(windows: Windows, decay):
+    """Return the part of the amplitude [m] that is free vibration while the interface sticks.
+
+    The result is `remaining_free_motion`, but at least the change of the amplitude in the last window.
+
+    Parameters
+    ----------
+    windows : Windows
+        Ranges of the output.
+    decay : (...)
+        Logarithmic decay of the slowest mode over a window [1]; a negative one counts as 0.
+    """
+    change = np.abs(np.diff(windows.amplitude[..., -2:])).sum(axis=-1)
+    return np.maximum(remaining_free_motion(windows, np.maximum(decay, 0.0)), change)
+
+
+def beat_mean_amplitudes(windows: Windows) -> np.ndarray:
     """Return the mean amplitudes [m] of motions with short beats, and their errors [m].
 
     The amplitude is the mean over the last third of the windows. The error is the sum of the largest
@@ -292,33 +390,26 @@ def beat_mean_amplitudes(extremes, window: int) -> ArrayPair:
 
     Parameters
     ----------
-    extremes : (n, c, 2)
-        Smallest and largest output of each cycle [m].
-    window : int
-        Number of cycles per window.
+    windows : Windows
+        Ranges of the output of n motions.
 
     Returns
     -------
-    tuple
-        Two arrays (n,); NaN if there is no estimate.
+    (2, n) array
+        Amplitudes and their errors; NaN if there is no estimate.
     """
-    amplitude, mean = window_amplitude_means(extremes, window)
-    n_third = amplitude.shape[1] // 3
+    count, n_windows = windows.low.shape
+    n_third = n_windows // 3
     if n_third < 2:
-        return np.full(len(mean), np.nan), np.full(len(mean), np.nan)
-    last_means = mean[:, -n_third:]
-    value = last_means.mean(axis=1)
-    beat = (amplitude - mean)[:, -n_third:].max(axis=1)
-    half_difference = np.abs(
-        last_means[:, : n_third // 2].mean(axis=1) - last_means[:, n_third // 2 :].mean(axis=1)
-    )
-    error = (
-        np.abs(last_means - value[:, None]).max(axis=1)
-        + 2 * half_difference
-        + beat**2 / np.maximum(value, 1e-300)
-    )
-    is_known = (error < np.abs(amplitude[:, -1] - value)) & (value > 0)
-    return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
+        return np.full((2, count), np.nan)
+    means = windows.cycle_amplitude[:, -n_third:]
+    value = means.mean(axis=1)
+    beat = windows.excess[:, -n_third:].max(axis=1)
+    first, second = (half.mean(axis=1) for half in np.split(means, [n_third // 2], axis=1))
+    error = np.abs(means - value[:, None]).max(axis=1) + 2 * np.abs(first - second)
+    error += beat**2 / np.maximum(value, 1e-300)
+    is_known = (error < np.abs(windows.amplitude[:, -1] - value)) & (value > 0)
+    return np.where(is_known, [value, error], np.nan)
 
 
 def slip_period(time, rate) -> float:
@@ -346,8 +437,7 @@ def slip_period(time, rate) -> float:
 def _increases_steadily(amplitudes) -> np.ndarray:
     """Return whether the amplitudes of the last windows (n, w) grow by similar increments."""
     steps = np.diff(amplitudes[:, -6:], axis=1)
-    if amplitudes.shape[1] < 4:
-        return np.zeros(len(amplitudes), bool)
-    is_increasing = np.all(steps > 0, axis=1)
-    ratios = steps[:, 1:] / np.where(steps[:, :-1] > 0, steps[:, :-1], 1.0)
-    return is_increasing & np.all((ratios > 0.5) & (ratios < 3), axis=1)
+    before = steps[:, :-1]
+    after = steps[:, 1:]
+    is_similar = (before > 0) & (after > 0.5 * before) & (after < 3 * before)
+    return is_similar.all(axis=1) & (amplitudes.shape[1] > 3)

@@ -7,10 +7,9 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
-from .measures import ArrayPair, Values
+from .measures import Values
 
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
-READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
@@ -18,8 +17,8 @@ GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a st
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
-def harmonic_weights(time, omega: float) -> ArrayPair:
-    """Return the weights of values and rates in a Fourier coefficient of a piecewise cubic motion.
+def motion_harmonic(time, value, rate, omega: float) -> complex:
+    """Return the Fourier coefficient of the piecewise cubic motion through samples.
 
     With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
     the fourth derivative.
@@ -27,45 +26,21 @@ def harmonic_weights(time, omega: float) -> ArrayPair:
     Parameters
     ----------
     time : (k,)
-        Times of the samples [s], at any spacing.
+        Times [s], at any spacing.
+    value, rate : (k,)
+        Samples of a motion and of its rate.
     omega : float
         Angular frequency [rad/s].
-
-    Returns
-    -------
-    tuple
-        Weights of the values [1] and of the rates [s], (k,) each.
     """
     step = np.diff(time)
-    uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    # for equal steps, the phase factors of the Gauss points are the same in each step
-    length = step.mean(keepdims=True) if uniform else step
+    rise = np.diff(value)
+    # The cubic of a step is its chord plus s (1 - s) (a (1 - s) + b s), with the excess slopes a and b of its ends.
+    first_excess = rate[:-1] * step - rise
+    last_excess = rise - rate[1:] * step
     s = GAUSS_POINTS[:, None]
-    gauss = GAUSS_WEIGHTS[:, None] * np.exp(-1j * omega * s * length)
-    phases = 2 / (time[-1] - time[0]) * step * np.exp(-1j * omega * time[:-1])
-    value_weights = np.zeros(len(time), complex)
-    value_weights[:-1] = (gauss * (1 - 3 * s**2 + 2 * s**3)).sum(axis=0) * phases
-    value_weights[1:] += (gauss * (3 * s**2 - 2 * s**3)).sum(axis=0) * phases
-    rate_weights = np.zeros(len(time), complex)
-    rate_weights[:-1] = (gauss * (s - 2 * s**2 + s**3)).sum(axis=0) * step * phases
-    rate_weights[1:] += (gauss * (s**3 - s**2)).sum(axis=0) * step * phases
-    return value_weights, rate_weights
-
-
-def motion_harmonic(time, value, rate, omega: float):
-    """Return the Fourier coefficient of the piecewise cubic motion through samples.
-
-    Parameters
-    ----------
-    time : (k,)
-        Times [s], at any spacing.
-    value, rate : (k,) or (k, n)
-        Samples of one motion or of n motions, and their rates.
-    omega : float
-        Angular frequency [rad/s].
-    """
-    value_weights, rate_weights = harmonic_weights(time, omega)
-    return value_weights @ value + rate_weights @ rate
+    motion = value[:-1] + s * (rise + (1 - s) * ((1 - s) * first_excess + s * last_excess))
+    phases = np.exp(-1j * omega * (time[:-1] + s * step))
+    return 2 / (time[-1] - time[0]) * np.sum(GAUSS_WEIGHTS @ (motion * phases) * step)
 
 
 def differentiate_harmonic(harmonic, values, time, omega: float):
@@ -75,9 +50,9 @@ def differentiate_harmonic(harmonic, values, time, omega: float):
 
     Parameters
     ----------
-    harmonic : complex or (n,)
+    harmonic : complex
         Coefficient of the motion.
-    values : (k,) or (k, n)
+    values : (k,)
         Samples of the motion.
     time : (k,)
         Times over whole cycles [s].
@@ -96,23 +71,13 @@ def acceleration_harmonic(time, value, rate, omega: float):
     ----------
     time : (k,)
         Times over whole cycles [s].
-    value, rate : (k,) or (k, n)
-        Displacements [m] and velocities [m/s] of one motion or of n motions.
+    value, rate : (k,)
+        Displacements [m] and velocities [m/s].
     omega : float
         Angular frequency [rad/s].
     """
     velocity = differentiate_harmonic(motion_harmonic(time, value, rate, omega), value, time, omega)
     return differentiate_harmonic(velocity, rate, time, omega)
-
-
-def _find_last_segment(window, drive):
-    """Return the segment of a drive at the end of a window, a sinusoid."""
-    return [part for part in drive.segments if part.start < window.time[-1]][-1]
-
-
-def _drive_harmonic(segment) -> complex:
-    """Return the Fourier coefficient -i a exp(i (phase - omega start)) [m s-2] of a segment of a drive."""
-    return -1j * segment.amplitude * np.exp(1j * (segment.phase - segment.omega * segment.start))
 
 
 def absolute_harmonic(window, drive, n: int) -> complex:
@@ -127,11 +92,15 @@ def absolute_harmonic(window, drive, n: int) -> complex:
     n : int
         Number of the harmonic, from 1.
     """
-    segment = _find_last_segment(window, drive)
+    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
     displacement = window.extra.get("sensor", window.output)
     rate = window.extra.get("sensor_rate", window.output_rate)
     harmonic = acceleration_harmonic(window.time, displacement, rate, n * segment.omega)
-    return harmonic + _drive_harmonic(segment) if n == 1 and drive.moving else harmonic
+    if n == 1 and drive.moving:
+        # The acceleration a sin(omega (t - start) + phase) of the base is added.
+        phase = segment.phase - segment.omega * segment.start
+        harmonic -= 1j * segment.amplitude * np.exp(1j * phase)
+    return harmonic
 
 
 def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
@@ -139,10 +108,8 @@ def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
-    return (
-        float(abs(absolute_harmonic(window, drive, 1))),
-        float(abs(absolute_harmonic(window, drive, 3))),
-    )
+    first, third = (float(abs(absolute_harmonic(window, drive, n))) for n in (1, 3))
+    return first, third
 
 
 def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> Values:
@@ -181,11 +148,6 @@ def read_instrument(
         1/(1 + sqrt2 s + s^2) with s = i f/cutoff, for N_FILTER_HARMONICS harmonics.
     cutoff : float, optional
         Cutoff frequency of the filter [Hz].
-
-    Raises
-    ------
-    ValueError
-        If the kind is not in READINGS.
     """
     if kind == "peak":
         return peak
@@ -194,8 +156,6 @@ def read_instrument(
         return float(np.sqrt(np.trapezoid(window.acceleration**2, window.time) / span))
     if kind == "fundamental":
         return abs(absolute_harmonic(window, drive, 1))
-    if kind != "lowpass":
-        raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
     n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
     filtered_harmonics = np.array([absolute_harmonic(window, drive, k) for k in n]) / (

@@ -79,8 +79,18 @@ def make_record(window, drive) -> Record:
     )
 
 
-def random_response_measures(window, drive) -> Values:
-    """Return the measures of the response to a stationary random drive, by name."""
+def random_response_measures(window, drive, *, has_friction: bool = False) -> Values:
+    """Return the measures of the response to a stationary random drive, by name.
+
+    Parameters
+    ----------
+    window : Response
+        Record without its initial transient.
+    drive
+        Random drive with its `band` [Hz].
+    has_friction : bool
+        Whether the power of friction is one of the measures.
+    """
     record = make_record(window, drive)
     measures = {}
     for name, values, samples in (
@@ -93,7 +103,7 @@ def random_response_measures(window, drive) -> Values:
     if fit is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *fit):
             measures |= {name: value, f"{name}_scatter": scatter}
-    if "ledger" in window.extra:
+    if has_friction and "ledger" in window.extra:
         measures["friction_power"], measures["friction_power_scatter"] = mean_power(
             window.time, window.extra["ledger"][0]
         )
@@ -258,10 +268,10 @@ def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
         return None
 
     # The initial damping follows from the half-power width 2 zeta f.
-    outside_peak = np.flatnonzero(np.abs(gain) < np.abs(gain[peak]) / np.sqrt(2))
-    left = outside_peak[outside_peak < peak].max(initial=0)
-    right = outside_peak[outside_peak > peak].min(initial=f.size - 1)
-    width = float(f[right] - f[left])
+    is_low = np.abs(gain) < np.abs(gain[peak]) / np.sqrt(2)
+    n_left = np.argmax(np.append(is_low[peak::-1], True))
+    n_right = np.argmax(np.append(is_low[peak:], True))
+    width = line * float(n_left + n_right)
     theta = np.log([2 * np.pi * f[peak], max(0.3 * width, 0.05 * line) / (2 * f[peak])])
 
     for _ in range(3):  # the fitted band is adapted to the width of the peak
@@ -305,16 +315,16 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     theta : (2,)
         Initial guess.
     """
-    size = np.abs(gain).max()
+    target = np.concatenate([gain.real, gain.imag]) / np.abs(gain).max()
+    constants = np.repeat(np.eye(2), f.size, axis=0)
 
     def compute_residual(theta):
         """Return the relative residual of H1, with optimal amplitude and constant."""
         response = expected_response(f, *np.exp(theta), span)
-        columns = np.stack([response, np.ones(f.size, complex), 1j * np.ones(f.size)], axis=1)
-        design = np.concatenate([columns.real, columns.imag])
-        norms = np.linalg.norm(design, axis=0)
-        target = np.concatenate([gain.real, gain.imag]) / size
-        return design / norms @ np.linalg.lstsq(design / norms, target, rcond=1e-12)[0] - target
+        basis, _ = np.linalg.qr(
+            np.column_stack([np.concatenate([response.real, response.imag]), constants])
+        )
+        return basis @ (basis.T @ target) - target
 
     max_change = np.array([0.5, 7.0])
     return least_squares(

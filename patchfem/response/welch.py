@@ -35,8 +35,10 @@ class CrossDensities(NamedTuple):
         )
 
 
-def transform_segments(step: float, records, size: int, *, has_window: bool = True) -> Segments:
+def transform_segments(step: float, records, size: int) -> Segments:
     """Return the Fourier transforms of the segments of records, which overlap by half.
+
+    The mean of each segment is removed before the Hann window is applied.
 
     Parameters
     ----------
@@ -46,8 +48,6 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
         Equally spaced samples.
     size : int
         Number of samples per segment.
-    has_window : bool
-        Whether a Hann window is applied to each segment after its mean is removed.
 
     Returns
     -------
@@ -56,10 +56,8 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
     records = np.asarray(records)
     starts = np.arange(0, records.shape[1] - size + 1, size - size // 2)
     segments = records[:, starts[:, None] + np.arange(size)]
-    taper = np.ones(size)
-    if has_window:
-        taper = np.sin(np.pi * np.arange(size) / size) ** 2  # periodic Hann window
-        segments = (segments - segments.mean(axis=2, keepdims=True)) * taper
+    taper = np.sin(np.pi * np.arange(size) / size) ** 2  # periodic Hann window
+    segments = (segments - segments.mean(axis=2, keepdims=True)) * taper
     transforms = np.fft.rfft(segments) * np.sqrt(step / np.sum(taper**2))
     return Segments(np.fft.rfftfreq(size, step), transforms)
 

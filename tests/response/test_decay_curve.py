@@ -7,11 +7,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem.response import (
-    fit_decay_curve,
-    locate_reversals,
-    make_half_cycles,
-)
+from patchfem.response import fit_decay_curve, locate_reversals, make_half_cycles
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 

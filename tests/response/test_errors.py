@@ -5,9 +5,7 @@ import pytest
 from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
 import patchfem as pf
-from patchfem.response import (
-    convergence_errors,
-)
+from patchfem.response import convergence_errors
 from patchfem.response.errors import SAFETY_FACTOR
 
 NAME = "relative_displacement_amplitude"

@@ -5,11 +5,7 @@ import pytest
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import G_N
-from patchfem.response import (
-    Level,
-    bracket_onset,
-    make_onset_test,
-)
+from patchfem.response import Level, bracket_onset, make_onset_test
 from patchfem.runs.run import run
 from patchfem.scene import loads
 

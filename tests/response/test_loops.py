@@ -9,7 +9,7 @@ import pytest
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import run
-from patchfem.response import loops
+from patchfem.response import compute_step_harmonic, loops
 from patchfem.response.measures import compute_harmonic
 
 OMEGA = 2 * pi * 143
@@ -97,3 +97,10 @@ def test_exact_drift_and_damping_of_event_engine(more, drive):
     truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
     # (pi/20000)^2/2 at the top
     assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)
+
+
+def test_exact_first_harmonic_of_square_wave():
+    """The first harmonic of a square wave with non-uniform samples is -12j/pi within 1e-14."""
+    time = np.array([0.0, 0.1, 0.5, 0.8, 1.0])
+    force = compute_step_harmonic(time, np.array([3.0, 3.0, -3.0, -3.0]), 2 * pi)
+    assert force == pytest.approx(-12j / pi, rel=1e-14)

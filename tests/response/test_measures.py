@@ -44,7 +44,7 @@ def test_always_error_of_peak_at_kink_contains_it(shift, fall):
     """The peak of a curve with a kink between two samples lies within the stated error of the largest sample."""
     place = np.arange(40.0) - 20 - shift
     curve = np.where(place < 0, 50 + place, 50 - fall * place)
-    peaks, errors = measures.interpolate_peaks(curve[:, None])
-    assert peaks[0] <= 50 * (1 + 1e-12)
-    assert 50 - peaks[0] <= errors[0] * (1 + 1e-9)
-    assert errors[0] <= max(1.0, fall)
+    peak, error = measures.interpolate_peak(curve)
+    assert peak <= 50 * (1 + 1e-12)
+    assert 50 - peak <= error * (1 + 1e-9)
+    assert error <= max(1.0, fall)

@@ -23,15 +23,7 @@ from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
 from ...response.errors import convergence_errors, total_error
-from ...response.outcome import (
-    AMPLITUDE_ROUND_OFF,
-    classify_periodic,
-    is_drifting,
-    is_ringing_visible,
-    is_still_changing,
-    remaining_ringing,
-    steady_estimate_error,
-)
+from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
 from ...response.reasons import (
     CHANGE_NOT_RESOLVED_REASON,
     STICKS_AT_REVERSAL_REASON,
@@ -47,8 +39,11 @@ from ...response.rows import (
 )
 from ...response.settling import (
     CLASSES,
-    extrapolate_steady_amplitudes,
-    window_amplitude_means,
+    MotionEnds,
+    judge_motions,
+    measure_windows,
+    remaining_ringing,
+    select_reported,
 )
 from ...scene.rules.accuracy import list_fixed_settings
 from ...structure.drive_sizes import find_max_acceleration, find_min_decay_rate
@@ -71,7 +66,6 @@ MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
 MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
 MIN_TOLERANCE = 1e-4  # smallest tolerance that STEPS meet
-N_FINAL_WINDOWS = 5  # windows from which the steady motion is extrapolated (response.settling)
 # Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
 MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
@@ -343,7 +337,7 @@ def make_results(
     values, errors = dict(refined.march.values), dict(refined.errors)
     results = CaseResults.blank(len(scales.tolerance))
     window = int(cases.parameters[0, Number.WINDOW])
-    classes, steady, steady_error = _judge_motions(cases, scales, refined)
+    classes, steady = _judge_motions(cases, scales, refined)
     is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
     outcomes = [
         Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
@@ -353,13 +347,9 @@ def make_results(
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
     with np.errstate(invalid="ignore"):
-        is_changing = (results.outcome == str(Outcome.STEADY)) & is_still_changing(
-            steady, steady_error, values[AMPLITUDE], scales.tolerance
+        values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
+            steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
         )
-    values[STEADY_AMPLITUDE] = np.where(is_changing | is_transient, steady, np.nan)
-    errors[STEADY_AMPLITUDE] = steady_estimate_error(
-        steady, steady_error, values[AMPLITUDE], errors[AMPLITUDE]
-    )
 
     # A growing motion has no limit, so that no error is stated for its values.
     grows = results.outcome == str(Outcome.GROWS)
@@ -418,7 +408,7 @@ def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
     return MAX_STICK_SLIP * scales.limit / stiffness
 
 
-def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
+def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds:
     """Classify the motions of n cases by their outcome, and estimate their steady amplitudes.
 
     Parameters
@@ -429,33 +419,20 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
         Magnitudes of the motions, with the decay rates of the modes `decay` (n,) [1/s].
     refined : Refined
         March of the cases, with the smallest and largest output `extremes` (n, cycles, 2) [m] of each cycle.
-
-    Returns
-    -------
-    tuple
-        Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each, in this order.
     """
     march, values = refined.march, refined.march.values
     omega = cases.parameters[:, Number.OMEGA]
-    cycles = march.extremes.shape[1]
     window = int(cases.parameters[0, Number.WINDOW])
-    ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
 
     # The amplitudes of the final windows are extrapolated to infinite time.
     with np.errstate(all="ignore"):
-        steady = extrapolate_steady_amplitudes(
-            np.ptp(march.extremes[:, ends], axis=2) / 2, march.phasors[:, ends]
-        )
-        classes, *steady = classify_periodic(
-            window_amplitude_means(march.extremes, window)[0],
+        classes, steady = judge_motions(
             march.extremes,
+            march.phasors,
             window,
-            steady,
-            (
-                scales.tolerance,
-                AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
-                scales.decay * window * 2 * np.pi / omega,
-            ),
+            scales.tolerance,
+            AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
+            scales.decay * window * 2 * np.pi / omega,
         )
 
     # A periodic motion about a moving mean is transient.
@@ -467,7 +444,9 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
         error_floor("drift_per_cycle", scales.displacement),
     )
     is_steady = classes == CLASSES.index(Outcome.STEADY)
-    return np.where(is_steady & drifts, CLASSES.index(Outcome.TRANSIENT), classes), *steady
+    return MotionEnds(
+        np.where(is_steady & drifts, CLASSES.index(Outcome.TRANSIENT), classes), steady
+    )
 
 
 def needs_single_run(
@@ -495,7 +474,7 @@ def needs_single_run(
     # A sticking interface may still vibrate freely, or carry a force that increases with its mean stretch.
     window = int(cases.parameters[0, Number.WINDOW])
     decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = remaining_ringing(march.extremes, window, decay)
+    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
     sizes = (values[AMPLITUDE], refined.errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
     is_unsettled = is_ringing_visible(ringing, *sizes, scales.tolerance)
     loading = np.abs(values["drift_per_cycle"]) * (window - 1) * scales.stick_stiffness

@@ -65,11 +65,8 @@ def compute_decay_curve(solution: Solution) -> DecayCurve | None:
 def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
     """Add the differences from coarse runs to the errors of a decay curve."""
     for run, beside in solution.coarser:
-        coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
-        reference = (
-            curve if beside is None else _measure_decay_curve(beside).interpolate(curve.amplitude)
-        )
-        curve = curve.add_difference(coarse, reference)
+        reference = curve if beside is None else _measure_decay_curve(beside)
+        curve = curve.add_change(_measure_decay_curve(run), reference)
     return curve
 
 

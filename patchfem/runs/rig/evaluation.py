@@ -12,13 +12,7 @@ from ...friction import path_work
 from ...response.events import is_all_stuck
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
-from ...response.measures import (
-    Values,
-    relative_gap,
-    window_amplitudes,
-    window_end_values,
-)
-from ...response.outcome import estimate_steady
+from ...response.measures import Values, relative_gap
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
 from .solution import (
@@ -166,17 +160,9 @@ class RunEvaluator:
             Further fields of the Solution.
         """
         drive = drive or self.model.rig.drive.signal
-        n_cycles = self.numerics.window
         stuck = self.is_stuck(run)
         values = self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
-
-        ends = window_end_values(run.extremes, run.phasors, n_cycles)
-        fields = {
-            "message": run.message,
-            "log": run.log,
-            "snapshots": run.snapshots,
-            "steady": estimate_steady(drive, *ends),
-        }
+        fields = {"message": run.message, "log": run.log, "snapshots": run.snapshots}
         fields |= self.collect_solution_fields(run, drive)
 
         # Without an early end, the outcome stays open until the errors are known.
@@ -184,7 +170,6 @@ class RunEvaluator:
             values=values,
             response=run.response,
             window=run.window,
-            amplitudes=window_amplitudes(run.extremes, n_cycles),
             outcome=run.outcome or (Outcome.STUCK if stuck else None),
             book=run.ledger,
             seconds=seconds,
@@ -192,6 +177,7 @@ class RunEvaluator:
             stick_tolerance=self.stick_tolerance,
             run_errors=self.estimate_run_errors(run, drive, values),
             extremes=run.extremes,
+            phasors=run.phasors,
             **(fields | other_fields),
         )
 

@@ -378,7 +378,9 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     # A growing motion has no final values, so the errors of its measures are unknown.
     if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
         measures = remove_errors(measures)
-    measures |= steady
+    # The motion is judged at the accelerometer, so that its steady amplitude is not that of a gauge.
+    if rig.modes.gauge is None:
+        measures |= steady
 
     window = solution.window
     is_rigid = run.has_friction and model.sticks_rigidly

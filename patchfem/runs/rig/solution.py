@@ -36,9 +36,7 @@ class Solution:
 
     - values: measures by name.
     - response, window: stored histories, and those of the last cycles.
-    - amplitudes: amplitude of each window [m], from the first to the last.
-    - steady: extrapolated steady amplitude and its error [m], or (None, None).
-    - outcome: Outcome, or None if it is determined from the amplitudes.
+    - outcome: Outcome, or None if it is determined from the cycles.
     - snapshots: states of the interface in the last cycle.
     - book: energies [J] and counters by name.
     - seconds: CPU time of the run [s].
@@ -54,8 +52,8 @@ class Solution:
     - errors: error estimates by measure of an engine that needs no coarse runs, or None.
     - bond_summation: EngineChoice of the bond summation; None without bonds.
     - coarser: pairs of a coarse run and its reference run (None for this run).
-    - extremes (c, 2): minimum and maximum output of every cycle [m], from which the outcome is
-      determined; None if the engine sets the outcome.
+    - extremes (c, 2), phasors (c,): minimum and maximum output, and phasor of the output, of every cycle [m], from which
+      the outcome is determined; None if the engine sets the outcome.
     - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
     - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
     - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
@@ -66,8 +64,6 @@ class Solution:
     values: Values
     response: Response
     window: Response
-    amplitudes: np.ndarray
-    steady: tuple[float | None, float | None]
     outcome: Outcome | None
     snapshots: Sequence
     book: Values
@@ -85,6 +81,7 @@ class Solution:
     bond_summation: object = None
     coarser: "tuple[tuple[Solution, Solution | None], ...]" = ()
     extremes: np.ndarray | None = None
+    phasors: np.ndarray | None = None
     drive: SineDrive | None = None
     peak_error: float = np.nan
     tail: VibratingMode | None = None
@@ -134,7 +131,6 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
         values=values | {AMPLITUDE: amplitude},
         response=_compute_gauge_histories(solution.response, gauge),
         window=window,
-        steady=(None, None),
         errors=errors,
     )
 

@@ -22,7 +22,6 @@ from ....dynamics.harmonic.steady import list_coexisting_slides, refine_steady_m
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import Values, compute_peak
-from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
@@ -188,8 +187,6 @@ class BalanceFinder:
             values,
             response,
             response,
-            np.array([values[AMPLITUDE]]),
-            (None, None),
             outcome,
             [],
             book,

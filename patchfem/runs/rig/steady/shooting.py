@@ -111,7 +111,7 @@ class ShootingFinder:
             solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
             errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
             periodic_data = SteadyData("leaves its grooves", np.zeros(0))
-            return replace(solution, steady=(None, None), errors=errors, periodic=periodic_data)
+            return replace(solution, errors=errors, periodic=periodic_data)
 
         motion = self.find_periodic_motion(drive, guess)
         state = None if motion.grows else motion.run.final
@@ -144,7 +144,6 @@ class ShootingFinder:
         return replace(
             solution,
             values=values | known,
-            steady=(None, None),
             outcome=outcome,
             message=solution.message if is_stable else describe_instability(motion.multipliers),
             errors=errors,
