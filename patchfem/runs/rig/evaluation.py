@@ -4,13 +4,15 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
+from dataclasses import replace
+from time import perf_counter
+
 import numpy as np
 
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response.events import is_all_stuck
-from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
     Values,
@@ -21,6 +23,7 @@ from ...response.measures import (
 from ...response.outcome import estimate_steady
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
+from .levels import run_levels
 from .solution import (
     Fields,
     Solution,
@@ -67,6 +70,46 @@ class RunEvaluator:
         # With a law that creeps, the interface slips under every force, however small.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
+
+    def integrate(self, drive, cycles: float, before, frames: int = 0, progress=None):
+        """Integrate the motion under a drive, and return the run of the engine.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
+        raise NotImplementedError
+
+    def solve(self, frames: int, progress, prepare: Values) -> Solution:
+        """Compute the motion of the rig, for one drive level after another, and its Solution.
+
+        Parameters
+        ----------
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable or None
+            Callback for the completed fraction.
+        prepare : dict
+            CPU time of each part of the preparation [s].
+        """
+        begin = perf_counter()
+        drive = self.model.rig.drive
+        fields = {}
+        if drive.levels.amplitudes:
+            run, fields = run_levels(self, frames, progress)
+        else:
+            run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
+            run = _remove_incomplete_cycle(run)
+        return self.make_solution(run, perf_counter() - begin, prepare=prepare, **fields)
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
@@ -195,26 +238,13 @@ class RunEvaluator:
             **(fields | other_fields),
         )
 
-    def evaluate_level(self, level: float, run, drive=None, relative_error: float = 0.0) -> Level:
-        """Evaluate the measures of a run at one drive level.
 
-        Parameters
-        ----------
-        level : float
-            Drive level [m s-2].
-        run
-            Run of the engine, with all cycles or with those of a drive level.
-        drive : optional
-            Drive of the run; default: that of the model.
-        relative_error : float
-            Relative error of the measures.
-        """
-        values = self.evaluate_measures(run, drive)
-        values = {name: values[name] for name in LEVEL_MEASURES if name in values}
-        errors = {}
-        if relative_error:
-            errors = {name: relative_error * abs(value) for name, value in values.items()}
-        return Level(level, self.is_stuck(run), values, errors)
+def _remove_incomplete_cycle(run):
+    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
+    count = int(run.cycles_done + 1e-9)
+    if not count or count >= len(run.extremes):
+        return run
+    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
 
 
 def find_numbers(window) -> tuple[np.ndarray, np.ndarray]:

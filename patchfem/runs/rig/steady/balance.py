@@ -12,8 +12,6 @@ import numpy as np
 
 from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
-from ....dynamics.harmonic.forces import LawGroup
-from ....dynamics.harmonic.laws import Spring
 from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
@@ -26,7 +24,7 @@ from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
-from ..interface import make_single_law
+from ..joints import make_law_group
 from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
     COLUMN_MEASURES,
@@ -126,21 +124,12 @@ class BalanceFinder:
     """
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        rig = model.rig
-        parts = []
-        if model.friction is not None:
-            parts.append((0, make_single_law(model, numerics, patch)))
-        if rig.springs.interlock is not None:
-            stiffness, wavelength = rig.springs.interlock
-            parts.append((0, Spring(stiffness, wavelength=wavelength)))
-        if rig.springs.cubic is not None:
-            parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
         self.model = model
-        self.modes = rig.modes
+        self.modes = model.rig.modes
         self.patch = patch
         self.harmonics = model.accuracy.harmonics
         self.numerics = numerics
-        self.group = LawGroup(rig.modes, parts)
+        self.group = make_law_group(model, numerics, patch)
         self.tolerance = model.accuracy.tolerance
 
     def compute_steady_motion(self, drive, guess=None) -> Solution:
