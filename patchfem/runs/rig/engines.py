@@ -62,22 +62,7 @@ class Engine(NamedTuple):
 
     def find_unsupported_feature(self, model: Model) -> str:
         """Describe a property of a model that this engine cannot compute; "" if there is none."""
-        features = collect_motion_features(model)
-        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], features)
-
-
-class SteadyMethod(NamedTuple):
-    """Method that computes steady motions.
-
-    - engine: name of the engine whose code and numerical settings it uses.
-    """
-
-    name: str
-    engine: str
-
-
-SHOOTING = SteadyMethod("shooting", "hybrid")
-BALANCE = SteadyMethod("balance", "harmonic")
+        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], model.motion)
 
 
 def find_obstacle_of_map(name: str, model: Model) -> str:
@@ -85,17 +70,12 @@ def find_obstacle_of_map(name: str, model: Model) -> str:
 
     `name` is "harmonic", or one of the maps of a period, "exact" and "piecewise".
     """
-    features = collect_motion_features(model, steady=True)
+    features = model.motion._replace(waveform=NO_WAVEFORM)
     return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
-def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
-    """Return the features of a scene, with the waveform of the rig or, if `steady`, that of a response curve."""
-    return model.motion._replace(waveform=NO_WAVEFORM if steady else model.rig.drive.waveform)
-
-
-def choose_steady_method(model: Model) -> SteadyMethod:
-    """Choose the method that computes the steady motion of a model.
+def choose_steady_method(model: Model) -> str:
+    """Return the engine whose method computes the steady motion of a model: "hybrid" for shooting, or "harmonic".
 
     Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
     forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
@@ -104,7 +84,7 @@ def choose_steady_method(model: Model) -> SteadyMethod:
     is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
     if model.accuracy.harmonics is None:
         is_shot |= not find_obstacle_of_map("piecewise", model)
-    return SHOOTING if is_shot else BALANCE
+    return "hybrid" if is_shot else "harmonic"
 
 
 # ---- comparison runs
@@ -292,7 +272,7 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows."""
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
-    if choose_steady_method(model) is BALANCE:
+    if choose_steady_method(model) == "harmonic":
         return [own]
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
 
@@ -344,7 +324,7 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:
-        used = choose_steady_method(model).engine
+        used = choose_steady_method(model)
     reasons = {
         "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",

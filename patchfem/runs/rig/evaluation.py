@@ -5,7 +5,7 @@ quantities that their engine computes more accurately than from samples.
 """
 
 from dataclasses import replace
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -101,7 +101,7 @@ class RunEvaluator:
         prepare : dict
             CPU time of each part of the preparation [s].
         """
-        begin = perf_counter()
+        begin = process_time()
         drive = self.model.rig.drive
         fields = {}
         if drive.levels.amplitudes:
@@ -109,7 +109,7 @@ class RunEvaluator:
         else:
             run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
             run = _remove_incomplete_cycle(run)
-        return self.make_solution(run, perf_counter() - begin, prepare=prepare, **fields)
+        return self.make_solution(run, process_time() - begin, prepare=prepare, **fields)
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.

@@ -224,7 +224,6 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            runner.add_error_seconds(coarser.solution.seconds)
             solution = runner.solve(numerics)
             inputs.seconds["march"] = solution.seconds
         time_runs = engine.list_time_runs(model, numerics)
@@ -240,6 +239,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
     run = refine.refine(solve, numerics, _judge)
+    inputs.seconds["error"] = sum(one.seconds for one in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak)
 
