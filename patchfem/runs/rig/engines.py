@@ -23,7 +23,7 @@ from ...response.errors import (
     finer_errors,
     friction_errors,
 )
-from ...response.measures import Measures, Values
+from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
@@ -37,8 +37,6 @@ MERGE_WIDTH_FACTOR = 0.5
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
 TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
-# Largest relative error of an energy balance due to round-off; a billion steps have less.
-BALANCE_ROUND_OFF = 1e-8
 
 
 class Engine(NamedTuple):
@@ -287,20 +285,6 @@ HARMONIC = Engine(
     finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
-
-
-def describe_balance_error(engine: Engine, measures: Measures) -> str:
-    """Return a message if a time integration created or lost more energy than round-off, else "".
-
-    Other engines have the error of the balance as that of the measure.
-    """
-    balance = measures.get("energy_balance")
-    if not engine.has_steps or balance is None or not (balance.value or 0.0) > BALANCE_ROUND_OFF:
-        return ""
-    return (
-        f"the energy balance of engine {engine.name} has an error of {balance.value:.2g} of the energy exchanged, "
-        f"more than the limit of {BALANCE_ROUND_OFF:.2g}, so the numerical method created or lost energy"
-    )
 
 
 @lru_cache(8)

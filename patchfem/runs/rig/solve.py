@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ...response.coarser import ComparisonRuns, SourceErrors, StepRun, estimate_errors
 from ..results.result import N_FRAMES, RunInputs
-from . import bond_lists, costs, event_to_event, march
+from . import event_to_event, march
 from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
@@ -41,14 +41,6 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     else:
         run = steady.solve_steady_motion
     return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
-
-
-def refuse_long_run(model, numerics) -> None:
-    """Raise Missing if a run would take too much CPU time, or has too long time steps."""
-    if numerics.engine == "hybrid":
-        costs.refuse_long_hybrid_run(model)
-    elif numerics.engine == "march":
-        bond_lists.refuse_unresolved_bond_vibration(model, numerics)
 
 
 class Runner:
