@@ -4,10 +4,7 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
-from dataclasses import replace
 from time import process_time
-
-import numpy as np
 
 from ...core import Outcome
 from ...effects import law_has_trait
@@ -108,7 +105,6 @@ class RunEvaluator:
             run, fields = run_levels(self, frames, progress)
         else:
             run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
-            run = _remove_incomplete_cycle(run)
         return self.make_solution(run, process_time() - begin, prepare=prepare, **fields)
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
@@ -237,32 +233,6 @@ class RunEvaluator:
             extremes=run.extremes,
             **(fields | other_fields),
         )
-
-
-def _remove_incomplete_cycle(run):
-    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
-    count = int(run.cycles_done + 1e-9)
-    if not count or count >= len(run.extremes):
-        return run
-    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
-
-
-def find_numbers(window) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers (k,) of the samples of a window, and whether they are of equal distances and not of events (k,)."""
-    position = (window.time - window.time[0]) / np.diff(window.time).max()
-    number = np.round(position).astype(int)
-    return number, np.abs(position - number) <= 1e-6
-
-
-def thin_samples(window):
-    """Remove every second sample of a uniformly sampled window.
-
-    The last sample and the samples of events in between remain.
-    """
-    number, is_even = find_numbers(window)
-    is_retained = ~is_even | (number % 2 == 0)
-    is_retained[-1] = True
-    return window.select(is_retained)
 
 
 def compute_sampled_work(response) -> Values:

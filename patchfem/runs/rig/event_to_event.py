@@ -44,8 +44,6 @@ from .evaluation import (
     RunEvaluator,
     compute_sampled_work,
     compute_work_check,
-    find_numbers,
-    thin_samples,
 )
 from .joints import Joints, make_joints
 from .solution import (
@@ -118,7 +116,6 @@ class LumpedRun:
     - cycles_done: number of cycles.
     - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
-    - repeats: whether the motion repeats after each cycle.
     """
 
     values: Values
@@ -133,7 +130,6 @@ class LumpedRun:
     cycles_done: float
     log: Events | None = None
     snapshots: list[ElementSnapshot] = field(default_factory=list)
-    repeats: bool = False
 
 
 def run_from_event_to_event(
@@ -182,6 +178,8 @@ class LumpedEvaluator(RunEvaluator):
     ) -> LumpedRun:
         """Integrate the motion under a drive from the end of another run; see `RunEvaluator.integrate`."""
         run = self.integrate_from(drive, cycles, None if before is None else before.end, frames)
+        if not self.model.rig.drive.levels.amplitudes:
+            run = _remove_incomplete_cycle(run)
         # Measures of the whole run add up from level to level.
         for name in select_names("run"):
             if before is not None and name in before.values:
@@ -311,8 +309,7 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(motion, response, times.snapshots, start),
-            repeats=motion.repeats,
+            snapshots=self._list_snapshots(response, times.snapshots, start),
         )
         return strips.average_over_strips(run, self.patch) if self.strips_slide_apart else run
 
@@ -353,32 +350,32 @@ class LumpedEvaluator(RunEvaluator):
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
         return sort_events(events)
 
-    def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
-        """Return the stretches of the elements of patches at given times, from all reversals before.
+    def _list_snapshots(self, response: Response, times, start) -> list[ElementSnapshot]:
+        """Return the stretches of the elements of patches at given times, from the whole motion before.
 
-        Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
+        What happened before its start is in the memory of its `State`, if it does not start from rest.
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
 
-        slides = response.slides
         at = np.searchsorted(response.time, times)
         states = []
         for i, (_, limit) in enumerate(self.joints.elements):
-            reversals = motion.list_reversals(i)
-            if start is not None:
-                reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
+            # Between two turns of the slide all elements move alike, so that the turns determine their stretches.
+            slide = response.slides[:, i]
+            directions = np.sign(np.diff(slide))
+            turns = 1 + np.flatnonzero(directions[1:] != directions[:-1])
+            points = np.union1d(np.append(0, turns), at)
+            path = slide[:1] if start is None else _list_remembered_slides(start, i)
+            steps = np.diff(np.append(path, slide[points]))
 
-            # Between two reversals all elements move alike, so that these points determine their stretches.
-            path = np.concatenate([reversals, np.stack([times, slides[at, i]], axis=1)])
-            order = np.argsort(path[:, 0], kind="stable")
             stretch = np.zeros(np.shape(limit))
-            found = {}
-            for k, step in zip(order, np.diff(path[order, 1], prepend=reversals[0, 1])):
+            stretches = []
+            for step in steps:
                 stretch = np.clip(stretch + step, -limit, limit)
-                found[k] = stretch
-            frames = range(len(reversals), len(path))
-            states.append([(float(path[k, 1]), found[k]) for k in frames])
+                stretches.append(stretch)
+            found = dict(zip(points, stretches[path.size - 1 :]))
+            states.append([(float(slide[k]), found[k]) for k in at])
         return [ElementSnapshot(float(time), list(faces)) for time, *faces in zip(times, *states)]
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
@@ -422,7 +419,7 @@ class LumpedEvaluator(RunEvaluator):
             "is_single_interface": True,
             "loop": compute_sampled_loop(window, drive, float(work / cycles)),
             # The other measures need samples of equal distances.
-            "window": window.select(find_numbers(window)[1]),
+            "window": window.select(_find_even_samples(window)),
         }
 
     def _limit_loop_measures(self, run) -> dict[str, None]:
@@ -468,8 +465,10 @@ class LumpedEvaluator(RunEvaluator):
         """
         if not hasattr(drive, "band"):
             return {}
-        # They follow from the changes when every second sample of the window is removed.
-        thinned = replace(run, window=thin_samples(run.window))
+        # They follow from the changes when every second sample of the window is removed, except for the last one.
+        count = run.window.time.size
+        samples = np.append(np.arange(0, count - 1, 2), count - 1)
+        thinned = replace(run, window=run.window.select(samples))
         coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
         errors = {}
         for name, change in absolute_change(values, coarse_values).items():
@@ -480,15 +479,28 @@ class LumpedEvaluator(RunEvaluator):
         return errors
 
 
+def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
+    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
+    count = int(run.cycles_done + 1e-9)
+    if not count or count >= len(run.extremes):
+        return run
+    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
+
+
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
     """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period."""
     count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
 
 
-def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:
-    """Return the time 0 and the slides [m] (k, 2) of the origin and of the reversals that a law remembers."""
+def _find_even_samples(window: Response) -> np.ndarray:
+    """Return which samples (k,) of a window are of equal distances, and not of events."""
+    position = (window.time - window.time[0]) / np.diff(window.time).max()
+    return np.abs(position - np.round(position)) <= 1e-6
+
+
+def _list_remembered_slides(state: State, interface: int) -> np.ndarray:
+    """Return the slides (k,) [m] of the origin and of the reversals that a law remembers."""
     memory = state.memory[interface]
     stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
-    slides = memory[Memory.ORIGIN] + np.append(0.0, stack)
-    return np.stack([np.zeros(slides.size), slides], axis=1)
+    return memory[Memory.ORIGIN] + np.append(0.0, stack)

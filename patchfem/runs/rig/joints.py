@@ -121,7 +121,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = _find_rigid_law(model, patch)
+        law = _find_rigid_law(model.friction, model, patch)
         return [Joint(law, load, speed, *parts) for load, parts in _list_patch_parts(model, patch)]
 
     joints = []
@@ -130,13 +130,13 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         parts = ()
         if own.partial_slip:
             parts = faces.make_patch_elements(own, model.accuracy.tolerance, k in meshed)
-        joints.append(Joint(own.numbers, load, speed, *parts))
+        law = _find_rigid_law(own.numbers, model, patch)
+        joints.append(Joint(law, load, speed, *parts))
     return joints
 
 
-def _find_rigid_law(model: Model, patch):
-    """Return the law of the table [contact]; a law that averages the pressure is Coulomb's law on a rigid block."""
-    law = model.friction
+def _find_rigid_law(law, model: Model, patch):
+    """Return the law of an interface; a law that averages the pressure is Coulomb's law on a rigid block."""
     if not law_has_trait(law.law, "averaged"):
         return law
     static = law.static * averaged_law.slip_force_ratio(model, patch)

@@ -92,19 +92,6 @@ class BalanceEvaluator(RunEvaluator):
         return fields | {"integrated": IntegratedMeasures(values, reversals=pairs)}
 
 
-class CycleMeasures(NamedTuple):
-    """Measures, histories and energies of one cycle of a motion from harmonic balance.
-
-    - values: measures by name.
-    - response: Response of the cycle.
-    - book: energies [J] and counters by name.
-    """
-
-    values: Values
-    response: Response
-    book: Values
-
-
 class StableMotion(NamedTuple):
     """Reported steady motion, with its stability and notes on coexisting motions.
 
@@ -147,14 +134,14 @@ class BalanceFinder:
         begin = perf_counter()
         motion = self._solve_balance(drive, guess)
         motion, stability, notes = self._find_stable_motion(drive, motion)
-        values, response, book = self._compute_measures(motion, drive)
+        values, run = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
             motion,
             drive,
-            lambda motion, sine: (
-                self._compute_measures(motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE).values
-            ),
+            lambda motion, sine: self._compute_measures(
+                motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE
+            )[0],
         )
 
         # The instants of slip have at least the error of a sample, and a phase at most that of half a cycle.
@@ -175,13 +162,13 @@ class BalanceFinder:
 
         return Solution(
             values,
-            response,
-            response,
+            run.window,
+            run.window,
             np.array([values[AMPLITUDE]]),
             (None, None),
             outcome,
             [],
-            book,
+            run.ledger,
             perf_counter() - begin,
             message=message,
             errors=errors,
@@ -288,24 +275,23 @@ class BalanceFinder:
 
     def _compute_measures(
         self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
-    ) -> CycleMeasures:
-        """Compute the measures of a steady motion from samples of its cycle."""
-        response = make_cycle_response(motion, self.modes, drive, samples)
-        book = find_cycle_energies(motion, self.modes) | {
+    ) -> tuple[Values, CycleRun]:
+        """Compute the measures of a steady motion by name, and its cycle, from samples."""
+        window = make_cycle_response(motion, self.modes, drive, samples)
+        energies = find_cycle_energies(motion, self.modes)
+        speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)
+        energies |= {
             "stored": 0.0,
             "iterations": float(motion.iterations),
-        }
-        speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)
-        book |= {
-            "power": abs(book["work_in"]),
+            "power": abs(energies["work_in"]),
             "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2)),
         }
         top = motion.amplitude(self.modes.output)
-        middle = (response.output.max() + response.output.min()) / 2
+        middle = (window.output.max() + window.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = CycleRun(response, extremes, book, motion.find_reversals())
+        run = CycleRun(window, extremes, energies, motion.find_reversals())
         evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
-        return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
+        return evaluator.evaluate_measures(run, drive), run
 
     def trace_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation through its folds."""
