@@ -9,6 +9,7 @@ from time import process_time
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
+from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.events import is_all_stuck
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
@@ -24,7 +25,6 @@ from .levels import run_levels
 from .solution import (
     Fields,
     Solution,
-    find_release_amplitude,
     first_interface_load,
     first_mode_stiffness,
 )
@@ -156,9 +156,12 @@ class RunEvaluator:
 
         values = compute_measures(last_cycles)
 
-        # The amplitude of a decay is that of a cycle, not of the whole window.
+        # The amplitude of a decay is that of its last complete cycle, not of the whole window.
         if model.rig.drive.kind == "free":
-            values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
+            motion = (window.time, window.output, window.output_rate)
+            swing = measure_last_cycle_amplitude(*motion, drive.period)
+            if swing is not None:
+                values[AMPLITUDE] = swing
         return values
 
     def is_stuck(self, run) -> bool:

@@ -117,17 +117,6 @@ class MarchEvaluator(RunEvaluator):
         """
         return peak_sampling_errors(run.window)
 
-    def _compute_energies(self, run, drive, *, stuck: bool) -> Values:
-        """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
-
-        This scale is the kinetic energy at the peak speed of the drive.
-        """
-        if not (stuck and self.contact.set_valued):
-            return run.ledger
-        rig = self.model.rig
-        moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
-        return run.ledger | {"power": run.ledger["power"] + moving}
-
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
 
@@ -142,11 +131,16 @@ class MarchEvaluator(RunEvaluator):
         """
         if not self.has_friction:
             return {}
-        energies = self._compute_energies(run, drive, stuck=stuck)
-        values = {"work_check": compute_work_check(energies)}
+        energies = run.ledger
+        missing = {}
         if stuck and self.contact.set_valued:
-            # The remaining motion of a stuck interface is round-off, not slip.
-            values |= {"slip_start_phase": None, "stick_fraction": 1.0}
+            # The remaining motion of a stuck interface is round-off, not slip. Its energies are compared with the kinetic
+            # energy at the peak speed of the drive.
+            rig = self.model.rig
+            moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
+            energies = energies | {"power": energies["power"] + moving}
+            missing = {"slip_start_phase": None, "stick_fraction": 1.0}
+        values = {"work_check": compute_work_check(energies)} | missing
         return {
             "integrated": IntegratedMeasures(values),
             "run_energies": energies,
