@@ -176,8 +176,22 @@ class LumpedEvaluator(RunEvaluator):
     def integrate(
         self, drive, cycles: float, before: LumpedRun | None, frames: int = 0, progress=None
     ) -> LumpedRun:
-        """Integrate the motion under a drive from the end of another run; see `RunEvaluator.integrate`."""
-        run = self.integrate_from(drive, cycles, None if before is None else before.end, frames)
+        """Integrate the motion under a drive from the end of another run.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before : LumpedRun or None
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
+        run = self.resume(drive, cycles, None if before is None else before.end, frames)
         if not self.model.rig.drive.levels.amplitudes:
             run = _remove_incomplete_cycle(run)
         # Measures of the whole run add up from level to level.
@@ -188,9 +202,7 @@ class LumpedEvaluator(RunEvaluator):
             progress(1.0)
         return run
 
-    def integrate_from(
-        self, drive, cycles: float, state: State | None, frames: int = 0
-    ) -> LumpedRun:
+    def resume(self, drive, cycles: float, state: State | None, frames: int = 0) -> LumpedRun:
         """Integrate the motion under a drive.
 
         Parameters

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.harmonic.forces import LawGroup
-from ...dynamics.harmonic.laws import Spring
+from ...dynamics.harmonic import forces
+from ...dynamics.harmonic import laws as balance_laws
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
@@ -293,7 +293,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
     return list_joints(model, patch, numerics.meshed)[0].make_element()
 
 
-def make_law_group(model: Model, numerics: Numerics, patch) -> LawGroup:
+def make_law_group(model: Model, numerics: Numerics, patch) -> "forces.LawGroup":
     """Return the laws of all interfaces and the nonlinear springs of a rig for harmonic balance.
 
     Parameters
@@ -318,7 +318,7 @@ def make_law_group(model: Model, numerics: Numerics, patch) -> LawGroup:
         parts = [(k, joint.make_element()) for k, joint in enumerate(joints)]
     if rig.springs.interlock is not None:
         stiffness, wavelength = rig.springs.interlock
-        parts.append((0, Spring(stiffness, wavelength=wavelength)))
+        parts.append((0, balance_laws.Spring(stiffness, wavelength=wavelength)))
     if rig.springs.cubic is not None:
-        parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
-    return LawGroup(rig.modes, parts)
+        parts.append((rig.modes.output, balance_laws.Spring(cubic=rig.springs.cubic)))
+    return forces.LawGroup(rig.modes, parts)

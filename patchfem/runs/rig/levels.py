@@ -174,7 +174,19 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     level_results = []
 
     def solve(level: float, before, n_frames: int = 0, report=None) -> tuple[Any, Level]:
-        """Run a level [m s-2] from the end of another run, None for rest; return the run and its Level."""
+        """Run a level, and return the run and its Level.
+
+        Parameters
+        ----------
+        level : float
+            Drive level [m s-2].
+        before
+            Run from whose end the level goes on; None for rest.
+        n_frames : int
+            Number of snapshots of the interface in the last cycle.
+        report : callable, optional
+            Callback for the completed fraction.
+        """
         sine = SineDrive(level, omega, drive.signal.moving)
         run = evaluator.integrate(sine, drive.levels.cycles, before, n_frames, report)
         values = evaluator.evaluate_measures(run, sine)

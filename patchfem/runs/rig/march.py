@@ -69,7 +69,21 @@ class MarchEvaluator(RunEvaluator):
     def integrate(
         self, drive, cycles: float, before: engine.Motion | None, frames: int = 0, progress=None
     ) -> engine.Motion:
-        """Integrate the motion under a drive from the end of another run; see `RunEvaluator.integrate`."""
+        """Integrate the motion under a drive from the end of another run.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before : points.time_march.Motion or None
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
         rig = self.model.rig
         numerics = self.numerics
         # Strips that slide independently have no common shear stress, so no output frames are stored.
