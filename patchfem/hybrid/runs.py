@@ -74,11 +74,6 @@ class Motion:
     time: float
     repeats: bool
 
-    def _slides(self, rows) -> np.ndarray:
-        """Return the slides (k, i) [m] of the interfaces at rows."""
-        n = self.case.rig.modes.shape[1]
-        return rows[:, 1 : 1 + n] @ self.case.rig.rows[0].T
-
     def _columns(self, rows, number: int) -> np.ndarray:
         """Return forces (0), loads (1) or directions (2) of the friction interfaces (k, i) at rows."""
         first = 1 + self.case.y.size + number * self.case.rig.faces.shape[0]
@@ -90,12 +85,6 @@ class Motion:
         They are 0 while a rigid interface rests, and while all elements of an interface stick.
         """
         return self._columns(np.concatenate([self.rows[:1], self.event_rows]), 2)
-
-    def list_reversals(self, interface: int) -> np.ndarray:
-        """Return times [s] and slides [m] (k, 2) at which the motion of an interface starts and reverses."""
-        is_own = (self.event_rows[:, -2] == interface) & (self.event_rows[:, -1] == Margin.MOTION)
-        rows = np.concatenate([self.rows[:1], self.event_rows[is_own]])
-        return np.stack([rows[:, 0], self._slides(rows)[:, interface]], axis=1)
 
     def make_response(self, modes: ModalBasis, drive) -> Response:
         """Return the stored samples as histories.

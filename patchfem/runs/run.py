@@ -463,10 +463,7 @@ def hash_run(model, patch, version: str) -> str:
 
 def is_march(run_plan: Plan) -> bool:
     """Return whether a run is a time march, whose state can be saved."""
-    if run_plan.model.rig is None:
-        return False
-
-    return engines.ENGINES[run_plan.engine].has_steps
+    return run_plan.model.rig is not None and engines.ENGINES[run_plan.engine].has_steps
 
 
 def _has_no_load(model: Model) -> bool:

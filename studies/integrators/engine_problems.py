@@ -18,7 +18,7 @@ from patchfem.hybrid.laws import masing
 from patchfem.model import build
 from patchfem.points import contacts, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.interface import make_single_law
+from patchfem.runs.rig.joints import make_single_law
 from patchfem.scene import scene
 from patchfem.structure import make_release
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import patchfem as pf
 from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.interface import make_contact
+from patchfem.runs.rig.joints import make_contact
 from patchfem.structure.drives import RecordedDrive
 
 G = 9.80665  # [m/s^2] standard gravity

@@ -27,7 +27,7 @@ from patchfem.dynamics import LawGroup, find_free_motions, make_free_balance
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs import run as runner
-from patchfem.runs.rig.interface import make_single_law
+from patchfem.runs.rig.joints import make_single_law
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent

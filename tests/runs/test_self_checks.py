@@ -60,7 +60,7 @@ def test_exact_motion_satisfies_equation_of_motion_of_scene(text, changes):
             lambda balance: balance | {"friction": (1 + 1e-6) * balance["friction"]},
             POINT + NONLOCAL + RIG,
             CHANGES + MARCH,
-            "the numerical method created or lost energy",
+            "of the exchanged energy is missing or was created (limit 1e-8)",
         ),
         (
             bench,

@@ -15,7 +15,7 @@ from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
 from ...runs.patch import mesh_levels
-from ...runs.rig import costs, engines, hybrid_laws, numerics
+from ...runs.rig import costs, engines, joints
 
 
 def export_structure(model: Model, out: Path) -> str:
@@ -126,8 +126,7 @@ def make_elements(model: Model) -> dict[str, np.ndarray]:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
 
     # as many elements as the first run would use, which merges neighbours in pairs
-    settings = numerics.choose_numerics(model)
-    groups = [_sort_elements(*one) for one in hybrid_laws.list_elements(model, settings, patch)]
+    groups = [_sort_elements(*joint.list_elements()) for joint in joints.list_joints(model, patch)]
     for _ in range(costs.count_cell_merges(model)):
         groups = [join_cells(2, 0, *group) for group in groups]
     stiffness, yields = (np.concatenate(parts) for parts in zip(*groups))

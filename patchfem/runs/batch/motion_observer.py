@@ -57,7 +57,7 @@ class MotionObserver:
     @cached_property
     def finder(self):
         """Finder of periodic motions; the motions of other engines are those of runs from rest."""
-        finder_class = FINDERS[choose_steady_method(self.model).name]
+        finder_class = FINDERS[choose_steady_method(self.model)]
         return finder_class(self.model, self.numerics, self.patch, 0, self.report)
 
     def __call__(self, drive, initial_guess=None) -> ObservedMotion | None:

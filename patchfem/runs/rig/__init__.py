@@ -12,7 +12,7 @@ Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, and
 folder `steady`), which prepares the integration in `dynamics` or `hybrid` and contains the measures that the
 engine computes itself.
 `evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive
-level. `interface` makes the contact model of an engine from the friction of a patch. `numerics` has
-the numerical settings. `costs` has the predicted cost, on which the choice of an engine, plans and
-refusals are based; `bond_lists` has the same for a bond list.
+level. `joints` makes the laws and contact models of each engine from the friction of a patch. `numerics` has
+the numerical settings. `costs` has the predicted cost, on which the choice of an engine is based; `bond_lists` has
+the length of a bond list, and the refusal of steps that are too long for it.
 """

@@ -109,20 +109,8 @@ def make_laws_on_mesh(model, patch, meshed=()) -> "forces.LawGroup":
     PatchfemError
         If a law has no steady loop.
     """
-    rig = model.rig
-    if len(rig.friction.interfaces) < 2:
-        return balance.BalanceFinder(
-            model,
-            replace(numerics.choose_numerics(with_automatic_method(model)), meshed=meshed),
-            patch,
-        ).group
-    return forces.LawGroup(
-        rig.modes,
-        [
-            (k, joint.make_element(rig.speed_scale))
-            for k, joint in enumerate(joints.list_joints(model, None, meshed))
-        ],
-    )
+    settings = numerics.choose_numerics(with_automatic_method(model))
+    return joints.make_law_group(model, replace(settings, meshed=meshed), patch)
 
 
 def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> "list[forces.LawGroup]":

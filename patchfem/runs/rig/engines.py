@@ -23,7 +23,7 @@ from ...response.errors import (
     finer_errors,
     friction_errors,
 )
-from ...response.measures import Measures, Values
+from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
@@ -37,8 +37,6 @@ MERGE_WIDTH_FACTOR = 0.5
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
 TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
-# Largest relative error of an energy balance due to round-off; a billion steps have less.
-BALANCE_ROUND_OFF = 1e-8
 
 
 class Engine(NamedTuple):
@@ -62,22 +60,7 @@ class Engine(NamedTuple):
 
     def find_unsupported_feature(self, model: Model) -> str:
         """Describe a property of a model that this engine cannot compute; "" if there is none."""
-        features = collect_motion_features(model)
-        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], features)
-
-
-class SteadyMethod(NamedTuple):
-    """Method that computes steady motions.
-
-    - engine: name of the engine whose code and numerical settings it uses.
-    """
-
-    name: str
-    engine: str
-
-
-SHOOTING = SteadyMethod("shooting", "hybrid")
-BALANCE = SteadyMethod("balance", "harmonic")
+        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], model.motion)
 
 
 def find_obstacle_of_map(name: str, model: Model) -> str:
@@ -85,17 +68,12 @@ def find_obstacle_of_map(name: str, model: Model) -> str:
 
     `name` is "harmonic", or one of the maps of a period, "exact" and "piecewise".
     """
-    features = collect_motion_features(model, steady=True)
+    features = model.motion._replace(waveform=NO_WAVEFORM)
     return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
-def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
-    """Return the features of a scene, with the waveform of the rig or, if `steady`, that of a response curve."""
-    return model.motion._replace(waveform=NO_WAVEFORM if steady else model.rig.drive.waveform)
-
-
-def choose_steady_method(model: Model) -> SteadyMethod:
-    """Choose the method that computes the steady motion of a model.
+def choose_steady_method(model: Model) -> str:
+    """Return the engine whose method computes the steady motion of a model: "hybrid" for shooting, or "harmonic".
 
     Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
     forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
@@ -104,7 +82,7 @@ def choose_steady_method(model: Model) -> SteadyMethod:
     is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
     if model.accuracy.harmonics is None:
         is_shot |= not find_obstacle_of_map("piecewise", model)
-    return SHOOTING if is_shot else BALANCE
+    return "hybrid" if is_shot else "harmonic"
 
 
 # ---- comparison runs
@@ -292,7 +270,7 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows."""
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
-    if choose_steady_method(model) is BALANCE:
+    if choose_steady_method(model) == "harmonic":
         return [own]
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
 
@@ -307,20 +285,6 @@ HARMONIC = Engine(
     finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
-
-
-def describe_balance_error(engine: Engine, measures: Measures) -> str:
-    """Return a message if a time integration created or lost more energy than round-off, else "".
-
-    Other engines have the error of the balance as that of the measure.
-    """
-    balance = measures.get("energy_balance")
-    if not engine.has_steps or balance is None or not (balance.value or 0.0) > BALANCE_ROUND_OFF:
-        return ""
-    return (
-        f"the energy balance of engine {engine.name} has an error of {balance.value:.2g} of the energy exchanged, "
-        f"more than the limit of {BALANCE_ROUND_OFF:.2g}, so the numerical method created or lost energy"
-    )
 
 
 @lru_cache(8)
@@ -344,7 +308,7 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:
-        used = choose_steady_method(model).engine
+        used = choose_steady_method(model)
     reasons = {
         "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",

@@ -4,21 +4,21 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
-import numpy as np
+from time import process_time
 
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
+from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.events import is_all_stuck
-from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import Values, relative_gap
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
+from .levels import run_levels
 from .solution import (
     Fields,
     Solution,
-    find_release_amplitude,
     first_interface_load,
     first_mode_stiffness,
 )
@@ -61,6 +61,45 @@ class RunEvaluator:
         # With a law that creeps, the interface slips under every force, however small.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
+
+    def integrate(self, drive, cycles: float, before, frames: int = 0, progress=None):
+        """Integrate the motion under a drive, and return the run of the engine.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
+        raise NotImplementedError
+
+    def solve(self, frames: int, progress, prepare: Values) -> Solution:
+        """Compute the motion of the rig, for one drive level after another, and its Solution.
+
+        Parameters
+        ----------
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable or None
+            Callback for the completed fraction.
+        prepare : dict
+            CPU time of each part of the preparation [s].
+        """
+        begin = process_time()
+        drive = self.model.rig.drive
+        fields = {}
+        if drive.levels.amplitudes:
+            run, fields = run_levels(self, frames, progress)
+        else:
+            run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
+        return self.make_solution(run, process_time() - begin, prepare=prepare, **fields)
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
@@ -111,9 +150,12 @@ class RunEvaluator:
 
         values = compute_measures(last_cycles)
 
-        # The amplitude of a decay is that of a cycle, not of the whole window.
+        # The amplitude of a decay is that of its last complete cycle, not of the whole window.
         if model.rig.drive.kind == "free":
-            values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
+            motion = (window.time, window.output, window.output_rate)
+            swing = measure_last_cycle_amplitude(*motion, drive.period)
+            if swing is not None:
+                values[AMPLITUDE] = swing
         return values
 
     def is_stuck(self, run) -> bool:
@@ -180,45 +222,6 @@ class RunEvaluator:
             phasors=run.phasors,
             **(fields | other_fields),
         )
-
-    def evaluate_level(self, level: float, run, drive=None, relative_error: float = 0.0) -> Level:
-        """Evaluate the measures of a run at one drive level.
-
-        Parameters
-        ----------
-        level : float
-            Drive level [m s-2].
-        run
-            Run of the engine, with all cycles or with those of a drive level.
-        drive : optional
-            Drive of the run; default: that of the model.
-        relative_error : float
-            Relative error of the measures.
-        """
-        values = self.evaluate_measures(run, drive)
-        values = {name: values[name] for name in LEVEL_MEASURES if name in values}
-        errors = {}
-        if relative_error:
-            errors = {name: relative_error * abs(value) for name, value in values.items()}
-        return Level(level, self.is_stuck(run), values, errors)
-
-
-def find_numbers(window) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers (k,) of the samples of a window, and whether they are of equal distances and not of events (k,)."""
-    position = (window.time - window.time[0]) / np.diff(window.time).max()
-    number = np.round(position).astype(int)
-    return number, np.abs(position - number) <= 1e-6
-
-
-def thin_samples(window):
-    """Remove every second sample of a uniformly sampled window.
-
-    The last sample and the samples of events in between remain.
-    """
-    number, is_even = find_numbers(window)
-    is_retained = ~is_even | (number % 2 == 0)
-    is_retained[-1] = True
-    return window.select(is_retained)
 
 
 def compute_sampled_work(response) -> Values:

@@ -44,11 +44,8 @@ from .evaluation import (
     RunEvaluator,
     compute_sampled_work,
     compute_work_check,
-    find_numbers,
-    thin_samples,
 )
-from .hybrid_laws import Joints, make_joints
-from .levels import remove_incomplete_cycle, run_levels
+from .joints import Joints, make_joints
 from .solution import (
     Fields,
     Solution,
@@ -76,17 +73,21 @@ class ElementSnapshot(NamedTuple):
     """State of the elements of patches at an instant of the last cycle.
 
     - time: [s].
-    - slide, slip, force: of the first interface [m], [m], [N].
-    - stretch (e,): stretches of the elements of the first interface [m].
     - faces: displacement [m] and stretches (e,) [m] of each interface.
     """
 
     time: float
-    slide: float
-    slip: float
-    force: float
-    stretch: np.ndarray
     faces: list
+
+    @property
+    def slide(self) -> float:
+        """Displacement of the first interface [m]."""
+        return self.faces[0][0]
+
+    @property
+    def stretch(self) -> np.ndarray:
+        """Stretches (e,) of the elements of the first interface [m]."""
+        return self.faces[0][1]
 
 
 class SampleTimes(NamedTuple):
@@ -115,7 +116,6 @@ class LumpedRun:
     - cycles_done: number of cycles.
     - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
-    - repeats: whether the motion repeats after each cycle.
     """
 
     values: Values
@@ -130,7 +130,6 @@ class LumpedRun:
     cycles_done: float
     log: Events | None = None
     snapshots: list[ElementSnapshot] = field(default_factory=list)
-    repeats: bool = False
 
 
 def run_from_event_to_event(
@@ -158,47 +157,9 @@ def run_from_event_to_event(
     """
     begin = perf_counter()
     joints = make_joints(model, numerics, patch)
-    reduced = perf_counter() - begin
+    prepare = {"reduce": perf_counter() - begin}
     compiled.load("hybrid.engine_kernels", say)
-    evaluator = LumpedEvaluator(model, numerics, patch, joints)
-    rig = model.rig
-
-    def integrate(drive, before, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate the motion under a drive.
-
-        Parameters
-        ----------
-        drive
-            Acceleration of the base, or force over the modal mass.
-        before
-            Run from whose end the motion goes on; None for the start of the rig.
-        watch : callable or None
-            Function that takes the completed fraction.
-        is_last : bool
-            Whether this is the last of several runs, whose frames are kept.
-        cycles : float
-            Number of cycles of the drive.
-        """
-        state = None if before is None else before.end
-        run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
-
-        # Measures of the whole run add up from level to level.
-        for name in select_names("run"):
-            if before is not None and name in before.values:
-                run.values[name] += before.values[name]
-        if watch is not None:
-            watch(1.0)
-        return run
-
-    fields = {}
-    begin = perf_counter()
-    if rig.drive.levels.amplitudes:
-        run, fields = run_levels(evaluator, integrate, progress)
-    else:
-        run = integrate(rig.drive.signal, None, progress, True, numerics.cycles)
-        run = remove_incomplete_cycle(run)
-    fields["prepare"] = {"reduce": reduced}
-    return evaluator.make_solution(run, perf_counter() - begin, **fields)
+    return LumpedEvaluator(model, numerics, patch, joints).solve(frames, progress, prepare)
 
 
 class LumpedEvaluator(RunEvaluator):
@@ -212,7 +173,36 @@ class LumpedEvaluator(RunEvaluator):
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
         self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
 
-    def integrate(self, drive, cycles: float, state: State | None, frames: int) -> LumpedRun:
+    def integrate(
+        self, drive, cycles: float, before: LumpedRun | None, frames: int = 0, progress=None
+    ) -> LumpedRun:
+        """Integrate the motion under a drive from the end of another run.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before : LumpedRun or None
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
+        run = self.resume(drive, cycles, None if before is None else before.end, frames)
+        if not self.model.rig.drive.levels.amplitudes:
+            run = _remove_incomplete_cycle(run)
+        # Measures of the whole run add up from level to level.
+        for name in select_names("run"):
+            if before is not None and name in before.values:
+                run.values[name] += before.values[name]
+        if progress is not None:
+            progress(1.0)
+        return run
+
+    def resume(self, drive, cycles: float, state: State | None, frames: int = 0) -> LumpedRun:
         """Integrate the motion under a drive.
 
         Parameters
@@ -222,7 +212,7 @@ class LumpedEvaluator(RunEvaluator):
         cycles : float
             Number of cycles of the drive.
         state : State or None
-            End of another run from which the motion goes on; None for the start of the rig.
+            State from which the motion goes on; None for the start of the rig.
         frames : int
             Number of snapshots of the elements in the last cycle.
         """
@@ -230,8 +220,12 @@ class LumpedEvaluator(RunEvaluator):
         times = self._choose_times(drive, cycles, frames)
         motion = self._run(drive, cycles, times.samples, travel, state)
         outcome = EARLY_ENDS.get(motion.status)
-        message = self._explain_end(motion, travel) if outcome is not None else ""
-        if motion.status not in (Status.DONE, *EARLY_ENDS):
+        message = ""
+        if outcome is Outcome.LEAVES_GROOVES:
+            message = self.model.grooves.describe_lift(motion.time)
+        elif outcome is not None:
+            message = describe_escape(self.model.rig, travel)
+        elif motion.status != Status.DONE:
             raise NotConverged(motion.message)
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
@@ -240,12 +234,6 @@ class LumpedEvaluator(RunEvaluator):
             motion = self._run(drive, cycles, times.samples, np.inf, state)
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
-
-    def _explain_end(self, motion, travel: float) -> str:
-        """Return why a motion ended early, "" if it reached the travel of the scene."""
-        if motion.status == Status.LEAVES_GROOVES:
-            return self.model.grooves.describe_lift(motion.time)
-        return describe_escape(self.model.rig, travel)
 
     def _run(self, drive, cycles: float, times, travel: float, state: State | None):
         """Return the `hybrid.runs.Motion` of a drive.
@@ -280,28 +268,19 @@ class LumpedEvaluator(RunEvaluator):
         period = drive.period
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
-        first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
-
-        # Before the last cycles the distances are equal, unless the run omits this part.
-        even = choose_samples_per_cycle(drive, cycles)
-        count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, N_EARLY_SAMPLES // max(cycles, 1)))
-        if not self.numerics.whole:
-            first = window_start
-            count = 0
+        first = window_start
         early = np.zeros(0)
-        if count:
+        if self.numerics.whole:
+            # Before the last cycles the distances are larger, and equal.
+            first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
+            count = max(1, min(EARLY_SAMPLES_PER_CYCLE, N_EARLY_SAMPLES // max(cycles, 1)))
+            count = choose_samples_per_cycle(drive, cycles) or count
             early = np.arange(0.0, first - 1e-9 * period, period / count)
 
         # Each of the last cycles has LATE_SAMPLES_PER_CYCLE samples.
-        late = [
-            _divide(begin, stop, period, minimum)
-            for begin, stop, minimum in (
-                (first, window_start, 2),
-                (window_start, end, MIN_WINDOW_SAMPLES),
-            )
-            if stop > begin
-        ]
-        late = np.unique(np.concatenate(late))
+        late = _divide(window_start, end, period, MIN_WINDOW_SAMPLES)
+        if first < window_start:
+            late = np.union1d(_divide(first, window_start, period, 2), late)
 
         # A snapshot is taken at a sample, where all histories have a value.
         begin = max(0.0, end - period)
@@ -342,20 +321,9 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(motion, response, times.snapshots, start),
-            repeats=motion.repeats,
+            snapshots=self._list_snapshots(response, times.snapshots, start),
         )
-        if not self.strips_slide_apart:
-            return run
-
-        # The histories of independent strips are averages, weighted by their loads.
-        loads = strips.compute_strip_loads(self.patch)
-        offsets = self.patch.strips.offsets
-        return replace(
-            run,
-            response=strips.average_histories_over_strips(response, loads, offsets),
-            window=strips.average_histories_over_strips(window, loads, offsets),
-        )
+        return strips.average_over_strips(run, self.patch) if self.strips_slide_apart else run
 
     def _add_vertical_force(self, response: Response, drive) -> Response:
         """Return histories with the vertical force on the flanks, which carries load and lifted mass, as normal load."""
@@ -394,35 +362,33 @@ class LumpedEvaluator(RunEvaluator):
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
         return sort_events(events)
 
-    def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
-        """Return the stretches of the elements of patches at given times, from all reversals before.
+    def _list_snapshots(self, response: Response, times, start) -> list[ElementSnapshot]:
+        """Return the stretches of the elements of patches at given times, from the whole motion before.
 
-        Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
+        What happened before its start is in the memory of its `State`, if it does not start from rest.
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
 
-        slides = response.slides
         at = np.searchsorted(response.time, times)
-
-        # Between two reversals all elements move alike, so that the reversals determine their stretches.
-        stretches = []
+        states = []
         for i, (_, limit) in enumerate(self.joints.elements):
-            reversals = motion.list_reversals(i)
-            if start is not None:
-                reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
-            stretches.append(_find_stretches(reversals, (times, slides[at, i]), limit))
-        return [
-            ElementSnapshot(
-                time=float(response.time[k]),
-                slide=float(response.slide[k]),
-                slip=float(response.slip[k]),
-                force=float(response.force[k]),
-                stretch=stretches[0][number],
-                faces=[(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
-            )
-            for number, k in enumerate(at)
-        ]
+            # Between two turns of the slide all elements move alike, so that the turns determine their stretches.
+            slide = response.slides[:, i]
+            directions = np.sign(np.diff(slide))
+            turns = 1 + np.flatnonzero(directions[1:] != directions[:-1])
+            points = np.union1d(np.append(0, turns), at)
+            path = slide[:1] if start is None else _list_remembered_slides(start, i)
+            steps = np.diff(np.append(path, slide[points]))
+
+            stretch = np.zeros(np.shape(limit))
+            stretches = []
+            for step in steps:
+                stretch = np.clip(stretch + step, -limit, limit)
+                stretches.append(stretch)
+            found = dict(zip(points, stretches[path.size - 1 :]))
+            states.append([(float(slide[k]), found[k]) for k in at])
+        return [ElementSnapshot(float(time), list(faces)) for time, *faces in zip(times, *states)]
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the measures of the engine.
@@ -465,7 +431,7 @@ class LumpedEvaluator(RunEvaluator):
             "is_single_interface": True,
             "loop": compute_sampled_loop(window, drive, float(work / cycles)),
             # The other measures need samples of equal distances.
-            "window": window.select(find_numbers(window)[1]),
+            "window": window.select(_find_even_samples(window)),
         }
 
     def _limit_loop_measures(self, run) -> dict[str, None]:
@@ -511,8 +477,10 @@ class LumpedEvaluator(RunEvaluator):
         """
         if not hasattr(drive, "band"):
             return {}
-        # They follow from the changes when every second sample of the window is removed.
-        thinned = replace(run, window=thin_samples(run.window))
+        # They follow from the changes when every second sample of the window is removed, except for the last one.
+        count = run.window.time.size
+        samples = np.append(np.arange(0, count - 1, 2), count - 1)
+        thinned = replace(run, window=run.window.select(samples))
         coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
         errors = {}
         for name, change in absolute_change(values, coarse_values).items():
@@ -523,41 +491,28 @@ class LumpedEvaluator(RunEvaluator):
         return errors
 
 
+def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
+    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
+    count = int(run.cycles_done + 1e-9)
+    if not count or count >= len(run.extremes):
+        return run
+    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
+
+
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
     """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period."""
     count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
 
 
-def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:
-    """Return the time 0 and the slides [m] (k, 2) of the origin and of the reversals that a law remembers."""
+def _find_even_samples(window: Response) -> np.ndarray:
+    """Return which samples (k,) of a window are of equal distances, and not of events."""
+    position = (window.time - window.time[0]) / np.diff(window.time).max()
+    return np.abs(position - np.round(position)) <= 1e-6
+
+
+def _list_remembered_slides(state: State, interface: int) -> np.ndarray:
+    """Return the slides (k,) [m] of the origin and of the reversals that a law remembers."""
     memory = state.memory[interface]
     stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
-    slides = memory[Memory.ORIGIN] + np.append(0.0, stack)
-    return np.stack([np.zeros(slides.size), slides], axis=1)
-
-
-def _find_stretches(reversals, points, limit) -> list[np.ndarray]:
-    """Return the stretches (e,) [m] of elements at points of a motion.
-
-    Parameters
-    ----------
-    reversals : (k, 2) array
-        Times [s] and slides [m] of start and reversals.
-    points : tuple of (f,) array
-        Times [s] and slides [m].
-    limit : (e,) array
-        Yield displacements [m].
-    """
-    found = []
-    stretch = np.zeros(np.shape(limit))
-    last = reversals[0, 1]
-    k = 1
-    for time, slide in zip(*points):
-        while k < len(reversals) and reversals[k, 0] <= time:
-            stretch += reversals[k, 1] - last
-            np.maximum(np.minimum(stretch, limit, out=stretch), -limit, out=stretch)
-            last = reversals[k, 1]
-            k += 1
-        found.append(np.clip(stretch + slide - last, -limit, limit))
-    return found
+    return memory[Memory.ORIGIN] + np.append(0.0, stack)

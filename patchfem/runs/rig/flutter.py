@@ -15,9 +15,8 @@ from ...model.rig import MAX_TRAVEL
 from ...response.measures import Measures
 from ...response.rows import TABLE
 from .engines import find_obstacle_of_map
-from .interface import make_single_law
+from .joints import make_law_group, make_single_law
 from .solution import first_interface_load
-from .steady.balance import BalanceFinder
 
 FLUTTER_MEASURE = "flutter_amplitude"
 NO_INTERFACE_NOTE = (
@@ -143,9 +142,9 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
             return LimitCycles(cycles, NO_SLIDING_NOTE)
 
         # All other laws have smooth loops, which harmonic balance finds.
-        finder = BalanceFinder(model, numerics, patch)
+        group = make_law_group(model, numerics, patch)
         cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
-            modes, finder.group, row, f.static * first_interface_load(model, patch)
+            modes, group, row, f.static * first_interface_load(model, patch)
         )
         reason = NO_SMALLER_CYCLE_NOTE if smallest_amplitude else NO_CYCLE_NOTE
         return LimitCycles(cycles, reason, smallest_amplitude)

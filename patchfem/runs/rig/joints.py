@@ -1,58 +1,111 @@
-"""Interfaces of a rig under constant loads, in the form from which each engine makes its own.
+"""Friction laws of the interfaces of a rig in the form of each engine.
 
-In: a Model and its Patch. Out: a `Joint` for each interface, or for each strip of a patch that slides apart.
+In: a Model, its Numerics and its Patch. Out: `Joint`s, from which follow the laws of the engine `hybrid` (`make_joints`),
+the contact points of a march (`make_contact`), and the laws for harmonic balance (`make_law_group`, `make_single_law`).
+A patch that slips part by part under a constant load is its exact set of Jenkins elements.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ...dynamics.harmonic import forces
+from ...dynamics.harmonic import laws as balance_laws
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import make_law
-from ...model.law import InterfaceLaw, make_bond_parameters
+from ...hybrid import laws as hybrid_laws
+from ...hybrid.cases import Load
+from ...hybrid.laws.grooves import make_grooves
+from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_reversals
+from ...hybrid.records import LawNumbers
+from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
+from ...points import contacts
 from ...slip import shear_modes
+from ...structure.drive_sizes import find_drive_omega
+from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements
 from . import strips
+from .bond_lists import choose_bond_summation
+from .numerics import Numerics
+
+STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
 class Joint(NamedTuple):
-    """Interface of a rig under a constant load.
+    """Interface of a rig with its law and load.
 
-    - interface: InterfaceLaw
-    - load: normal load [N]
+    - law: effective keys of the friction law.
+    - load: normal load.
+    - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
     - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips part
-      by part; None for an interface that slips as a whole
-    - reduction: JenkinsSet of such a patch, or None
+      by part; None for an interface that slips as a whole.
+    - reduction: JenkinsSet of such a patch, or None.
     """
 
-    interface: InterfaceLaw
-    load: float
+    law: object
+    load: Load
+    speed: float
     stiffness: np.ndarray | None = None
     yields: np.ndarray | None = None
     reduction: "shear_modes.JenkinsSet | None" = None
 
-    def make_element(self, speed: float) -> Element:
-        """Return the Element of the interface; the expected slip speed [m/s] is that of bonds that grow."""
+    def make_element(self) -> Element:
+        """Return the law under its mean load in the form of the march and of harmonic balance."""
         if self.stiffness is not None:
             return parallel_element(self.stiffness, self.yields)
-        law = self.interface.numbers
-        if law_has_trait(law.law, "bonds"):
-            return points_element(make_bond_parameters(law, speed, MIN_RIG_REST_SPEED), self.load)
-        return make_law(law, self.load).element(self.load)
+        load = self.load.mean
+        if law_has_trait(self.law.law, "bonds"):
+            return points_element(
+                make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED), load
+            )
+        return make_law(self.law, load).element(load)
 
-    def list_elements(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    def make_hybrid_law(self) -> LawNumbers:
+        """Return the law in the form of the engine `hybrid`."""
+        if self.stiffness is not None:
+            return from_elements(self.stiffness, self.yields)
+        return hybrid_laws.make_law(self.law, self.load.mean, self.speed, varies=self.load.varies)
+
+    def list_elements(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stiffness [N/m] and yield displacement [m] (e,) of parallel elements; empty for other laws."""
-        element = self.make_element(speed)
+        element = self.make_element()
         count = int(element.numbers[1]) if element.form == "parallel" else 0
         return element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
 
 
+class Joints(NamedTuple):
+    """Interfaces of a rig for the engine `hybrid`.
+
+    - laws: (LawNumbers, Load) of each interface.
+    - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () without partial
+      slip.
+    - contact: Joint of the only patch, if it slips part by part, or None.
+    - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
+    """
+
+    laws: tuple[tuple[LawNumbers, Load], ...] = ()
+    elements: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    contact: Joint | None = None
+    stick_tolerance: float = 0.0
+
+    @property
+    def has_kinks(self) -> bool:
+        """Whether a law has elements that yield at several displacements."""
+        return any(has_many_elements(law) for law, _ in self.laws)
+
+    @property
+    def springs(self) -> np.ndarray:
+        """Stiffness (i,) [N/m] of each interface in stick; nan for a law that is no single element."""
+        return np.array([_find_spring_stiffness(law) for law, _ in self.laws])
+
+
 def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
-    """Return the interfaces of a rig, or the strips of its patch that slide apart.
+    """Return the interfaces of a rig, or the strips of its patch that slide apart; [] without friction.
 
     Parameters
     ----------
@@ -64,32 +117,208 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         Indices of the interfaces whose patches have a coarser mesh.
     """
     friction = model.rig.friction
+    speed = model.rig.speed_scale
+    if not friction.interfaces:
+        return []
     if patch is not None:
-        return _list_joints_of_patch(friction, model, patch)
+        law = _find_rigid_law(model.friction, model, patch)
+        return [Joint(law, load, speed, *parts) for load, parts in _list_patch_parts(model, patch)]
+
     joints = []
     for k, own in enumerate(friction.interfaces):
-        load = model.point.load if own.load is None else own.load
+        load = _make_point_load(model.point) if own.load is None else Load(own.load)
         parts = ()
         if own.partial_slip:
             parts = faces.make_patch_elements(own, model.accuracy.tolerance, k in meshed)
-        joints.append(Joint(own, load, *parts))
+        law = _find_rigid_law(own.numbers, model, patch)
+        joints.append(Joint(law, load, speed, *parts))
     return joints
 
 
-def _list_joints_of_patch(friction, model: Model, patch) -> list[Joint]:
-    """Return the interface of the table [contact], or its strips."""
-    own = friction.interfaces[0]
-    load = patch.pressure.load
+def _find_rigid_law(law, model: Model, patch):
+    """Return the law of an interface; a law that averages the pressure is Coulomb's law on a rigid block."""
+    if not law_has_trait(law.law, "averaged"):
+        return law
+    static = law.static * averaged_law.slip_force_ratio(model, patch)
+    return law.model_copy(update={"law": "coulomb", "static": static, "kinetic": static})
+
+
+def _make_point_load(point) -> Load:
+    """Return the load on a point, which may oscillate."""
+    return Load(point.load, point.amplitude, 2 * np.pi * (point.frequency or 0.0), point.phase)
+
+
+def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
+    """Return loads and elements of the patch of the table [contact], or of its strips if they slide apart.
+
+    The elements are the last fields of a Joint, () without partial slip.
+    """
+    slide_apart = model.rig.friction.strips_slide_apart
+    load = Load(float(patch.pressure.load))
     if not model.partial_slip:
-        loads = strips.compute_strip_loads(patch) if friction.strips_slide_apart else [load]
-        return [Joint(own, float(load)) for load in loads]
+        if not slide_apart:
+            return [(load, ())]
+        return [(Load(float(one)), ()) for one in strips.compute_strip_loads(patch)]
+
     static = model.friction.static
-    length = make_law(model.friction, load).element(load).length
+    length = make_law(model.friction, load.mean).element(load.mean).length
     if patch.strips is None:
         found = jenkins_elements.elements(patch, static, length)
-        return [Joint(own, load, found.stiffness, found.yield_displacement, found)]
+        return [(load, (found.stiffness, found.yield_displacement, found))]
     parts = jenkins_elements.strip_elements(patch, static, length)
-    if friction.strips_slide_apart:
-        return [Joint(own, load, *part) for part in parts]
+    if slide_apart:
+        return [(load, part) for part in parts]
     # Strips of a patch that does not yaw have the same displacement.
-    return [Joint(own, load, *map(np.concatenate, zip(*parts)))]
+    return [(load, tuple(map(np.concatenate, zip(*parts))))]
+
+
+# ---- engine `hybrid`
+
+
+def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
+    """Return laws and loads of all interfaces of a rig for the engine `hybrid`.
+
+    Parameters
+    ----------
+    model : Model
+        Rig with its interfaces.
+    numerics : Numerics
+        Names the interfaces with a coarser mesh.
+    patch : Patch or None
+        None without [contact].
+    """
+    rig = model.rig
+    joints = list_joints(model, patch, numerics.meshed)
+    laws = []
+    for joint in joints:
+        law = joint.make_hybrid_law() if model.grooves is None else _make_groove_law(model)
+        if joint.stiffness is not None and rig.drive.kind == "free":
+            # Decay curves are measured at the extremes of the output.
+            law = with_all_reversals(law)
+        laws.append(law)
+
+    is_soft = any(joint.stiffness is not None for joint in joints)
+    return Joints(
+        tuple((law, joint.load) for law, joint in zip(laws, joints)),
+        tuple(joint.list_elements() for joint in joints) if is_soft else (),
+        joints[0] if is_soft and len(joints) == 1 else None,
+        _find_stick_tolerance(joints, laws),
+    )
+
+
+def _make_groove_law(model: Model) -> LawNumbers:
+    """Return the law of the only interface, whose flanks lift the load."""
+    slide = model.rig.modes.slide
+    mass = model.rig.modes.mass / float(slide @ slide)
+    model.grooves.check_lifted_mass(model.friction.static, mass)
+    return make_grooves(model.friction, model.grooves)
+
+
+def _find_spring_stiffness(law: LawNumbers) -> float:
+    """Return the stiffness [N/m] of a law that is a single element in stick; nan for other laws."""
+    if law.law != "masing" or law.numbers[1] >= 0 or has_many_elements(law):
+        return np.nan
+    limit, length = law.numbers[2:4]
+    return limit / length
+
+
+def _find_stick_tolerance(joints, laws) -> float:
+    """Return the largest slip per cycle [m] of interfaces that count as stuck; 0 for rigid laws."""
+    lengths = []
+    for joint, law in zip(joints, laws):
+        keys = joint.law
+        if np.isfinite(law.length):
+            lengths.append(law.length)
+        elif keys.bond_length and not law_has_trait(keys.law, "set-valued"):
+            lengths.append(keys.bond_length)
+        elif keys.stiffness:
+            lengths.append(keys.static * joint.load.mean / keys.stiffness)
+    return STUCK_SLIP * min(lengths, default=0.0)
+
+
+# ---- march and harmonic balance
+
+
+def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
+    """Return the contact points of a time integration, with all interfaces and nonlinear springs.
+
+    Parameters
+    ----------
+    model : Model
+        Rig, springs and friction laws.
+    numerics : Numerics
+        Numbers of shear modes, method of bond summation and coarser meshes.
+    patch : Patch or None
+        None under [normal].
+    """
+    rig = model.rig
+    rows = rig.modes.interfaces
+    springs = []
+    if rig.springs.interlock is not None:
+        springs.append(contacts.make_interlocking_spring(*rig.springs.interlock, rows[0]))
+    if rig.springs.cubic is not None:
+        springs.append(contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
+
+    # The points of a single interface may have lists of bonds, grooves or a load that changes.
+    if len(rows) == 1 and model.friction is not None:
+        has_bonds = law_has_trait(model.friction.law, "bonds")
+        if has_bonds or model.grooves is not None or rig.friction.load_varies:
+            choice = choose_bond_summation(model, numerics) if has_bonds else None
+            contact = shear.make_points(model, patch, rows[0], choice, numerics.shear_modes)
+            return replace(contact, point_sets=[*contact.point_sets, *springs])
+
+    joints = list_joints(model, patch, numerics.meshed)
+    elements = [joint.make_element() for joint in joints]
+    scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
+    contact = contacts.make_contact(elements, rows[: len(joints)], springs, scale)
+    return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
+
+
+def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
+    """Return the law of a rig with one interface under a constant load; None for bonds that are no single element.
+
+    Parameters
+    ----------
+    model : Model
+        Friction law and load of the interface.
+    numerics : Numerics
+        Method of bond summation and coarser meshes.
+    patch : Patch or None
+        None under [normal].
+    """
+    if law_has_trait(model.friction.law, "bonds") and not model.rig.friction.has_partial_slip:
+        is_spread = model.partial_slip or model.side == "lower"
+        if is_spread or choose_bond_summation(model, numerics).engine != "recursion":
+            return None
+    return list_joints(model, patch, numerics.meshed)[0].make_element()
+
+
+def make_law_group(model: Model, numerics: Numerics, patch) -> "forces.LawGroup":
+    """Return the laws of all interfaces and the nonlinear springs of a rig for harmonic balance.
+
+    Parameters
+    ----------
+    model : Model
+        Rig, springs and friction laws.
+    numerics : Numerics
+        Method of bond summation and coarser meshes.
+    patch : Patch or None
+        None under [normal] and between masses.
+
+    Raises
+    ------
+    PatchfemError
+        If a law has no steady loop.
+    """
+    rig = model.rig
+    if len(rig.friction.interfaces) == 1:
+        parts = [(0, make_single_law(model, numerics, patch))]
+    else:
+        joints = list_joints(model, patch, numerics.meshed)
+        parts = [(k, joint.make_element()) for k, joint in enumerate(joints)]
+    if rig.springs.interlock is not None:
+        stiffness, wavelength = rig.springs.interlock
+        parts.append((0, balance_laws.Spring(stiffness, wavelength=wavelength)))
+    if rig.springs.cubic is not None:
+        parts.append((rig.modes.output, balance_laws.Spring(cubic=rig.springs.cubic)))
+    return forces.LawGroup(rig.modes, parts)

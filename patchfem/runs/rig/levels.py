@@ -11,11 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Measure, SineDrive
+from ...core import Measure, Response, SineDrive
 from ...response.coarser import ComparisonRuns, estimate_errors
 from ...response.errors import split_errors
 from ...response.events import join_events
-from ...response.levels import Level, bracket_onset, make_no_onset_reason, make_onset_test
+from ...response.levels import (
+    LEVEL_MEASURES,
+    Level,
+    bracket_onset,
+    make_no_onset_reason,
+    make_onset_test,
+)
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 from .solution import Fields
@@ -113,7 +119,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     tolerance : float
         Largest width of the bracket relative to the level.
     """
-    unit = _find_level_unit(rig)
+    unit, factor = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
     def find(run) -> Onset | None:
@@ -130,36 +136,29 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
         reference = onset if beside is None else find(beside)
         is_missing = coarse_onset is None or reference is None
         error += level if is_missing else abs(coarse_onset.level - reference.level)
-    factor = _find_level_factor(rig)
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
 def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:
     """Convert drive levels [m s-2] to the unit of the scene, [m s-2] or [N]."""
-    unit_factor = _find_level_factor(rig)
-    unit = _find_level_unit(rig)
-    return tuple(replace(level, drive=unit_factor * level.drive, unit=unit) for level in levels)
+    unit, factor = _find_level_unit(rig)
+    return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in levels)
 
 
-def _find_level_unit(rig) -> str:
-    """Return the unit of the drive levels in the scene."""
-    return "N" if rig.drive.kind == "force" else "m s-2"
+def _find_level_unit(rig) -> tuple[str, float]:
+    """Return the unit of the drive levels in the scene, and the factor that converts a level [m s-2] to it."""
+    return ("N", rig.modes.mass) if rig.drive.kind == "force" else ("m s-2", 1.0)
 
 
-def _find_level_factor(rig) -> float:
-    """Return the factor that converts a drive level [m s-2] to the unit of the scene."""
-    return rig.modes.mass if rig.drive.kind == "force" else 1.0
-
-
-def run_levels(evaluator, integrate, progress=None) -> tuple[Any, Fields]:
+def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
     ----------
     evaluator : RunEvaluator
-        Evaluates each level; its model has the levels of the drive.
-    integrate : callable
-        Function (sine, run, watch, is_last) that returns the run from the end of another one, None for the start.
+        Integrates and evaluates each level; its model has the levels of the drive.
+    frames : int
+        Number of snapshots of the interface in the last cycle of the last level.
     progress : callable, optional
         Callback for the completed fraction of all levels.
 
@@ -168,48 +167,57 @@ def run_levels(evaluator, integrate, progress=None) -> tuple[Any, Fields]:
     tuple
         Joined run, and the fields `levels` and `run_level` of its Solution.
     """
-    rig = evaluator.model.rig
-    omega = find_drive_omega(rig.drive.signal)
-    moving = rig.drive.signal.moving
-
+    drive = evaluator.model.rig.drive
+    amplitudes = drive.levels.amplitudes
+    omega = find_drive_omega(drive.signal)
     runs = []
     level_results = []
 
+    def solve(level: float, before, n_frames: int = 0, report=None) -> tuple[Any, Level]:
+        """Run a level, and return the run and its Level.
+
+        Parameters
+        ----------
+        level : float
+            Drive level [m s-2].
+        before
+            Run from whose end the level goes on; None for rest.
+        n_frames : int
+            Number of snapshots of the interface in the last cycle.
+        report : callable, optional
+            Callback for the completed fraction.
+        """
+        sine = SineDrive(level, omega, drive.signal.moving)
+        run = evaluator.integrate(sine, drive.levels.cycles, before, n_frames, report)
+        values = evaluator.evaluate_measures(run, sine)
+        values = {name: values[name] for name in LEVEL_MEASURES if name in values}
+        errors = {name: EXACT_RELATIVE_ERROR * abs(value) for name, value in values.items()}
+        return run, Level(level, evaluator.is_stuck(run), values, errors)
+
     def run_level(number: int, level: float) -> Level:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
-        sine = SineDrive(level, omega, moving)
-        run = integrate(sine, runs[number] if number >= 0 else None, None, False)
-        return evaluator.evaluate_level(level, run, sine, EXACT_RELATIVE_ERROR)
+        return solve(level, runs[number] if number >= 0 else None)[1]
 
     # Each level goes on from the end of the one before; a run that ends early is the last one.
-    amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
         report = None
         if progress is not None:
             report = partial(_report_fraction, progress, k, n_levels)
-        sine = SineDrive(amplitude, omega, moving)
-        run = integrate(sine, runs[-1] if runs else None, report, k + 1 == n_levels)
+        is_last = k + 1 == n_levels
+        run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)
-        level_results.append(evaluator.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
+        level_results.append(result)
         if run.outcome is not None:
             break
 
-    joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
+    joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 
 
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
     """Report the completed fraction of all levels to the progress callback."""
     progress((level + fraction) / n_levels)
-
-
-def remove_incomplete_cycle(run):
-    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
-    count = int(run.cycles_done + 1e-9)
-    if not count or count >= len(run.extremes):
-        return run
-    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
 
 
 def join_runs(runs, duration: float):
@@ -233,43 +241,32 @@ def join_runs(runs, duration: float):
     )
 
 
-def _join_histories(histories, shifts: list[float]):
-    """Join the histories of successive runs and shift them by their start times [s]."""
-    last = histories[-1]
+def _join_histories(histories, shifts: list[float]) -> Response:
+    """Join the histories of successive runs, and shift them by their start times [s]."""
+    parts = []
+    start = np.zeros((4, 1))
+    for part, shift in zip(histories, shifts):
+        # Work, dissipated and created energy go on from run to run; the stored energy does not add up.
+        ledger = part.extra["ledger"] + start
+        start = ledger[:, -1:].copy()
+        start[1] = 0.0
+        extra = part.extra | {"ledger": ledger}
+        parts.append(replace(part, time=_shift_times(part.time, shift), extra=extra))
+
     # The last sample of a run equals the first sample of the next run.
-    samples = [slice(None, -1)] * (len(histories) - 1) + [slice(None)]
-
-    def join(arrays) -> np.ndarray:
-        """Concatenate one history of all runs without repeating the common samples."""
-        return np.concatenate([array[part] for array, part in zip(arrays, samples)])
-
-    columns = {}
-    for name in type(last).__dataclass_fields__:
-        if name not in ("time", "extra"):
-            columns[name] = join([getattr(part, name) for part in histories])
-    columns["time"] = join([_shift_times(part.time, t) for part, t in zip(histories, shifts)])
+    parts[:-1] = [part.select(slice(None, -1)) for part in parts[:-1]]
     extra = {}
-    for name in last.extra:
-        arrays = [part.extra[name] for part in histories]
-        if name == "ledger":
-            extra[name] = join([array.T for array in _continue_energies(arrays)]).T
-        else:
-            extra[name] = join(arrays)
-    return replace(last, extra=extra, **columns)
+    for name in parts[-1].extra:
+        axis = int(name == "ledger")
+        extra[name] = np.concatenate([part.extra[name] for part in parts], axis=axis)
+    columns = {}
+    for name in Response.__dataclass_fields__:
+        if name != "extra":
+            columns[name] = np.concatenate([getattr(part, name) for part in parts])
+    return Response(**columns, extra=extra)
 
 
-def _continue_energies(ledgers) -> list[np.ndarray]:
-    """Return the energies (4, k) [J] of successive runs with work, dissipated and created energy since the first start."""
-    continued = []
-    before = np.zeros((4, 1))
-    for ledger in ledgers:
-        continued.append(ledger + before)
-        before = continued[-1][:, -1:].copy()
-        before[1] = 0.0  # the stored energy does not add up
-    return continued
-
-
-def _shift_times(time, shift: float):
+def _shift_times(time, shift: float) -> np.ndarray:
     """Shift times by `shift` [s] so that both samples of each event remain distinct."""
     moved = time + shift
     before = np.flatnonzero(moved[1:] <= moved[:-1])

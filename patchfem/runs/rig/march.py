@@ -5,7 +5,6 @@ work of the energy balance and the harmonics of the loop.
 """
 
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -17,11 +16,10 @@ from ...response.loops import CycleLoop
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
-from . import levels as rig_levels
 from . import strips
 from .bond_lists import choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
-from .interface import make_contact
+from .joints import make_contact
 from .solution import (
     Fields,
     Solution,
@@ -47,62 +45,17 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    rig = model.rig
     begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
     engine.load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": perf_counter() - begin - reduced}
-    begin = perf_counter()
-    # Strips that slide independently have no common shear stress, so no output frames are stored.
-    slide_apart = rig.friction.strips_slide_apart
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
-    travel = find_travel(rig)
-
-    def integrate(drive, before, watch, is_last, cycles=numerics.cycles):
-        """Integrate the motion under a drive.
-
-        Parameters
-        ----------
-        drive
-            Acceleration of the base, or force over the modal mass.
-        before
-            Run from whose end the motion goes on; None for the start of the rig.
-        watch : callable or None
-            Function that takes the completed fraction.
-        is_last : bool
-            Whether this is the last of several runs, whose frames are kept.
-        cycles : float
-            Number of cycles of the drive.
-        """
-        run = engine.march(
-            rig.modes,
-            drive,
-            contact,
-            cycles,
-            numerics.steps,
-            window=numerics.window,
-            travel=travel,
-            start=rig.start if before is None else before.end,
-            frames=0 if slide_apart or not is_last else frames,
-            keeps_samples=numerics.whole,
-            progress=watch,
-        )
-        if run.outcome is Outcome.EXCEEDS_TRAVEL:
-            run = replace(run, message=describe_escape(rig, travel))
-        return strips.average_march_over_strips(run, patch) if slide_apart else run
-
-    evaluator = MarchEvaluator(model, numerics, patch, contact)
-    if not rig.drive.levels.amplitudes:
-        run = integrate(rig.drive.signal, None, progress, True)
-        return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare)
-    cycles = rig.drive.levels.cycles
-    run, fields = rig_levels.run_levels(evaluator, partial(integrate, cycles=cycles), progress)
-    return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare, **fields)
+    return MarchEvaluator(model, numerics, patch, contact).solve(frames, progress, prepare)
 
 
 class MarchEvaluator(RunEvaluator):
-    """Evaluation of the runs that are integrated with constant time steps."""
+    """Runs that are integrated with constant time steps, and their evaluation."""
 
     def __init__(self, model, numerics, patch, contact):
         stick_tolerance = 0.0
@@ -113,9 +66,56 @@ class MarchEvaluator(RunEvaluator):
             stick_tolerance = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
+    def integrate(
+        self, drive, cycles: float, before: engine.Motion | None, frames: int = 0, progress=None
+    ) -> engine.Motion:
+        """Integrate the motion under a drive from the end of another run.
+
+        Parameters
+        ----------
+        drive
+            Acceleration of the base, or force over the modal mass.
+        cycles : float
+            Number of cycles of the drive.
+        before : points.time_march.Motion or None
+            Run from whose end the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the interface in the last cycle.
+        progress : callable, optional
+            Callback for the completed fraction.
+        """
+        rig = self.model.rig
+        numerics = self.numerics
+        # Strips that slide independently have no common shear stress, so no output frames are stored.
+        slide_apart = rig.friction.strips_slide_apart
+        travel = find_travel(rig)
+        run = engine.march(
+            rig.modes,
+            drive,
+            self.contact,
+            cycles,
+            numerics.steps,
+            window=numerics.window,
+            travel=travel,
+            start=rig.start if before is None else before.end,
+            frames=0 if slide_apart else frames,
+            keeps_samples=numerics.whole,
+            progress=progress,
+        )
+        if run.outcome is Outcome.EXCEEDS_TRAVEL:
+            run = replace(run, message=describe_escape(rig, travel))
+        if not slide_apart:
+            return run
+        run = strips.average_over_strips(run, self.patch)
+        force = run.window.force
+        return replace(run, step_force=(force[1:] + force[:-1]) / 2)
+
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return the bond summation of the run."""
-        return {"bond_summation": self.choose_bond_summation()}
+        """Return the bond summation of a law with bonds."""
+        friction = self.model.friction
+        if friction is None or not law_has_trait(friction.law, "bonds"):
+            return {}
+        return {"bond_summation": choose_bond_summation(self.model, self.numerics)}
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate how far the peaks of a motion exceed its samples.
@@ -131,24 +131,6 @@ class MarchEvaluator(RunEvaluator):
         """
         return peak_sampling_errors(run.window)
 
-    def choose_bond_summation(self):
-        """Return the bond summation of the run; None for a law without bonds."""
-        friction = self.model.friction
-        if friction is None or not law_has_trait(friction.law, "bonds"):
-            return None
-        return choose_bond_summation(self.model, self.numerics)
-
-    def _compute_energies(self, run, drive, *, stuck: bool) -> Values:
-        """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
-
-        This scale is the kinetic energy at the peak speed of the drive.
-        """
-        if not (stuck and self.contact.set_valued):
-            return run.ledger
-        rig = self.model.rig
-        moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
-        return run.ledger | {"power": run.ledger["power"] + moving}
-
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
 
@@ -163,11 +145,16 @@ class MarchEvaluator(RunEvaluator):
         """
         if not self.has_friction:
             return {}
-        energies = self._compute_energies(run, drive, stuck=stuck)
-        values = {"work_check": compute_work_check(energies)}
+        energies = run.ledger
+        missing = {}
         if stuck and self.contact.set_valued:
-            # The remaining motion of a stuck interface is round-off, not slip.
-            values |= {"slip_start_phase": None, "stick_fraction": 1.0}
+            # The remaining motion of a stuck interface is round-off, not slip. Its energies are compared with the kinetic
+            # energy at the peak speed of the drive.
+            rig = self.model.rig
+            moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
+            energies = energies | {"power": energies["power"] + moving}
+            missing = {"slip_start_phase": None, "stick_fraction": 1.0}
+        values = {"work_check": compute_work_check(energies)} | missing
         return {
             "integrated": IntegratedMeasures(values),
             "run_energies": energies,

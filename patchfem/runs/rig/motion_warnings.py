@@ -21,7 +21,7 @@ from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import Settings
 from ..results.travel import warn_of_large_slide
 from .engines import ENGINES, find_obstacle_of_map
-from .hybrid_laws import list_elements
+from .joints import list_joints
 from .solution import first_interface_load
 
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
@@ -180,7 +180,8 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.window.slides.T
-    for (_, yields), slide in zip(list_elements(run.model, run.numerics, run.patch), slides):
+    for joint, slide in zip(list_joints(run.model, run.patch, run.numerics.meshed), slides):
+        _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2
         if largest_yield > amplitude:

@@ -108,19 +108,16 @@ def choose_numerics(model: Model) -> Numerics:
     numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes, pinned)
 
     if engine is HYBRID:
-        # A linear rig needs few steps.
+        # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.
         is_exact = accuracy.method == "exact" or model.friction is None
-        local = cases.EXACT_RTOL if is_exact else choose_step_tolerance(accuracy.tolerance)
+        local = (
+            cases.EXACT_RTOL if is_exact else float(np.clip(1e-5 * accuracy.tolerance, 1e-12, 1e-8))
+        )
         return replace(numerics, local=local, steps=cases.MIN_STEPS)
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
         return replace(numerics, steps=4 * ceil(max(steps, min_unique_steps(model)) / 4))
     return numerics
-
-
-def choose_step_tolerance(tolerance: float) -> float:
-    """Return the largest relative error per step of the engine `hybrid`."""
-    return float(np.clip(1e-5 * tolerance, 1e-12, 1e-8))
 
 
 def min_unique_steps(model: Model) -> int:

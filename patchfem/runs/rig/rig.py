@@ -26,13 +26,13 @@ from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
 from . import bond_lists, decays, flutter, levels
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
-from .engines import ENGINES, describe_balance_error, list_runs_with_other_modes
+from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
 from .motion_warnings import collect_remarks
 from .numerics import Numerics, choose_numerics
 from .solution import Solution, compute_peak_frequency
-from .solve import Runner, refuse_long_run
+from .solve import Runner
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
@@ -119,7 +119,8 @@ def run_rig(inputs: RunInputs) -> Result:
         )
 
     numerics = choose_numerics(model)
-    refuse_long_run(model, numerics)
+    if numerics.engine == "march":
+        bond_lists.refuse_unresolved_bond_vibration(model, numerics)
     run = run_refined(inputs, numerics)
 
     # The reasons of missing values depend on the outcome, so that they come after it.
@@ -224,7 +225,6 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            runner.add_error_seconds(coarser.solution.seconds)
             solution = runner.solve(numerics)
             inputs.seconds["march"] = solution.seconds
         time_runs = engine.list_time_runs(model, numerics)
@@ -240,6 +240,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
     run = refine.refine(solve, numerics, _judge)
+    inputs.seconds["error"] = sum(one.seconds for one in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak)
 
@@ -348,17 +349,11 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     """Return the run with its outcome, all error estimates of its measures, and the reasons of missing values.
 
     The errors that the run itself shows (`Solution.run_errors`) are added to the errors from coarse
-    runs. A motion that grows has no errors. The outcome is NOT_CONVERGED if the error of the energy
-    balance is too large.
+    runs. A motion that grows has no errors.
     """
     solution = run.solution
     model = run.model
     rig = model.rig
-    if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
-        message = solution.message or text
-        solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
-        run = replace(run, solution=solution)
-
     measures = add_run_error_estimates(run.measures, solution.run_errors)
     if not run.has_errors:
         measures = remove_errors(measures)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
-from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.events import Events
 from ...response.levels import Level
 from ...response.loops import CycleLoop, sample_loop
@@ -119,8 +118,6 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
         return solution
     window = _compute_gauge_histories(solution.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
-    if model.rig.drive.kind == "free":
-        amplitude = find_release_amplitude(window, model.rig.drive.signal.period, amplitude)
     ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
     errors = solution.errors and solution.errors | {
         AMPLITUDE: ratio * solution.errors.get(AMPLITUDE, 0.0)
@@ -147,22 +144,6 @@ def _compute_gauge_histories(histories: Response, gauge) -> Response:
         output_rate=histories.modal_rate @ gauge,
         extra=histories.extra | sensor,
     )
-
-
-def find_release_amplitude(window, period: float, window_amplitude: float) -> float:
-    """Return the amplitude [m] of a released motion in its last complete cycle.
-
-    Parameters
-    ----------
-    window : Response
-        Last cycles of the motion.
-    period : float
-        Period of the drive [s].
-    window_amplitude : float
-        Amplitude of the window [m]; returned if the window contains no complete cycle.
-    """
-    swing = measure_last_cycle_amplitude(window.time, window.output, window.output_rate, period)
-    return window_amplitude if swing is None else swing
 
 
 def first_interface_load(model, patch) -> float | None:

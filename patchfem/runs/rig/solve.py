@@ -5,11 +5,10 @@ Each coarse run is solved only once.
 """
 
 from dataclasses import replace
-from time import process_time
 
 from ...response.coarser import ComparisonRuns, SourceErrors, StepRun, estimate_errors
 from ..results.result import N_FRAMES, RunInputs
-from . import bond_lists, costs, event_to_event, march
+from . import event_to_event, march
 from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
@@ -44,14 +43,6 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
 
 
-def refuse_long_run(model, numerics) -> None:
-    """Raise Missing if a run would take too much CPU time, or has too long time steps."""
-    if numerics.engine == "hybrid":
-        costs.refuse_long_hybrid_run(model)
-    elif numerics.engine == "march":
-        bond_lists.refuse_unresolved_bond_vibration(model, numerics)
-
-
 class Runner:
     """Solver of a rig with several numerical settings, which stores the solutions of coarse runs.
 
@@ -66,15 +57,12 @@ class Runner:
     ----------
     solutions : dict
         Solution of each coarse run by its Numerics.
-    cpu_seconds : dict
-        CPU time of each run [s] by its Numerics.
     """
 
     def __init__(self, inputs: RunInputs, numerics: Numerics):
         self.inputs = inputs
         self.model = inputs.plan.model
         self.solutions: dict[Numerics, Solution] = {}
-        self.cpu_seconds: dict[Numerics, float] = {}
         # Steps per cycle of all runs: expected and completed ones; and the largest reported fraction.
         self._expected_steps = numerics.steps * (COARSE_RUNS_RATIO if inputs.estimate else 1.0)
         self._steps_done = 0.0
@@ -101,7 +89,7 @@ class Runner:
         return self._solve(model, replace(numerics, whole=needs_whole), patch)
 
     def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
-        """Solve a rig, and count its CPU time and steps.
+        """Solve a rig, and count its steps.
 
         Parameters
         ----------
@@ -116,24 +104,14 @@ class Runner:
         say : callable, optional
             Function that takes a line of text on the progress.
         """
-        begin = process_time()
         report = self._make_callback(numerics.steps)
         solution = solve_rig(model, numerics, patch, frames, say, report)
-        self.cpu_seconds[replace(numerics, whole=False)] = process_time() - begin
         self._steps_done += numerics.steps
         return solution
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
-        errors, seconds = estimate_errors(
-            self._solve_coarse_run, solution.values, runs, self.solutions
-        )
-        self.add_error_seconds(seconds)
-        return errors
-
-    def add_error_seconds(self, seconds: float) -> None:
-        """Add the time of a comparison run [s] to that of the run."""
-        self.inputs.seconds["error"] = self.inputs.seconds.get("error", 0.0) + seconds
+        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)[0]
 
     def list_step_runs(
         self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns
@@ -154,11 +132,7 @@ class Runner:
         pairs = [(numerics, solution)]
         if time_runs and time_runs[0].source == "steps":
             pairs += [(run, self.solutions[run]) for run in time_runs[0].runs]
-        step_runs = []
-        for settings, run in pairs:
-            seconds = self.cpu_seconds.get(replace(settings, whole=False), run.seconds)
-            step_runs.append(StepRun(settings.steps, seconds, run.values))
-        return step_runs
+        return [StepRun(settings.steps, run.seconds, run.values) for settings, run in pairs]
 
     def _make_callback(self, steps: float):
         """Return the progress callback of a run with given steps per cycle; None without one for all runs.

@@ -12,8 +12,6 @@ import numpy as np
 
 from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
-from ....dynamics.harmonic.forces import LawGroup
-from ....dynamics.harmonic.laws import Spring
 from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
@@ -25,7 +23,7 @@ from ....response.measures import Values, compute_peak
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
-from ..interface import make_single_law
+from ..joints import make_law_group
 from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
     COLUMN_MEASURES,
@@ -93,19 +91,6 @@ class BalanceEvaluator(RunEvaluator):
         return fields | {"integrated": IntegratedMeasures(values, reversals=pairs)}
 
 
-class CycleMeasures(NamedTuple):
-    """Measures, histories and energies of one cycle of a motion from harmonic balance.
-
-    - values: measures by name.
-    - response: Response of the cycle.
-    - book: energies [J] and counters by name.
-    """
-
-    values: Values
-    response: Response
-    book: Values
-
-
 class StableMotion(NamedTuple):
     """Reported steady motion, with its stability and notes on coexisting motions.
 
@@ -125,21 +110,12 @@ class BalanceFinder:
     """
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        rig = model.rig
-        parts = []
-        if model.friction is not None:
-            parts.append((0, make_single_law(model, numerics, patch)))
-        if rig.springs.interlock is not None:
-            stiffness, wavelength = rig.springs.interlock
-            parts.append((0, Spring(stiffness, wavelength=wavelength)))
-        if rig.springs.cubic is not None:
-            parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
         self.model = model
-        self.modes = rig.modes
+        self.modes = model.rig.modes
         self.patch = patch
         self.harmonics = model.accuracy.harmonics
         self.numerics = numerics
-        self.group = LawGroup(rig.modes, parts)
+        self.group = make_law_group(model, numerics, patch)
         self.tolerance = model.accuracy.tolerance
 
     def compute_steady_motion(self, drive, guess=None) -> Solution:
@@ -157,14 +133,14 @@ class BalanceFinder:
         begin = perf_counter()
         motion = self._solve_balance(drive, guess)
         motion, stability, notes = self._find_stable_motion(drive, motion)
-        values, response, book = self._compute_measures(motion, drive)
+        values, run = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
             motion,
             drive,
-            lambda motion, sine: (
-                self._compute_measures(motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE).values
-            ),
+            lambda motion, sine: self._compute_measures(
+                motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE
+            )[0],
         )
 
         # The instants of slip have at least the error of a sample, and a phase at most that of half a cycle.
@@ -185,11 +161,11 @@ class BalanceFinder:
 
         return Solution(
             values,
-            response,
-            response,
+            run.window,
+            run.window,
             outcome,
             [],
-            book,
+            run.ledger,
             perf_counter() - begin,
             message=message,
             errors=errors,
@@ -296,24 +272,23 @@ class BalanceFinder:
 
     def _compute_measures(
         self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
-    ) -> CycleMeasures:
-        """Compute the measures of a steady motion from samples of its cycle."""
-        response = make_cycle_response(motion, self.modes, drive, samples)
-        book = find_cycle_energies(motion, self.modes) | {
+    ) -> tuple[Values, CycleRun]:
+        """Compute the measures of a steady motion by name, and its cycle, from samples."""
+        window = make_cycle_response(motion, self.modes, drive, samples)
+        energies = find_cycle_energies(motion, self.modes)
+        speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)
+        energies |= {
             "stored": 0.0,
             "iterations": float(motion.iterations),
-        }
-        speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)
-        book |= {
-            "power": abs(book["work_in"]),
+            "power": abs(energies["work_in"]),
             "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2)),
         }
         top = motion.amplitude(self.modes.output)
-        middle = (response.output.max() + response.output.min()) / 2
+        middle = (window.output.max() + window.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = CycleRun(response, extremes, book, motion.find_reversals())
+        run = CycleRun(window, extremes, energies, motion.find_reversals())
         evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
-        return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
+        return evaluator.evaluate_measures(run, drive), run
 
     def trace_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation through its folds."""

@@ -23,7 +23,7 @@ from ....structure.response import compute_receptance
 from ...results.result import Settings, SteadyData
 from ..engines import estimate_hybrid_errors
 from ..event_to_event import LumpedEvaluator
-from ..hybrid_laws import make_joints
+from ..joints import make_joints
 from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
@@ -116,7 +116,7 @@ class ShootingFinder:
         motion = self.find_periodic_motion(drive, guess)
         state = None if motion.grows else motion.run.final
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
-        run = self.evaluator.integrate(drive, cycles, state, self.frames)
+        run = self.evaluator.resume(drive, cycles, state, self.frames)
         is_stuck = self.evaluator.is_stuck(run)
         solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
 
@@ -174,7 +174,7 @@ class ShootingFinder:
         )
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
         start = None if motion.grows else motion.run.final
-        other_run = other.integrate(drive, run.cycles_done, start, 0)
+        other_run = other.resume(drive, run.cycles_done, start, 0)
         coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
         step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
         relative = find_relative_error(motion)
@@ -187,7 +187,7 @@ class ShootingFinder:
         """Return the run from rest that leaves the grooves, or None if there is none."""
         if self.model.grooves is None or not self.model.grooves.lifted_mass:
             return None
-        run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
+        run = self.evaluator.resume(drive, N_CYCLES_IN_GROOVES, None, 0)
         return run if run.outcome is Outcome.LEAVES_GROOVES else None
 
     def _name_regime(self, motion, *, is_stuck: bool) -> str:
@@ -267,7 +267,7 @@ class ShootingFinder:
             # The closed form of a linear rig has no state from which a cycle starts.
             laws = self.joints.laws
             state = point.guess if laws else self.find_periodic_motion(drive).run.final
-            window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
+            window = self.evaluator.resume(drive, N_CYCLES, state, 0).window
         sensed = [point.values.get(COLUMN_MEASURES[name]) for name in SENSED_COLUMNS]
         amplitude, peak, fundamental = sensed
         return ObservedMotion(window, peak, amplitude, point.guess, fundamental)

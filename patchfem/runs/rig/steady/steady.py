@@ -12,7 +12,8 @@ from .balance import BalanceFinder
 from .peak import solve_peak
 from .shooting import ShootingFinder
 
-FINDERS = {"shooting": ShootingFinder, "balance": BalanceFinder}
+# By the engine that `choose_steady_method` names.
+FINDERS = {"hybrid": ShootingFinder, "harmonic": BalanceFinder}
 
 
 def solve_steady_motion(
@@ -39,7 +40,7 @@ def solve_steady_motion(
     -------
     Solution
     """
-    finder_class = FINDERS[choose_steady_method(model).name]
+    finder_class = FINDERS[choose_steady_method(model)]
     finder = finder_class(model, numerics, patch, frames, say)
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
