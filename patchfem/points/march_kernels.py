@@ -16,7 +16,10 @@ them out of equilibrium, and reverse that in every step. Lists of bonds, whose f
 of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
-point at rest is released, is halved up to the last level.
+point at rest is released, is halved up to the last level. The constant force of a step lets a held port move and come
+back; the work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
+(rigid or tanh) would also gain energy where a port reverses and moves back in one step; such a step is halved too, so
+that no law creates energy.
 """
 
 import numpy as np
@@ -353,7 +356,7 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if system.options.is_rigid and rests(points, points.trial, j):
+        if system.options.has_events and rests(points, points.trial, j):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
@@ -416,7 +419,7 @@ def write_residual(system, level, h):
         size = max(size, abs(ports.contact[2]))
 
     # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
-    if system.options.is_rigid:
+    if system.options.has_events:
         for j in range(points.port.size):
             if rests(points, points.trial, j):
                 p = points.port[j]
@@ -496,7 +499,7 @@ def write_matrix(system, level):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
 
     # Ports that hold have the derivative of their end velocity in place of that of a force.
-    if not system.options.is_rigid:
+    if not system.options.has_events:
         return
     for j in range(n_points):
         if rests(points, points.trial, j):
@@ -542,7 +545,7 @@ def find_step(system, level):
             slope = find_descent(system, level)
             if slope < 0.0:
                 return slope
-            if slope == 0.0 or attempt > 0 or not system.options.has_lists:
+            if slope == 0.0 or attempt > 0:
                 return slope
         for p in range(ports.values.shape[1]):
             ports.values[Port.BY_SLIDE, p] = 0.0
@@ -827,9 +830,9 @@ def solve_held(system):
 
 @njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
-    """Return whether a rigid point stops or is released within the trial step.
+    """Return whether a rigid point stops or is released, or friction would gain energy, within the trial step.
 
-    A step that cannot be halved is not searched again: the point changes its regime there.
+    A step that cannot be halved is not searched again: a rigid point changes its regime there.
 
     Parameters
     ----------
@@ -844,13 +847,24 @@ def find_event(system, drive, is_shortest):
     points = system.points
     found = False
     is_any_held = False
-    # Row 0 of the memory of a rigid point is its direction of slip, 0 at rest.
     for j in range(points.port.size):
-        if points.numbers[0, j] != Law.COULOMB:
+        law = points.numbers[0, j]
+        if law != Law.COULOMB and law != Law.TANH:
             continue
+
+        # Friction without memory gains energy in a step that does not resolve a reversal.
+        p = points.port[j]
+        force = points.values[Point.FORCE, j]
+        round_off = RESIDUAL * abs(force * ports.values[Port.SLIDE, p])
+        if force * ports.values[Port.INCREMENT, p] < -round_off:
+            found = True
+        if law == Law.TANH:
+            continue
+
+        # Row 0 of the memory of a rigid point is its direction of slip, 0 at rest.
         direction = points.memory[0, j]
         is_any_held = is_any_held or direction == 0
-        if direction * ports.values[Port.END_VELOCITY, points.port[j]] < 0:
+        if direction * ports.values[Port.END_VELOCITY, p] < 0:
             found = True
             if is_shortest:
                 points.trial[0, j] = 0.0
@@ -915,7 +929,8 @@ def commit(system, h):
                 )
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
 
-    if options.is_rigid:
+    rest = 0.0
+    if options.has_events:
         for j in range(count):
             p = points.port[j]
             if points.numbers[0, j] == Law.COULOMB:
@@ -923,6 +938,7 @@ def commit(system, h):
                 was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
                 values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
+                rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
 
     copy_memory(points.trial, points.memory)
     system.totals[Total.IS_DIRTY] = 0.0
@@ -941,10 +957,12 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    system.totals[Total.REST] = 0.0
-    if options.is_rigid and system.sets.counters[PRESENT_SLOT] >= 0:
+    if options.has_events and system.sets.counters[PRESENT_SLOT] >= 0:
         return_ports_to_rest(system)
-        system.totals[Total.REST] = find_motion_energy(system) - energy
+        rest += energy - find_motion_energy(system)
+        if ports.contact[0] >= 0:
+            press_at_rest(system)
+    system.totals[Total.REST] = rest
 
     # The mean of the rise speed over the step is slope dq/h.
     if flank.size:
@@ -978,18 +996,24 @@ def relax_pieces(system):
     for k in range(r):
         shear[Shear.TRIAL, k] = 0.0
 
-    # Newton's method for the increments.
-    for _ in range(MAX_RELAXATIONS):
+    # Newton's method for the increments; `gain` is the change of energy of pieces and points without slip.
+    gain = 0.0
+    for iteration in range(MAX_RELAXATIONS):
         largest = 0.0
+        gain = 0.0
         for j in range(count):
             values[Point.TRIAL_SLIDE, j] = -sum_products(points.shapes[:, j], shear[Shear.TRIAL])
             step = Step(values[Point.TRIAL_SLIDE, j], 1.0, 0.0, 0.0, 0.0)
             mean = mean_force(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
             values[Point.TRIAL_FORCE, j] = mean.end
             values[Point.BY_SLIDE, j] = 2 * mean.by_increment
+            gain += mean.force * values[Point.TRIAL_SLIDE, j]
 
         for k in range(r):
-            residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
+            increment = shear[Shear.TRIAL, k]
+            middle = shear[Shear.VALUE, k] + 0.5 * increment
+            gain += points.stiffness[k] * middle * increment
+            residual = points.stiffness[k] * (middle + 0.5 * increment)
             residual -= sum_products(points.shapes[k], values[Point.TRIAL_FORCE, :count])
             ports.vector[k] = residual
             largest = max(largest, abs(residual) * shear[Shear.SCALE, k])
@@ -999,10 +1023,16 @@ def relax_pieces(system):
                 )
             ports.matrix[k, k] += points.stiffness[k]
 
-        if largest <= tolerance or not solve_linear(ports.matrix, ports.vector, r):
+        if largest <= tolerance or iteration == MAX_RELAXATIONS - 1:
+            break
+        if not solve_linear(ports.matrix, ports.vector, r):
             break
         for k in range(r):
             shear[Shear.TRIAL, k] -= ports.vector[k]
+
+    # Where forces fall with the slide the method may fail; the pieces then relax after a later step.
+    if gain > 0.0:
+        return
 
     # The points slide back for good, with the loss that follows.
     for j in range(count):
@@ -1138,6 +1168,31 @@ def return_ports_to_rest(system):
 
 
 @njit(**NJIT_CALL)
+def press_at_rest(system):
+    """Give the points the loads of the normal contact at the present state, while their ports rest.
+
+    A start with heave, and ports that come back to rest, change the loads outside of steps.
+    """
+    ports = system.ports
+    points = system.points
+    values = points.values
+    n = system.state.shape[1] // 2
+    for i in range(2):
+        p = int(ports.contact[i])
+        ports.values[Port.SLIDE, p] = sum_products(ports.rows[p], system.state[0, :n])
+        ports.values[Port.INCREMENT, p] = 0.0
+    find_loads(system, 0, 0.0, False)
+
+    for j in range(points.port.size):
+        load = values[Point.END_LOAD, j]
+        if points.numbers[0, j] == Law.LIST:
+            lists.press_list(system.lists, j, load)
+        else:
+            press(points.numbers, points.memory, j, values[Point.START_LOAD, j], load)
+        values[Point.START_LOAD, j] = values[Point.LOAD, j] = load
+
+
+@njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
     """Advance the motion by a step, unless the step must be halved.
 
@@ -1209,7 +1264,7 @@ def try_step(system, level, row, begin, end, drive):
     # An event inside the step, or Newton's method without a solution, halves the step.
     write_trial(system, level)
     is_shortest = level == levels - 1
-    if options.is_rigid and find_event(
+    if options.has_events and find_event(
         system, drive[0] + h * (drive[1] + 0.5 * h * drive[2]), is_shortest
     ):
         totals[Total.IS_DIRTY] = 1.0
@@ -1253,6 +1308,7 @@ def add_energies(system, level):
     for i in range(inputs.size):
         loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
 
+    work -= totals[Total.REST]
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
     totals[Total.VISCOUS] += loss
@@ -1278,7 +1334,7 @@ def write_sample(system, row, sample):
     flank = system.flank
     size = system.state.shape[1]
     n = size // 2
-    if system.options.is_rigid:
+    if system.options.has_events:
         find_holds(system, system.state[0], structure.drive[row, 0])
 
     # Displacements of the ports; their sums start at 0.
@@ -1354,7 +1410,7 @@ def write_sample(system, row, sample):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(system, steps, samples):
-    """March over a number of whole steps.
+    """March over a number of whole steps; 0 steps press the points to the normal contact of the present state.
 
     Parameters
     ----------
@@ -1378,6 +1434,8 @@ def march(system, steps, samples):
     ticks = 1 << (structure.responses.shape[0] - 1)
     h = system.options.step
     level = 0
+    if steps == 0 and ports.contact[0] >= 0:
+        press_at_rest(system)
 
     for i in range(steps + 1):
         write_sample(system, i, samples[i])
@@ -1442,7 +1500,7 @@ def add_work(system, sample, first_column, part):
     """
     ports = system.ports
     points = system.points
-    work = -system.totals[Total.REST]
+    work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:
             continue
@@ -1451,6 +1509,7 @@ def add_work(system, sample, first_column, part):
         slide = ports.values[Port.INCREMENT, p]
         if points.numbers[0, j] == Law.COULOMB:
             force = ports.values[Port.FORCE, p]
+            slide -= ports.values[Port.FREE, p]
         if system.flank.size and p == 0:
             force *= system.flank[Flank.RATIO]
         work += force * slide

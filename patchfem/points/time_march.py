@@ -45,7 +45,9 @@ from .march_rows import (
 
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
-RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
+EVENT_LEVELS = (
+    20  # lengths of the steps with laws without memory: whole steps and nineteen halvings
+)
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
@@ -61,7 +63,6 @@ MAX_STEPS_AT_ONCE = 8000
 TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
-SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
 WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of cycles
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
@@ -261,7 +262,8 @@ def make_system(
     rows = np.array(rows, float).reshape(len(rows), n)
 
     laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
-    levels = RIGID_LEVELS if Law.COULOMB in laws else SOFT_LEVELS
+    has_events = bool(laws & {Law.COULOMB, Law.TANH})
+    levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
 
     # Responses of the modes; a prescribed slide has none.
@@ -309,7 +311,7 @@ def make_system(
         max(float(contact.limit), 1e-300),
         LIST_DAMPING if has_lists else 0.0,
         REDUNDANT if len(rows) > n else 0.0,
-        int(Law.COULOMB in laws),
+        int(has_events),
         int(has_lists),
         int(contact.has_loads),
         int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
@@ -451,7 +453,7 @@ def _make_no_sets():
 
 
 def _press_first(system: System, contact: Contact) -> None:
-    """Find the contact set at the start, and press the points to it."""
+    """Find the contact set at the start."""
     press = compiled.load("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
@@ -670,8 +672,6 @@ class March:
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
         sampled = np.zeros(works.size)
-        rests = np.ones(works.size, bool)
-        still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
         for k, one in enumerate(self.contact.point_sets):
             if one.is_spring:
                 continue
@@ -680,11 +680,7 @@ class March:
             mean = columns[:-1, 2] if is_rigid else None
             slide = samples[:, : n // 2] @ np.asarray(one.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
-            rests &= is_rigid & (np.abs(np.diff(slide)) <= still)
-        # What a port at rest does within a step and takes back is no work of the friction.
-        sampled[rests] = works[rests]
-        passed = np.abs(works[~rests]).sum()
-        self.work_sums += float(sampled.sum()), float(passed)
+        self.work_sums += float(sampled.sum()), float(np.abs(works).sum())
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""
