@@ -151,19 +151,11 @@ def copy_memory(source, target):
 
 
 @njit(**NJIT_CALL)
-def rests(points, memory, j):
-    """Return whether point j is rigid and at rest in a memory of the points.
-
-    Parameters
-    ----------
-    points : march_rows.Points
-        Points with their laws.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    """
-    return find_rest_limit(points.numbers, memory, j, 1.0) < np.inf
+def is_held(points, p):
+    """Return whether port p is held at rest by a rigid point, which is then the only point on it."""
+    j = points.first[p]
+    is_rigid = j < points.first[p + 1] and points.numbers[0, j] == Law.COULOMB
+    return is_rigid and points.memory[0, j] == 0
 
 
 @njit(**NJIT_CALL)
@@ -241,11 +233,10 @@ def prepare_points(system, h):
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
 
-    # The rest time of bonds grows before they carry the force of the step.
-    if options.has_growth:
-        for j in range(count):
-            v = system.ports.values[Port.VELOCITY, points.port[j]]
-            prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
+    # The length of bonds grows before they carry the force of the step.
+    for j in range(count):
+        v = system.ports.values[Port.VELOCITY, points.port[j]]
+        prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
 @njit(**NJIT_CALL)
@@ -356,11 +347,11 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if system.options.has_events and rests(points, points.trial, j):
+        p = points.port[j]
+        if is_held(points, p):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
-        p = points.port[j]
         step = Step(
             values[Point.SLIDE, j],
             h,
@@ -419,16 +410,12 @@ def write_residual(system, level, h):
         size = max(size, abs(ports.contact[2]))
 
     # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
-    if system.options.has_events:
-        for j in range(points.port.size):
-            if rests(points, points.trial, j):
-                p = points.port[j]
-                vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
-                vector[p] -= system.options.redundant * moves[Port.FORCE, p]
-
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):
+        if is_held(points, p):
+            vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
+            vector[p] -= system.options.redundant * moves[Port.FORCE, p]
         own = ports.compliance[level, 0, p, p]
         noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         # The normal contact loses no energy, so that its residuals would add up over the steps.
@@ -499,11 +486,8 @@ def write_matrix(system, level):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
 
     # Ports that hold have the derivative of their end velocity in place of that of a force.
-    if not system.options.has_events:
-        return
-    for j in range(n_points):
-        if rests(points, points.trial, j):
-            p = points.port[j]
+    for p in range(n_ports):
+        if is_held(points, p):
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
@@ -777,12 +761,11 @@ def find_holds(system, state, drive):
     values = ports.values
     n_ports = values.shape[1]
 
-    # Ports whose points do not hold carry the friction force of their points.
+    # Ports that are not held carry the friction force of their points.
     for p in range(n_ports):
         ports.vector[p] = 0.0
-    for j in range(points.port.size):
-        if not rests(points, points.memory, j):
-            ports.vector[points.port[j]] += read_point(system, j).force
+        for j in range(points.first[p], points.first[p + 1]):
+            ports.vector[p] += read_point(system, j).force
 
     heave = int(ports.contact[0])
     if heave >= 0:
@@ -794,10 +777,9 @@ def find_holds(system, state, drive):
         ports.vector[pitch] += energy[2]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-    for j in range(points.port.size):
-        if not rests(points, points.memory, j):
+    for p in range(n_ports):
+        if not is_held(points, p):
             continue
-        p = points.port[j]
         total = 0.0
         for i in range(n):
             acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
@@ -817,14 +799,12 @@ def solve_held(system):
     points = system.points
     n_ports = ports.values.shape[1]
     for p in range(n_ports):
-        ports.matrix[p, :] = 0.0
-        ports.matrix[p, p] = 1.0
-    for j in range(points.port.size):
-        if rests(points, points.memory, j):
-            p = points.port[j]
-            for k in range(n_ports):
-                ports.matrix[p, k] = ports.grip[p, k]
+        for k in range(n_ports):
+            ports.matrix[p, k] = ports.grip[p, k] if is_held(points, p) else 0.0
+        if is_held(points, p):
             ports.matrix[p, p] *= 1 + system.options.redundant
+        else:
+            ports.matrix[p, p] = 1.0
     solve_linear(ports.matrix, ports.vector, n_ports)
 
 
@@ -901,14 +881,19 @@ def commit(system, h):
     flank = system.flank
     count = points.port.size
 
-    for j in range(count):
-        values[Point.TOTAL, j] += values[Point.SLIDE, j]
-
+    # Slides and memory of the points; a port that was at rest before stays at its place.
+    rest = 0.0
     for j in range(count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
+        values[Point.TOTAL, j] += slide
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
+        elif points.numbers[0, j] == Law.COULOMB:
+            was_held = is_held(points, p) and points.trial[0, j] == 0
+            ports.values[Port.FREE, p] = slide if was_held else 0.0
+            values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
+            rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
         else:
             v0 = ports.values[Port.VELOCITY, p]
             v1 = ports.values[Port.END_VELOCITY, p]
@@ -920,25 +905,9 @@ def commit(system, h):
                 if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
                     points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
             elif points.numbers[0, j] != Law.LIST:
-                press(
-                    points.numbers,
-                    points.trial,
-                    j,
-                    values[Point.LOAD, j],
-                    values[Point.END_LOAD, j],
-                )
+                middle = values[Point.LOAD, j]
+                press(points.numbers, points.trial, j, middle, values[Point.END_LOAD, j])
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
-
-    rest = 0.0
-    if options.has_events:
-        for j in range(count):
-            p = points.port[j]
-            if points.numbers[0, j] == Law.COULOMB:
-                # A port that was at rest before stays at its place.
-                was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
-                ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
-                values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
-                rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
 
     copy_memory(points.trial, points.memory)
     system.totals[Total.IS_DIRTY] = 0.0
@@ -1153,9 +1122,7 @@ def return_ports_to_rest(system):
     for first in (0, n):
         for p in range(n_ports):
             ports.vector[p] = 0.0
-        for j in range(points.port.size):
-            if rests(points, points.memory, j):
-                p = points.port[j]
+            if is_held(points, p):
                 ports.vector[p] = ports.values[Port.FREE, p]
                 if first > 0:
                     ports.vector[p] = sum_products(ports.rows[p], state[n:])
@@ -1365,7 +1332,7 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        if rests(points, points.memory, j):
+        if is_held(points, p):
             limit = find_rest_limit(points.numbers, points.memory, j, load)
             force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         # The slip is a mean over the points, weighted by their friction limits.

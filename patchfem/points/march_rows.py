@@ -256,8 +256,7 @@ class Options(NamedTuple):
     - scale: force [N] to whose 1e-11 part a step is solved
     - damping: weight of the change of a shear increment
     - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
-    - has_events, has_lists, has_loads, has_growth: 1 if points have laws without memory, lists of bonds, loads that
-      change, or bonds that grow
+    - has_events, has_lists, has_loads: 1 if points have laws without memory, lists of bonds, or loads that change
     """
 
     mass: float
@@ -269,7 +268,6 @@ class Options(NamedTuple):
     has_events: int
     has_lists: int
     has_loads: int
-    has_growth: int
 
 
 class System(NamedTuple):

@@ -261,7 +261,7 @@ def make_system(
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows, float).reshape(len(rows), n)
 
-    laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
+    laws = {float(law) for one in contact.point_sets for law in np.unique(one.law.numbers[0])}
     has_events = bool(laws & {Law.COULOMB, Law.TANH})
     levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
@@ -314,7 +314,6 @@ def make_system(
         int(has_events),
         int(has_lists),
         int(contact.has_loads),
-        int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
     )
 
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
@@ -340,28 +339,24 @@ def make_system(
 def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
     # Numbers, memory and loads of the laws of all points.
-    laws = [law for one in contact.point_sets for law in one.laws]
-    counts = [len(one.laws) for one in contact.point_sets]
-    numbers = np.zeros((N_NUMBERS, len(laws)))
-    memory = np.zeros((max([N_MEMORY, *(law.memory.size for law in laws)]), len(laws)))
-    values = np.zeros((len(Point), max(len(laws), n_nodes)))
-    for j, law in enumerate(laws):
-        numbers[:, j] = law.numbers
-        memory[: law.memory.size, j] = law.memory
-        values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
-        if law.numbers[0] == Law.BONDS:
-            memory[4, j] = law.memory[0]  # bond length in the middle of a step
+    laws = [one.law for one in contact.point_sets]
+    counts = [law.numbers[0].size for law in laws]
+    numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
+    memory = _join_columns(N_MEMORY, [law.memory for law in laws])
+    loads = _join_columns(1, [law.load + 0 * law.numbers[0] for law in laws])[0]
+    values = np.zeros((len(Point), max(loads.size, n_nodes)))
+    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : loads.size] = loads
 
     resultant = contact.preload
     if contact.grooves is not None:
         resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
     # A single point carries a prescribed load that is 0 at the start.
-    share = np.array([law.load / resultant if resultant > 0 else 1.0 for law in laws], float)
+    share = loads / resultant if resultant > 0 else np.ones(loads.size)
 
     # Nodes, shares of the load and shear shapes of each set of points.
-    nodes = np.full(len(laws), RESULTANT, np.int64)
-    place = np.zeros(len(laws))
-    shapes = np.zeros((0, len(laws)))
+    nodes = np.full(loads.size, RESULTANT, np.int64)
+    place = np.zeros(loads.size)
+    shapes = np.zeros((0, loads.size))
     stiffness = np.zeros(0)
     first = 0
     for one, count in zip(contact.point_sets, counts):
@@ -372,7 +367,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
             share[own] = one.shares
             place[own] = one.places
         if one.shear is not None:
-            shapes = np.zeros((len(one.shear.stiffness), len(laws)))
+            shapes = np.zeros((len(one.shear.stiffness), loads.size))
             shapes[:, own] = np.asarray(one.shear.shape).T
             stiffness = np.array(one.shear.stiffness, float)
         first = first + count
@@ -397,6 +392,11 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         place,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
+
+
+def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
+    """Return the columns of all points from the rows of each law, (n_rows,) for one point or (n_rows, c)."""
+    return np.hstack([np.zeros((n_rows, 0)), *(part.reshape(n_rows, -1) for part in parts)])
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
@@ -676,7 +676,7 @@ class March:
             if one.is_spring:
                 continue
             columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
-            is_rigid = one.laws[0].numbers[0] == Law.COULOMB
+            is_rigid = (one.law.numbers[0] == Law.COULOMB).all()
             mean = columns[:-1, 2] if is_rigid else None
             slide = samples[:, : n // 2] @ np.asarray(one.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)

@@ -255,8 +255,8 @@ def compute_groove_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.nda
     """
     index = contact.reduction.points
     weight = patch.pieces.interface.weight[index]
-    shares = np.array([law.load for law in contact.point_sets[0].laws])
-    shares = shares / shares.sum()
+    load = contact.point_sets[0].law.load
+    shares = load / load.sum()
     tau = np.zeros((len(snapshots), patch.x.size))
     local = np.zeros((len(snapshots), patch.x.size))
     for i, one in enumerate(snapshots):
