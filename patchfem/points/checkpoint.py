@@ -5,11 +5,11 @@ that ends within MIN_WRITE_INTERVAL writes nothing. A checkpoint holds the array
 """
 
 import hashlib
-import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from itertools import count
 from pathlib import Path
 from time import perf_counter
 
@@ -25,8 +25,8 @@ MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
 MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums", "work_sums")
-RECORD_STATE = ("early", "recent", "energies", "before")
-CYCLES = ("extremes", "phasors")  # lists of numbers of the cycles of a record
+RECORD_STATE = ("energies", "before", "extremes", "phasors")
+PARTS = ("early", "recent")  # lists of the samples of a record
 _FILES = ContextVar("checkpoint_files", default=None)
 
 
@@ -109,9 +109,7 @@ def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
     files.n_begun += 1
     path = files.path_of_march(files.n_begun)
     digest = hashlib.sha256(f"{files.key} {request}".encode())
-    arrays = []
-    pack(run.system, arrays)
-    for array in arrays:
+    for array in map(np.asarray, list_leaves(run.system)):
         digest.update(f"{array.shape} ".encode() + array.tobytes())
     time = np.linspace(0, request[0] * run.step, 1000)
     digest.update(np.asarray(run.drive.values(time)).tobytes())
@@ -121,30 +119,19 @@ def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
     return MarchCheckpoint(path, key)
 
 
-def pack(value, arrays: list[np.ndarray]):
-    """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
-    if isinstance(value, np.ndarray):
-        arrays.append(value)
-        return {"array": len(arrays) - 1}
-    if isinstance(value, tuple | list):
-        return [pack(part, arrays) for part in value]
-    return value
+def list_leaves(tree) -> list[np.ndarray | float]:
+    """Return the arrays and numbers of nested tuples in order."""
+    if isinstance(tree, tuple):
+        return [leaf for part in tree for leaf in list_leaves(part)]
+    return [tree]
 
 
-def unpack(value, arrays):
-    """Return the lists that `pack` made, with the arrays of a mapping by the names "0", "1", ..."""
-    if isinstance(value, dict):
-        return arrays[str(value["array"])]
-    if isinstance(value, list):
-        return [unpack(part, arrays) for part in value]
-    return value
-
-
-def convert_to_tuples(value, model):
-    """Return nested lists as the nested tuples of a model."""
-    if isinstance(model, tuple):
-        return type(model)(*map(convert_to_tuples, value, model))
-    return value
+def replace_leaves(tree, leaves: Iterator[np.ndarray]):
+    """Return nested tuples with other arrays; numbers keep their types."""
+    if isinstance(tree, tuple):
+        return type(tree)(*(replace_leaves(part, leaves) for part in tree))
+    leaf = next(leaves)
+    return leaf if isinstance(tree, np.ndarray) else type(tree)(leaf)
 
 
 def save_checkpoint(path: Path, key: str, run, record) -> None:
@@ -166,17 +153,13 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     Missing
         If the file cannot be written.
     """
-    arrays = []
-    state = (
-        run.system,
-        [getattr(run, name) for name in MARCH_STATE],
-        [getattr(record, name) for name in RECORD_STATE],
-        [np.array(getattr(record, name)) for name in CYCLES],
-    )
-    form = np.array(json.dumps(pack(state, arrays)))
-    named = {str(number): array for number, array in enumerate(arrays)}
+    arrays = {f"system_{k}": leaf for k, leaf in enumerate(list_leaves(run.system))}
+    for owner, names in ((run, MARCH_STATE), (record, RECORD_STATE)):
+        arrays |= {name: np.asarray(getattr(owner, name)) for name in names}
+    for name in PARTS:
+        arrays |= {f"{name}_{k}": part for k, part in enumerate(getattr(record, name))}
     with write_atomically(path) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), form=form, **named)
+        np.savez(file, key=np.array(key), **arrays)
         file.flush()
         os.fsync(file.fileno())
 
@@ -211,15 +194,16 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
                 f"{RETRY_ADVICE}"
             )
 
-        form = json.loads(str(arrays["form"]))
-        system, march_state, record_state, cycles = unpack(form, arrays)
-        run.system = convert_to_tuples(system, run.system)
-        for name, value in zip(MARCH_STATE, march_state, strict=True):
-            setattr(run, name, value)
-        for name, value in zip(RECORD_STATE, record_state, strict=True):
-            setattr(record, name, value)
-        for name, value in zip(CYCLES, cycles, strict=True):
-            setattr(record, name, list(value))
+        run.system = replace_leaves(run.system, (arrays[f"system_{k}"] for k in count()))
+        for name in MARCH_STATE:
+            value = arrays[name]
+            setattr(run, name, value if value.ndim else value.item())
+        for name in RECORD_STATE:
+            is_list = isinstance(getattr(record, name), list)
+            setattr(record, name, list(arrays[name]) if is_list else arrays[name])
+        for name in PARTS:
+            n_parts = sum(key.startswith(f"{name}_") for key in arrays)
+            setattr(record, name, [arrays[f"{name}_{k}"] for k in range(n_parts)])
         record.last = record.recent[-1]
     except PatchfemError:
         raise

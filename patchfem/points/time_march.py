@@ -482,13 +482,10 @@ def _climb_first(system: System, contact: Contact) -> None:
     flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
 
 
-def copy_system(system):
-    """Return a copy of nested tuples of arrays."""
-    if isinstance(system, np.ndarray):
-        return system.copy()
-    if isinstance(system, tuple):
-        return type(system)(*map(copy_system, system))
-    return system
+def copy_system(system: System) -> System:
+    """Return a copy of all arrays of a march."""
+    leaves = checkpoint.list_leaves(system)
+    return checkpoint.replace_leaves(system, map(np.copy, leaves))
 
 
 def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
@@ -942,12 +939,7 @@ def march(
             [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
         )
         now = np.concatenate([state, memory])
-        if (
-            can_repeat
-            and count > 0
-            and record.before is not None
-            and record.before.size == now.size
-        ):
+        if can_repeat and count > 0 and record.before.size == now.size:
             largest = np.abs(record.last[:, : state.size]).max(axis=0)
             scale = np.concatenate([largest, np.abs(memory)])
             if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
@@ -956,7 +948,7 @@ def march(
                 run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
                 run.work_sums += count * (run.work_sums - works)
 
-        record.before = now if size % steps_per_cycle == 0 else None
+        record.before = now if size % steps_per_cycle == 0 else np.zeros(0)
         if run.done < n_steps:
             saved.write_if_due(run, record)
         if progress is not None:
@@ -1007,7 +999,7 @@ class Record:
     - energies (3,): energies up to the last sample [J]
     - snapshots: of the last cycle
     - stride: distance of the samples of earlier cycles
-    - before: state and memory at the end of the part before the last, if both have whole cycles; else None
+    - before: state and memory at the end of the part before the last, if both have whole cycles; else (0,)
     """
 
     def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
@@ -1022,7 +1014,7 @@ class Record:
         self.phasors = []
         self.energies = np.zeros(3)
         self.snapshots = []
-        self.before = None
+        self.before = np.zeros(0)
         # The distance of early samples divides a cycle, so that each one begins with a sample.
         longest = max(1, run.steps // MAX_EARLY_SAMPLES_PER_CYCLE)
         self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)
