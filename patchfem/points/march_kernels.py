@@ -52,7 +52,6 @@ from .march_rows import (
 from .return_maps_kernels import (
     Step,
     advance,
-    find_rest_limit,
     mean_force,
     prepare,
     press,
@@ -858,16 +857,19 @@ def find_event(system, drive, is_shortest):
     find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
-    for j in range(points.port.size):
-        limit = find_rest_limit(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
-        hold = abs(ports.values[Port.HOLD, points.port[j]])
-        if limit < np.inf and hold > largest * limit:
-            worst = j
+    for p in range(ports.values.shape[1]):
+        if not is_held(points, p):
+            continue
+        j = points.first[p]
+        limit = points.numbers[1, j] * points.values[Point.END_LOAD, j]
+        hold = abs(ports.values[Port.HOLD, p])
+        if hold > largest * limit:
+            worst = p
             largest = hold / limit if limit > 0 else np.inf
     if worst < 0:
         return False
     if is_shortest:
-        points.trial[0, worst] = 1.0 if ports.values[Port.HOLD, points.port[worst]] > 0 else -1.0
+        points.trial[0, points.first[worst]] = np.sign(ports.values[Port.HOLD, worst])
     return not is_shortest
 
 
@@ -1332,11 +1334,10 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        if is_held(points, p):
-            limit = find_rest_limit(points.numbers, points.memory, j, load)
-            force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         # The slip is a mean over the points, weighted by their friction limits.
         weight = load * points.numbers[1, j]
+        if is_held(points, p):
+            force = min(max(ports.values[Port.HOLD, p], -weight), weight)
         sample[first + N_PORT_COLUMNS * p] += force
         sample[first + N_PORT_COLUMNS * p + 1] += weight * (
             points.values[Point.TOTAL, j] - state.stretch
