@@ -52,7 +52,7 @@ class BondSum(NamedTuple):
 class PointSet:
     """Points that act on one port.
 
-    - laws: law of each point under its load at the start
+    - law: laws of the m points under their loads at the start
     - row (n,): displacement of the port per modal coordinate
     - nodes (m,): node whose normal force is the load of a point, RESULTANT or LOWER
     - shear: slip.shear_modes.ShearModes of pieces that deform, or None
@@ -61,7 +61,7 @@ class PointSet:
     - places (m,): positions of the points [m], with LOWER
     """
 
-    laws: list[PointLaw]
+    law: PointLaw
     row: np.ndarray
     nodes: np.ndarray | None = None
     shear: object = None
@@ -103,7 +103,9 @@ class Contact:
     @property
     def set_valued(self) -> bool:
         """Whether the first interface sticks rigidly."""
-        return bool(self.point_sets) and _get_law(self.point_sets[0]) == Law.COULOMB
+        return bool(self.point_sets) and bool(
+            (self.point_sets[0].law.numbers[0] == Law.COULOMB).all()
+        )
 
     @property
     def reduction(self):
@@ -117,23 +119,17 @@ class Contact:
         return any(part is not None for part in parts)
 
 
-def _get_law(points: PointSet) -> float:
-    """Return the number of the law of the first point."""
-    return points.laws[0].numbers[0]
-
-
-def convert_element(element: Element) -> list[PointLaw]:
+def convert_element(element: Element) -> PointLaw:
     """Return the points of a law of one contact under a constant load.
 
     Parallel elements become one point each, bonds at points of equal slide a single point.
     """
     numbers = element.numbers
     if element.form == "rigid":
-        return [make_coulomb(numbers[1], numbers[2])]
+        return make_coulomb(numbers[1], numbers[2])
     if element.form == "parallel":
-        count = int(numbers[1])
-        pairs = zip(numbers[2 : 2 + count], numbers[2 + count : 2 + 2 * count])
-        return [make_jenkins(stiffness * length, length) for stiffness, length in pairs]
+        stiffness, length = np.split(numbers[2:], 2)
+        return make_jenkins(stiffness * length, length)
 
     rows = np.zeros(N_NUMBERS)
     memory = np.zeros(N_MEMORY)
@@ -142,14 +138,14 @@ def convert_element(element: Element) -> list[PointLaw]:
         limit = numbers[1] * numbers[2]
         rows[:9] = (Law.BONDS, limit, numbers[2], *numbers[3:8], element.memory[1])
         memory[:4] = element.memory[:4]
-        return [PointLaw(rows, memory, 1.0)]
+        return PointLaw(rows, memory, 1.0)
 
     if element.kernels in FLOW_LAWS:
         rows[0] = FLOW_LAWS[element.kernels]
         rows[1 : numbers.size] = numbers[1:]
         if rows[0] == Law.TANH:
             rows[2] = 1 / numbers[2]
-        return [PointLaw(rows, memory, 1.0)]
+        return PointLaw(rows, memory, 1.0)
     raise PatchfemError(
         f"a bench and time steps need the return map of a law, which {element.kernels} lacks; add it to "
         "points/return_maps_kernels.py, or compute a rig with another method"
@@ -189,8 +185,8 @@ def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact
         Elements of a patch.
     """
     limits = np.multiply(stiffness, yield_slide)
-    laws = [make_jenkins(limit, length) for limit, length in zip(limits, yield_slide)]
-    return Contact([PointSet(laws, row)], float(limits.sum()), elements=elements)
+    points = PointSet(make_jenkins(limits, np.asarray(yield_slide, float)), row)
+    return Contact([points], float(limits.sum()), elements=elements)
 
 
 def make_cubic_spring(stiffness: float, row) -> PointSet:
@@ -203,7 +199,7 @@ def make_cubic_spring(stiffness: float, row) -> PointSet:
     row : (n,) array
         Displacement of the port per modal coordinate.
     """
-    return PointSet([make_cubic(stiffness)], row, is_spring=True)
+    return PointSet(make_cubic(stiffness), row, is_spring=True)
 
 
 def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointSet:
@@ -218,7 +214,7 @@ def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointS
     row : (n,) array
         Displacement of the port per modal coordinate.
     """
-    return PointSet([make_interlocking(stiffness, wavelength)], row, is_spring=True)
+    return PointSet(make_interlocking(stiffness, wavelength), row, is_spring=True)
 
 
 def make_bond_contact(
@@ -251,11 +247,8 @@ def make_bond_contact(
         places = pressure[0]
         now = loads * pressure[1]
         nodes = np.full(loads.size, LOWER)
-    if bond_sum is None:
-        laws = [make_bonds(bonds, load) for load in now]
-    else:
-        laws = [make_list(bonds, load) for load in now]
-    points = PointSet(laws, row, nodes, shear, shares=shares, places=places)
+    make = make_bonds if bond_sum is None else make_list
+    points = PointSet(make(bonds, now), row, nodes, shear, shares=shares, places=places)
     limit = bonds.static * float(now.sum())
     return Contact([points], limit, bonds.length, bond_sum=bond_sum, pressure=pressure)
 
@@ -281,32 +274,28 @@ def make_pressed_contact(
         Fields of Contact that describe the load.
     """
     loads = np.atleast_1d(np.asarray(force, float))
-    name = getattr(law, "law", "bonds")
     nodes = None if np.ndim(force) == 0 else np.arange(loads.size)
     length = 0.0
+    if isinstance(law, Bonds):
+        length = law.length
+        make = make_bonds if bond_sum is None else make_list
+        points = make(law, loads)
 
     # Laws of the resultant make one point of the whole interface.
-    if name in ("coulomb", "tanh"):
-        kinetic = law.static if law.kinetic is None else law.kinetic
-        make = make_coulomb if name == "coulomb" else make_tanh
-        laws = [
-            make(law.static, kinetic if name == "coulomb" else law.reference_speed, loads.sum())
-        ]
+    elif law.law in ("coulomb", "tanh"):
         nodes = None
-
-    elif name != "bonds":
-        length = law.bond_length or 0.0
-        laws = [make_jenkins(law.static, length, load) for load in loads]
-    elif bond_sum is None:
-        length = law.length
-        laws = [make_bonds(law, load) for load in loads]
+        kinetic = law.static if law.kinetic is None else law.kinetic
+        if law.law == "coulomb":
+            points = make_coulomb(law.static, kinetic, loads.sum())
+        else:
+            points = make_tanh(law.static, law.reference_speed, loads.sum())
     else:
-        length = law.length
-        laws = [make_list(law, load) for load in loads]
+        length = law.bond_length or 0.0
+        points = make_jenkins(law.static, length, loads)
 
-    points = PointSet(laws, row, nodes, shear)
     limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
-    return Contact([points], limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
+    point_sets = [PointSet(points, row, nodes, shear)]
+    return Contact(point_sets, limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
 
 
 def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shares=None) -> Contact:
@@ -329,12 +318,12 @@ def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shar
     """
     normal = load * float(np.hypot(1.0, grooves.slope(0.0)))
     shares = np.ones(1) if shares is None else np.asarray(shares, float)
-    is_bonds = isinstance(law, Bonds)
-    length = law.length if is_bonds else law.bond_length
-    if is_bonds:
-        laws = [make_bonds(law, normal * share) for share in shares]
+    if isinstance(law, Bonds):
+        length = law.length
+        points = make_bonds(law, normal * shares)
     else:
-        laws = [make_jenkins(law.static, length, normal * share) for share in shares]
-    points = PointSet(laws, row, None, shear)
+        length = law.bond_length
+        points = make_jenkins(law.static, length, normal * shares)
     limit = grooves.max_force(load, law.static)
-    return Contact([points], limit, length, preload=load, grooves=grooves)
+    point_sets = [PointSet(points, row, None, shear)]
+    return Contact(point_sets, limit, length, preload=load, grooves=grooves)

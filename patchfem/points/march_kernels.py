@@ -16,7 +16,10 @@ them out of equilibrium, and reverse that in every step. Lists of bonds, whose f
 of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
-point at rest is released, is halved up to the last level.
+point at rest is released, is halved up to the last level. The constant force of a step lets a held port move and come
+back; the work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
+(rigid or tanh) would also gain energy where a port reverses and moves back in one step; such a step is halved too, so
+that no law creates energy.
 """
 
 import numpy as np
@@ -49,7 +52,6 @@ from .march_rows import (
 from .return_maps_kernels import (
     Step,
     advance,
-    find_rest_limit,
     mean_force,
     prepare,
     press,
@@ -148,19 +150,11 @@ def copy_memory(source, target):
 
 
 @njit(**NJIT_CALL)
-def rests(points, memory, j):
-    """Return whether point j is rigid and at rest in a memory of the points.
-
-    Parameters
-    ----------
-    points : march_rows.Points
-        Points with their laws.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    """
-    return find_rest_limit(points.numbers, memory, j, 1.0) < np.inf
+def is_held(points, p):
+    """Return whether port p is held at rest by a rigid point, which is then the only point on it."""
+    j = points.first[p]
+    is_rigid = j < points.first[p + 1] and points.numbers[0, j] == Law.COULOMB
+    return is_rigid and points.memory[0, j] == 0
 
 
 @njit(**NJIT_CALL)
@@ -238,11 +232,10 @@ def prepare_points(system, h):
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
 
-    # The rest time of bonds grows before they carry the force of the step.
-    if options.has_growth:
-        for j in range(count):
-            v = system.ports.values[Port.VELOCITY, points.port[j]]
-            prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
+    # The length of bonds grows before they carry the force of the step.
+    for j in range(count):
+        v = system.ports.values[Port.VELOCITY, points.port[j]]
+        prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
 @njit(**NJIT_CALL)
@@ -353,11 +346,11 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if system.options.is_rigid and rests(points, points.trial, j):
+        p = points.port[j]
+        if is_held(points, p):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
-        p = points.port[j]
         step = Step(
             values[Point.SLIDE, j],
             h,
@@ -416,16 +409,12 @@ def write_residual(system, level, h):
         size = max(size, abs(ports.contact[2]))
 
     # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
-    if system.options.is_rigid:
-        for j in range(points.port.size):
-            if rests(points, points.trial, j):
-                p = points.port[j]
-                vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
-                vector[p] -= system.options.redundant * moves[Port.FORCE, p]
-
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):
+        if is_held(points, p):
+            vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
+            vector[p] -= system.options.redundant * moves[Port.FORCE, p]
         own = ports.compliance[level, 0, p, p]
         noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         # The normal contact loses no energy, so that its residuals would add up over the steps.
@@ -496,11 +485,8 @@ def write_matrix(system, level):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
 
     # Ports that hold have the derivative of their end velocity in place of that of a force.
-    if not system.options.is_rigid:
-        return
-    for j in range(n_points):
-        if rests(points, points.trial, j):
-            p = points.port[j]
+    for p in range(n_ports):
+        if is_held(points, p):
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
@@ -542,7 +528,7 @@ def find_step(system, level):
             slope = find_descent(system, level)
             if slope < 0.0:
                 return slope
-            if slope == 0.0 or attempt > 0 or not system.options.has_lists:
+            if slope == 0.0 or attempt > 0:
                 return slope
         for p in range(ports.values.shape[1]):
             ports.values[Port.BY_SLIDE, p] = 0.0
@@ -774,12 +760,11 @@ def find_holds(system, state, drive):
     values = ports.values
     n_ports = values.shape[1]
 
-    # Ports whose points do not hold carry the friction force of their points.
+    # Ports that are not held carry the friction force of their points.
     for p in range(n_ports):
         ports.vector[p] = 0.0
-    for j in range(points.port.size):
-        if not rests(points, points.memory, j):
-            ports.vector[points.port[j]] += read_point(system, j).force
+        for j in range(points.first[p], points.first[p + 1]):
+            ports.vector[p] += read_point(system, j).force
 
     heave = int(ports.contact[0])
     if heave >= 0:
@@ -791,10 +776,9 @@ def find_holds(system, state, drive):
         ports.vector[pitch] += energy[2]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-    for j in range(points.port.size):
-        if not rests(points, points.memory, j):
+    for p in range(n_ports):
+        if not is_held(points, p):
             continue
-        p = points.port[j]
         total = 0.0
         for i in range(n):
             acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
@@ -814,22 +798,20 @@ def solve_held(system):
     points = system.points
     n_ports = ports.values.shape[1]
     for p in range(n_ports):
-        ports.matrix[p, :] = 0.0
-        ports.matrix[p, p] = 1.0
-    for j in range(points.port.size):
-        if rests(points, points.memory, j):
-            p = points.port[j]
-            for k in range(n_ports):
-                ports.matrix[p, k] = ports.grip[p, k]
+        for k in range(n_ports):
+            ports.matrix[p, k] = ports.grip[p, k] if is_held(points, p) else 0.0
+        if is_held(points, p):
             ports.matrix[p, p] *= 1 + system.options.redundant
+        else:
+            ports.matrix[p, p] = 1.0
     solve_linear(ports.matrix, ports.vector, n_ports)
 
 
 @njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
-    """Return whether a rigid point stops or is released within the trial step.
+    """Return whether a rigid point stops or is released, or friction would gain energy, within the trial step.
 
-    A step that cannot be halved is not searched again: the point changes its regime there.
+    A step that cannot be halved is not searched again: a rigid point changes its regime there.
 
     Parameters
     ----------
@@ -844,13 +826,24 @@ def find_event(system, drive, is_shortest):
     points = system.points
     found = False
     is_any_held = False
-    # Row 0 of the memory of a rigid point is its direction of slip, 0 at rest.
     for j in range(points.port.size):
-        if points.numbers[0, j] != Law.COULOMB:
+        law = points.numbers[0, j]
+        if law != Law.COULOMB and law != Law.TANH:
             continue
+
+        # Friction without memory gains energy in a step that does not resolve a reversal.
+        p = points.port[j]
+        force = points.values[Point.FORCE, j]
+        round_off = RESIDUAL * abs(force * ports.values[Port.SLIDE, p])
+        if force * ports.values[Port.INCREMENT, p] < -round_off:
+            found = True
+        if law == Law.TANH:
+            continue
+
+        # Row 0 of the memory of a rigid point is its direction of slip, 0 at rest.
         direction = points.memory[0, j]
         is_any_held = is_any_held or direction == 0
-        if direction * ports.values[Port.END_VELOCITY, points.port[j]] < 0:
+        if direction * ports.values[Port.END_VELOCITY, p] < 0:
             found = True
             if is_shortest:
                 points.trial[0, j] = 0.0
@@ -864,16 +857,19 @@ def find_event(system, drive, is_shortest):
     find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
-    for j in range(points.port.size):
-        limit = find_rest_limit(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
-        hold = abs(ports.values[Port.HOLD, points.port[j]])
-        if limit < np.inf and hold > largest * limit:
-            worst = j
+    for p in range(ports.values.shape[1]):
+        if not is_held(points, p):
+            continue
+        j = points.first[p]
+        limit = points.numbers[1, j] * points.values[Point.END_LOAD, j]
+        hold = abs(ports.values[Port.HOLD, p])
+        if hold > largest * limit:
+            worst = p
             largest = hold / limit if limit > 0 else np.inf
     if worst < 0:
         return False
     if is_shortest:
-        points.trial[0, worst] = 1.0 if ports.values[Port.HOLD, points.port[worst]] > 0 else -1.0
+        points.trial[0, points.first[worst]] = np.sign(ports.values[Port.HOLD, worst])
     return not is_shortest
 
 
@@ -887,14 +883,19 @@ def commit(system, h):
     flank = system.flank
     count = points.port.size
 
-    for j in range(count):
-        values[Point.TOTAL, j] += values[Point.SLIDE, j]
-
+    # Slides and memory of the points; a port that was at rest before stays at its place.
+    rest = 0.0
     for j in range(count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
+        values[Point.TOTAL, j] += slide
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
+        elif points.numbers[0, j] == Law.COULOMB:
+            was_held = is_held(points, p) and points.trial[0, j] == 0
+            ports.values[Port.FREE, p] = slide if was_held else 0.0
+            values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
+            rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
         else:
             v0 = ports.values[Port.VELOCITY, p]
             v1 = ports.values[Port.END_VELOCITY, p]
@@ -906,23 +907,9 @@ def commit(system, h):
                 if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
                     points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
             elif points.numbers[0, j] != Law.LIST:
-                press(
-                    points.numbers,
-                    points.trial,
-                    j,
-                    values[Point.LOAD, j],
-                    values[Point.END_LOAD, j],
-                )
+                middle = values[Point.LOAD, j]
+                press(points.numbers, points.trial, j, middle, values[Point.END_LOAD, j])
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
-
-    if options.is_rigid:
-        for j in range(count):
-            p = points.port[j]
-            if points.numbers[0, j] == Law.COULOMB:
-                # A port that was at rest before stays at its place.
-                was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
-                ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
-                values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
 
     copy_memory(points.trial, points.memory)
     system.totals[Total.IS_DIRTY] = 0.0
@@ -941,10 +928,12 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    system.totals[Total.REST] = 0.0
-    if options.is_rigid and system.sets.counters[PRESENT_SLOT] >= 0:
+    if options.has_events and system.sets.counters[PRESENT_SLOT] >= 0:
         return_ports_to_rest(system)
-        system.totals[Total.REST] = find_motion_energy(system) - energy
+        rest += energy - find_motion_energy(system)
+        if ports.contact[0] >= 0:
+            press_at_rest(system)
+    system.totals[Total.REST] = rest
 
     # The mean of the rise speed over the step is slope dq/h.
     if flank.size:
@@ -978,18 +967,24 @@ def relax_pieces(system):
     for k in range(r):
         shear[Shear.TRIAL, k] = 0.0
 
-    # Newton's method for the increments.
-    for _ in range(MAX_RELAXATIONS):
+    # Newton's method for the increments; `gain` is the change of energy of pieces and points without slip.
+    gain = 0.0
+    for iteration in range(MAX_RELAXATIONS):
         largest = 0.0
+        gain = 0.0
         for j in range(count):
             values[Point.TRIAL_SLIDE, j] = -sum_products(points.shapes[:, j], shear[Shear.TRIAL])
             step = Step(values[Point.TRIAL_SLIDE, j], 1.0, 0.0, 0.0, 0.0)
             mean = mean_force(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
             values[Point.TRIAL_FORCE, j] = mean.end
             values[Point.BY_SLIDE, j] = 2 * mean.by_increment
+            gain += mean.force * values[Point.TRIAL_SLIDE, j]
 
         for k in range(r):
-            residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
+            increment = shear[Shear.TRIAL, k]
+            middle = shear[Shear.VALUE, k] + 0.5 * increment
+            gain += points.stiffness[k] * middle * increment
+            residual = points.stiffness[k] * (middle + 0.5 * increment)
             residual -= sum_products(points.shapes[k], values[Point.TRIAL_FORCE, :count])
             ports.vector[k] = residual
             largest = max(largest, abs(residual) * shear[Shear.SCALE, k])
@@ -999,10 +994,16 @@ def relax_pieces(system):
                 )
             ports.matrix[k, k] += points.stiffness[k]
 
-        if largest <= tolerance or not solve_linear(ports.matrix, ports.vector, r):
+        if largest <= tolerance or iteration == MAX_RELAXATIONS - 1:
+            break
+        if not solve_linear(ports.matrix, ports.vector, r):
             break
         for k in range(r):
             shear[Shear.TRIAL, k] -= ports.vector[k]
+
+    # Where forces fall with the slide the method may fail; the pieces then relax after a later step.
+    if gain > 0.0:
+        return
 
     # The points slide back for good, with the loss that follows.
     for j in range(count):
@@ -1123,9 +1124,7 @@ def return_ports_to_rest(system):
     for first in (0, n):
         for p in range(n_ports):
             ports.vector[p] = 0.0
-        for j in range(points.port.size):
-            if rests(points, points.memory, j):
-                p = points.port[j]
+            if is_held(points, p):
                 ports.vector[p] = ports.values[Port.FREE, p]
                 if first > 0:
                     ports.vector[p] = sum_products(ports.rows[p], state[n:])
@@ -1135,6 +1134,31 @@ def return_ports_to_rest(system):
             for i in range(n):
                 change = ports.rows[p, i] * ports.vector[p] / system.options.mass
                 state[first + i] -= change
+
+
+@njit(**NJIT_CALL)
+def press_at_rest(system):
+    """Give the points the loads of the normal contact at the present state, while their ports rest.
+
+    A start with heave, and ports that come back to rest, change the loads outside of steps.
+    """
+    ports = system.ports
+    points = system.points
+    values = points.values
+    n = system.state.shape[1] // 2
+    for i in range(2):
+        p = int(ports.contact[i])
+        ports.values[Port.SLIDE, p] = sum_products(ports.rows[p], system.state[0, :n])
+        ports.values[Port.INCREMENT, p] = 0.0
+    find_loads(system, 0, 0.0, False)
+
+    for j in range(points.port.size):
+        load = values[Point.END_LOAD, j]
+        if points.numbers[0, j] == Law.LIST:
+            lists.press_list(system.lists, j, load)
+        else:
+            press(points.numbers, points.memory, j, values[Point.START_LOAD, j], load)
+        values[Point.START_LOAD, j] = values[Point.LOAD, j] = load
 
 
 @njit(**NJIT_CALL)
@@ -1209,7 +1233,7 @@ def try_step(system, level, row, begin, end, drive):
     # An event inside the step, or Newton's method without a solution, halves the step.
     write_trial(system, level)
     is_shortest = level == levels - 1
-    if options.is_rigid and find_event(
+    if options.has_events and find_event(
         system, drive[0] + h * (drive[1] + 0.5 * h * drive[2]), is_shortest
     ):
         totals[Total.IS_DIRTY] = 1.0
@@ -1253,6 +1277,7 @@ def add_energies(system, level):
     for i in range(inputs.size):
         loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
 
+    work -= totals[Total.REST]
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
     totals[Total.VISCOUS] += loss
@@ -1278,7 +1303,7 @@ def write_sample(system, row, sample):
     flank = system.flank
     size = system.state.shape[1]
     n = size // 2
-    if system.options.is_rigid:
+    if system.options.has_events:
         find_holds(system, system.state[0], structure.drive[row, 0])
 
     # Displacements of the ports; their sums start at 0.
@@ -1309,11 +1334,10 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        if rests(points, points.memory, j):
-            limit = find_rest_limit(points.numbers, points.memory, j, load)
-            force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         # The slip is a mean over the points, weighted by their friction limits.
         weight = load * points.numbers[1, j]
+        if is_held(points, p):
+            force = min(max(ports.values[Port.HOLD, p], -weight), weight)
         sample[first + N_PORT_COLUMNS * p] += force
         sample[first + N_PORT_COLUMNS * p + 1] += weight * (
             points.values[Point.TOTAL, j] - state.stretch
@@ -1354,7 +1378,7 @@ def write_sample(system, row, sample):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(system, steps, samples):
-    """March over a number of whole steps.
+    """March over a number of whole steps; 0 steps press the points to the normal contact of the present state.
 
     Parameters
     ----------
@@ -1378,6 +1402,8 @@ def march(system, steps, samples):
     ticks = 1 << (structure.responses.shape[0] - 1)
     h = system.options.step
     level = 0
+    if steps == 0 and ports.contact[0] >= 0:
+        press_at_rest(system)
 
     for i in range(steps + 1):
         write_sample(system, i, samples[i])
@@ -1442,7 +1468,7 @@ def add_work(system, sample, first_column, part):
     """
     ports = system.ports
     points = system.points
-    work = -system.totals[Total.REST]
+    work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:
             continue
@@ -1451,6 +1477,7 @@ def add_work(system, sample, first_column, part):
         slide = ports.values[Port.INCREMENT, p]
         if points.numbers[0, j] == Law.COULOMB:
             force = ports.values[Port.FORCE, p]
+            slide -= ports.values[Port.FREE, p]
         if system.flank.size and p == 0:
             force *= system.flank[Flank.RATIO]
         work += force * slide

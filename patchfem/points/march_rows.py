@@ -124,14 +124,14 @@ class Flank(IntEnum):
 class Total(IntEnum):
     """Entries of `System.totals`.
 
-    - WORK_IN: work of the drive since the start [J]
+    - WORK_IN: work of the drive since the start, without that on motions of ports at rest [J]
     - POWER: sum over the steps of the magnitude of this work [J]
     - VISCOUS, FRICTION: viscous loss and friction work since the start [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
-    - REST: energy that the modes gained as ports at rest were brought back in the last step [J]
+    - REST: work of the drive in the last step on motions of ports at rest, which are taken back [J]
     """
 
     WORK_IN = 0
@@ -256,8 +256,7 @@ class Options(NamedTuple):
     - scale: force [N] to whose 1e-11 part a step is solved
     - damping: weight of the change of a shear increment
     - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
-    - is_rigid, has_lists, has_loads, has_growth: 1 if points are rigid, have lists of bonds, loads that change, or
-      bonds that grow
+    - has_events, has_lists, has_loads: 1 if points have laws without memory, lists of bonds, or loads that change
     """
 
     mass: float
@@ -266,10 +265,9 @@ class Options(NamedTuple):
     scale: float
     damping: float
     redundant: float
-    is_rigid: int
+    has_events: int
     has_lists: int
     has_loads: int
-    has_growth: int
 
 
 class System(NamedTuple):

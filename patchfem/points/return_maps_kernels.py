@@ -28,7 +28,7 @@ LIST          mu, length [m]                                       see `lists_ke
 ============= ==================================================== =================================================
 """
 
-from math import exp, inf, log1p, sin, sqrt, tanh
+from math import exp, log1p, sin, sqrt, tanh
 from typing import NamedTuple
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
@@ -632,23 +632,3 @@ def press(numbers, memory, j, before, after):
         )
     elif law == Law.TANH:
         memory[0, j] *= after / before if before > 0 else 0.0
-
-
-@njit(**NJIT_KERNEL)
-def find_rest_limit(numbers, memory, j, load):
-    """Return the largest force at which a COULOMB point that sticks stays at rest; inf for other laws.
-
-    Parameters
-    ----------
-    numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    load : float
-        Normal load [N].
-    """
-    if numbers[0, j] != Law.COULOMB or memory[0, j] != 0:
-        return inf
-    return numbers[1, j] * load

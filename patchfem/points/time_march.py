@@ -45,7 +45,9 @@ from .march_rows import (
 
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
-RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
+EVENT_LEVELS = (
+    20  # lengths of the steps with laws without memory: whole steps and nineteen halvings
+)
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
@@ -61,7 +63,6 @@ MAX_STEPS_AT_ONCE = 8000
 TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
-SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
 WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of cycles
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
@@ -260,8 +261,9 @@ def make_system(
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows, float).reshape(len(rows), n)
 
-    laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
-    levels = RIGID_LEVELS if Law.COULOMB in laws else SOFT_LEVELS
+    laws = {float(law) for one in contact.point_sets for law in np.unique(one.law.numbers[0])}
+    has_events = bool(laws & {Law.COULOMB, Law.TANH})
+    levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
 
     # Responses of the modes; a prescribed slide has none.
@@ -309,10 +311,9 @@ def make_system(
         max(float(contact.limit), 1e-300),
         LIST_DAMPING if has_lists else 0.0,
         REDUNDANT if len(rows) > n else 0.0,
-        int(Law.COULOMB in laws),
+        int(has_events),
         int(has_lists),
         int(contact.has_loads),
-        int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
     )
 
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
@@ -338,28 +339,24 @@ def make_system(
 def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
     # Numbers, memory and loads of the laws of all points.
-    laws = [law for one in contact.point_sets for law in one.laws]
-    counts = [len(one.laws) for one in contact.point_sets]
-    numbers = np.zeros((N_NUMBERS, len(laws)))
-    memory = np.zeros((max([N_MEMORY, *(law.memory.size for law in laws)]), len(laws)))
-    values = np.zeros((len(Point), max(len(laws), n_nodes)))
-    for j, law in enumerate(laws):
-        numbers[:, j] = law.numbers
-        memory[: law.memory.size, j] = law.memory
-        values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
-        if law.numbers[0] == Law.BONDS:
-            memory[4, j] = law.memory[0]  # bond length in the middle of a step
+    laws = [one.law for one in contact.point_sets]
+    counts = [law.numbers[0].size for law in laws]
+    numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
+    memory = _join_columns(N_MEMORY, [law.memory for law in laws])
+    loads = _join_columns(1, [law.load + 0 * law.numbers[0] for law in laws])[0]
+    values = np.zeros((len(Point), max(loads.size, n_nodes)))
+    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : loads.size] = loads
 
     resultant = contact.preload
     if contact.grooves is not None:
         resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
     # A single point carries a prescribed load that is 0 at the start.
-    share = np.array([law.load / resultant if resultant > 0 else 1.0 for law in laws], float)
+    share = loads / resultant if resultant > 0 else np.ones(loads.size)
 
     # Nodes, shares of the load and shear shapes of each set of points.
-    nodes = np.full(len(laws), RESULTANT, np.int64)
-    place = np.zeros(len(laws))
-    shapes = np.zeros((0, len(laws)))
+    nodes = np.full(loads.size, RESULTANT, np.int64)
+    place = np.zeros(loads.size)
+    shapes = np.zeros((0, loads.size))
     stiffness = np.zeros(0)
     first = 0
     for one, count in zip(contact.point_sets, counts):
@@ -370,7 +367,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
             share[own] = one.shares
             place[own] = one.places
         if one.shear is not None:
-            shapes = np.zeros((len(one.shear.stiffness), len(laws)))
+            shapes = np.zeros((len(one.shear.stiffness), loads.size))
             shapes[:, own] = np.asarray(one.shear.shape).T
             stiffness = np.array(one.shear.stiffness, float)
         first = first + count
@@ -395,6 +392,11 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         place,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
+
+
+def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
+    """Return the columns of all points from the rows of each law, (n_rows,) for one point or (n_rows, c)."""
+    return np.hstack([np.zeros((n_rows, 0)), *(part.reshape(n_rows, -1) for part in parts)])
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
@@ -451,7 +453,7 @@ def _make_no_sets():
 
 
 def _press_first(system: System, contact: Contact) -> None:
-    """Find the contact set at the start, and press the points to it."""
+    """Find the contact set at the start."""
     press = compiled.load("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
@@ -670,21 +672,15 @@ class March:
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
         sampled = np.zeros(works.size)
-        rests = np.ones(works.size, bool)
-        still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
         for k, one in enumerate(self.contact.point_sets):
             if one.is_spring:
                 continue
             columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
-            is_rigid = one.laws[0].numbers[0] == Law.COULOMB
+            is_rigid = (one.law.numbers[0] == Law.COULOMB).all()
             mean = columns[:-1, 2] if is_rigid else None
             slide = samples[:, : n // 2] @ np.asarray(one.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
-            rests &= is_rigid & (np.abs(np.diff(slide)) <= still)
-        # What a port at rest does within a step and takes back is no work of the friction.
-        sampled[rests] = works[rests]
-        passed = np.abs(works[~rests]).sum()
-        self.work_sums += float(sampled.sum()), float(passed)
+        self.work_sums += float(sampled.sum()), float(np.abs(works).sum())
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""
@@ -946,12 +942,7 @@ def march(
             [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
         )
         now = np.concatenate([state, memory])
-        if (
-            can_repeat
-            and count > 0
-            and record.before is not None
-            and record.before.size == now.size
-        ):
+        if can_repeat and count > 0 and record.before.size == now.size:
             largest = np.abs(record.last[:, : state.size]).max(axis=0)
             scale = np.concatenate([largest, np.abs(memory)])
             if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
@@ -960,7 +951,7 @@ def march(
                 run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
                 run.work_sums += count * (run.work_sums - works)
 
-        record.before = now if size % steps_per_cycle == 0 else None
+        record.before = now if size % steps_per_cycle == 0 else np.zeros(0)
         if run.done < n_steps:
             saved.write_if_due(run, record)
         if progress is not None:
@@ -1011,7 +1002,7 @@ class Record:
     - energies (3,): energies up to the last sample [J]
     - snapshots: of the last cycle
     - stride: distance of the samples of earlier cycles
-    - before: state and memory at the end of the part before the last, if both have whole cycles; else None
+    - before: state and memory at the end of the part before the last, if both have whole cycles; else (0,)
     """
 
     def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
@@ -1026,7 +1017,7 @@ class Record:
         self.phasors = []
         self.energies = np.zeros(3)
         self.snapshots = []
-        self.before = None
+        self.before = np.zeros(0)
         # The distance of early samples divides a cycle, so that each one begins with a sample.
         longest = max(1, run.steps // MAX_EARLY_SAMPLES_PER_CYCLE)
         self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)

@@ -40,8 +40,7 @@ def make_bonds(law: Bonds):
 def make_springs(stiffness, yield_slide):
     """Return the function of a load that makes parallel elastic-plastic elements, with forces (t,) per load [1]."""
     limits = np.multiply(stiffness, yield_slide)
-    laws = [make_jenkins(limit, length) for limit, length in zip(limits, yield_slide)]
-    points = PointSet(laws, np.zeros(0))
+    points = PointSet(make_jenkins(limits, np.array(yield_slide, float)), np.zeros(0))
     return lambda load: Contact([points], float(limits.sum()), load=load)
 
 

@@ -115,8 +115,8 @@ def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
 
 def make_sliders(limits, lengths) -> Contact:
     """Return parallel Jenkins elements of friction limits [N] that yield at given slides [m]."""
-    laws = [make_jenkins(float(limit), float(length)) for limit, length in zip(limits, lengths)]
-    return Contact([PointSet(laws, np.ones(1))], float(np.sum(limits)), LENGTH)
+    law = make_jenkins(np.array(limits, float), np.array(lengths, float))
+    return Contact([PointSet(law, np.ones(1))], float(np.sum(limits)), LENGTH)
 
 
 def elastic_plastic(amplitude: float, share: float = 1.0) -> Cycle:

@@ -129,6 +129,22 @@ def test_order_two_for_combined_slide_heave_and_pitch(name):
     check_order_two(name, 1600, 0.35)
 
 
+@pytest.mark.parametrize(
+    "name, seed, count",
+    [
+        ("coulomb", 42, 0),
+        ("coulomb", 50, 0),
+        ("weaker", 27, 0),
+        ("tanh", 14, 0),
+        ("growing", 225, 2),
+    ],
+)
+def test_always_no_step_gains_energy(name, seed, count):
+    """Friction gains no energy in coarse steps: ports that reverse within a step, rest or start apart, pieces that snap."""
+    shear = reduce_to_shear_modes(crowned_contact(), count, 1.5e-7) if count else None
+    check_energy_of_random_march(name, seed, 60, shear)
+
+
 @pytest.mark.share(0)
 @pytest.mark.parametrize("laws", [POINT_LAWS, sorted(LAWS)], ids=["points", "all"])
 @given(st.data(), st.integers(0, 10**6), st.sampled_from([60, 200]))

@@ -20,9 +20,9 @@ def make_modes(zeta=0.003) -> ModalBasis:
     return ModalBasis(("a",), np.array([OMEGA]), np.array([zeta]), one, one, one, 1.0)
 
 
-def run(points, steps, drive=DRIVE, cycles=60, zeta=0.003, **options):
-    """Return the motion of a block on points of given laws."""
-    contact = Contact([PointSet(points, np.ones(1))], LIMIT)
+def run(law, steps, drive=DRIVE, cycles=60, zeta=0.003, **options):
+    """Return the motion of a block on points of a given law."""
+    contact = Contact([PointSet(law, np.ones(1))], LIMIT)
     return march(make_modes(zeta), drive, contact, cycles, steps, **options)
 
 
@@ -34,7 +34,7 @@ def amplitude(motion) -> float:
 
 def test_coulomb_block_at_resonance():
     """The amplitude of the two-stop motion, and its energy balance."""
-    motion = run([laws.make_coulomb(1.0, 1.0, LIMIT)], 200)
+    motion = run(laws.make_coulomb(1.0, 1.0, LIMIT), 200)
     assert amplitude(motion) == pytest.approx(EXACT_AMPLITUDE, rel=1e-6)
     ledger = motion.ledger
     gap = ledger["work_in"] - ledger["viscous"] - ledger["booked"] - ledger["stored"]
@@ -43,7 +43,7 @@ def test_coulomb_block_at_resonance():
 
 def test_exact_rig_without_friction_shares_compiled_code():
     """The arrays of a march without points have the types of those with points: other types are compiled anew."""
-    point = PointSet([laws.make_coulomb(1.0, 1.0, LIMIT)], np.ones(1))
+    point = PointSet(laws.make_coulomb(1.0, 1.0, LIMIT), np.ones(1))
     contacts = Contact([]), Contact([point], LIMIT)
     systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
     converter = compiled.machine.ArgumentConverter()

@@ -113,11 +113,13 @@ def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -
     response = result.response
     peak = result.ledger["peak_stored"]
     assert result.outcome is None, result.message
-    assert check_balance(result, basis) <= 1e-11
+    # A step is solved up to 1e-12 of the largest force (march_rows.RESIDUAL), which does work along the path.
+    force = max(0.3 * LOAD, response.extra["normal_load"].max())
+    paths = np.abs(np.diff([response.slide, response.modal @ basis.normal])).sum()
+    energy = peak + result.ledger["power"]
+    assert check_balance(result, basis) <= 1e-11 + 1e-12 * force * paths / energy
     work, stored, lost, created = response.extra["ledger"]
-    # Rigid friction takes back what a step before lost too much.
-    round_off = 1e-3 * lost[-1] if name in ("coulomb", "weaker") else 1e-12 * peak
-    assert created[-1] <= 1e-12 * peak and np.diff(lost).min() >= -round_off
+    assert created[-1] <= 1e-12 * peak and np.diff(lost).min() >= -1e-12 * peak
     assert work[-1] == pytest.approx(
         stored[-1] + lost[-1] - created[-1], rel=1e-9, abs=1e-12 * peak
     )

@@ -264,11 +264,10 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     if contact.grooves is not None:
         slope = contact.grooves.slope(slide)
         vertical = np.array([one.vertical for one in snapshots])[:, None]
-        loads = np.array([law.load for law in contact.point_sets[0].laws])
+        loads = contact.point_sets[0].law.load
         length = np.hypot(1.0, slope)
         forces = vertical * loads / loads.sum() * slope + forces * length
         elastic = elastic / length
-
     tau = np.zeros((len(snapshots), patch.x.size))
     local = tau + slide
     tau[:, index] = forces / patch.pieces.interface.weight[index]
