@@ -13,6 +13,6 @@ folder `steady`), which prepares the integration in `dynamics` or `hybrid` and c
 engine computes itself.
 `evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive
 level. `joints` makes the laws and contact models of each engine from the friction of a patch. `numerics` has
-the numerical settings. `costs` has the predicted cost, on which the choice of an engine is based; `bond_lists` has
-the length of a bond list, and the refusal of steps that are too long for it.
+the numerical settings. `costs` has the predicted cost, on which the choice of an engine and a refusal are based;
+`bond_lists` has the length of a bond list, and the refusal of steps that are too long for it.
 """

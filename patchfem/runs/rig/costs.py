@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
 
 In: a Model. Out: numbers of steps, CPU times, and whether a time integration with constant steps is
 chosen instead of steps from event to event.
@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import cost_model
+from ...core import Missing
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
@@ -22,6 +23,9 @@ from ...structure.drive_sizes import find_max_acceleration, find_max_frequency_r
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
+MAX_EXACT_SECONDS = (
+    600.0  # Largest CPU time [s] of a motion from event to event; a longer one is refused.
+)
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -241,3 +245,19 @@ def prefers_time_steps(model: Model) -> bool:
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
+
+
+def refuse_long_hybrid_run(model: Model) -> None:
+    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
+    seconds = estimate_hybrid_seconds(model)
+    if seconds > MAX_EXACT_SECONDS:
+        march = ""
+        if estimate_march_seconds(model) < seconds:
+            march = ', or use accuracy.method = "march"'
+        raise Missing(
+            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by events, "
+            f"the fastest free vibration and the friction law) would need a computing time of about {seconds:.0f} s, "
+            f"more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness of modes and "
+            f"elements{march}",
+            "",
+        )
