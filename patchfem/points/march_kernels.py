@@ -1468,6 +1468,8 @@ def add_work(system, sample, first_column, part):
     """
     ports = system.ports
     points = system.points
+
+    # Work is mean force times increment; that of a port at rest is taken back, and counts for the drive.
     work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:
