@@ -22,7 +22,7 @@ from .return_maps_kernels import (
     mean_force,
     prepare,
     read,
-    slip_since_zero,
+    slip_share,
 )
 
 LEVELS = 5  # halvings of a step that contains an event
@@ -30,19 +30,18 @@ TICKS = 1 << LEVELS  # shortest steps in a step
 # Number of terms of the exponential of a shortest step; the product of this step with any rate is below 0.1.
 TAYLOR_TERMS = 12
 MAX_TRIALS = 60  # Newton steps and bisections for the increment of a step
-CASE_RESIDUAL = 1e-10  # residual of a step relative to its increments
+CASE_RESIDUAL = 1e-7  # residual of a step relative to its increments
 GAUSS_POINT = (
     0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
 # Distance of the mean force from the mean of the forces at both ends of a step, relative to the force of the drive and to
 # the squared phase of a whole step, above which the step is halved
-MAX_FORCE_BEND = 0.3
-# Change of the irreversible part of the slide from step to step, relative to the phase of a whole step, above which the
-# steps of the window stay short; near events, where steps grow with their distance, it is resolved like elsewhere
-MAX_SLIP_CHANGE = 0.25
-FULL_STICK_TOL = (
-    1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
-)
+MAX_FORCE_BEND = 0.1
+# Velocities at both ends of a step with a reversal, relative to the reference speed of the law "tanh", beyond which its
+# force changes like that of a rigid point
+STEEP_TURN = 2.0
+# Change of the irreversible part of the motion in a step from which it is a jump at a corner of the law
+MIN_SHARE_JUMP = 0.5
 N_READ = 2  # measured cycles of a motion that repeats
 
 
@@ -116,7 +115,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         Duration of the step [s].
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -203,7 +202,7 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         Force that would keep the point at rest at the end of the step [N].
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -215,6 +214,7 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     mobility = case[Number.MOBILITY]
     load = case[Number.LOAD]
     direction = memory[0, j]
+    now[Now.SHARE_BEFORE] = abs(direction)
     slip_force = numbers[2, j] * load
     rest_force = numbers[1, j] * load
     if direction == 0:
@@ -225,8 +225,11 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         now[Now.EVENT] = fraction
         rest = (1 - fraction) * h
         memory[0, j] = 1.0 if hold > 0 else -1.0
-        now[Now.VELOCITY] = mobility * (hold - memory[0, j] * slip_force) * rest
-        now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * rest
+        # The force beyond that of slip is linear in the rest of the step.
+        excess = memory[0, j] * (rest_force - slip_force)
+        last = hold - memory[0, j] * slip_force
+        now[Now.VELOCITY] = mobility * rest / 2 * (excess + last)
+        now[Now.SLIDE] += mobility * rest * rest / 6 * (2 * excess + last)
         return
 
     # The slip stops at a fraction of the step, in which the velocity falls linearly.
@@ -235,19 +238,31 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     rest = (1 - fraction) * h
     if abs(hold) <= rest_force:
         memory[0, j] = 0.0
+        now[Now.TURN_FORCE] = nan  # rigid friction at rest takes many values
         now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * fraction * h
         now[Now.VELOCITY] = 0.0
         return
     # Reversal: for the rest of the step the force has the other sign.
     memory[0, j] = -direction
+    now[Now.TURN_FORCE] = 0.0
     change = 2 * mobility * direction * slip_force * rest
     now[Now.SLIDE] = q + 0.5 * change * rest
     now[Now.VELOCITY] = v + change
 
 
 @njit(**NJIT_KERNEL)
+def count_halvings(part):
+    """Return after how many halvings a step is shorter than a part of it; at least 1."""
+    count = 1
+    while part < 0.5 and count < LEVELS:
+        part *= 2
+        count += 1
+    return count
+
+
+@njit(**NJIT_KERNEL)
 def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memory, j):
-    """Advance a case by a step, or return False if the step contains an event and can be halved.
+    """Advance a case by a step and return 0, or return how often a step that contains an event has to be halved.
 
     `waves` are the sines of the drive at the start, in the middle and at the end; `max_bend` [N] is the largest difference
     of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
@@ -267,7 +282,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         corner in the step.
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -302,14 +317,16 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         if direction == 0:
             hold = (drive * waves[2] - case[Number.STIFFNESS] * q) / mobility
             if abs(hold) > numbers[1, j] * load:
-                if is_shortest:
-                    end_at_event(q, v, h, hold, case, now, numbers, memory, j)
-                return is_shortest
+                if not is_shortest:
+                    return 1
+                end_at_event(q, v, h, hold, case, now, numbers, memory, j)
+                return 0
             middle = (drive * waves[1] - case[Number.STIFFNESS] * q) / mobility
             now[Now.MEAN] = 0.5 * (now[Now.FORCE] + hold)
             now[Now.TIME_MEAN] = (now[Now.FORCE] + 4 * middle + hold) / 6
-            return True
+            return 0
 
+        turns = False
         dq = free - response[0, 2] * mobility * force
         end = free_velocity - response[1, 2] * mobility * force
         time_mean = force
@@ -318,26 +335,35 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         dq, end, force, time_mean, bend = solve_step(
             (free, free_velocity), response, h, case, now, numbers, memory, j
         )
-        # A law takes the net increment of a reversal inside the step as its path.
-        turns = v * end < 0 and numbers[0, j] != Law.TANH
-        if (turns or abs(bend) > max_bend) and not is_shortest:
-            return False
+        turns = v * end < 0
+        # A law takes the net increment of a reversal inside the step as its path; one of the velocity may jump there.
+        if numbers[0, j] == Law.TANH:
+            turns = turns and min(abs(v), abs(end)) > STEEP_TURN * numbers[2, j]
+        if not is_shortest:
+            if turns:
+                return count_halvings(v / (v - end))
+            if abs(bend) > max_bend:
+                return count_halvings(sqrt(max_bend / abs(bend)))
 
     # A slip of the other direction than that of its force stops or reverses inside the step.
     if is_rigid and memory[0, j] * end < 0:
-        if is_shortest:
-            hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility
-            now[Now.MEAN] = force
-            end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
-        return is_shortest
+        if not is_shortest:
+            return count_halvings(v / (v - end))
+        hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility
+        now[Now.MEAN] = force
+        end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
+        return 0
 
     first = 0.0
-    if v * end < 0 and numbers[0, j] != Law.TANH:
+    if turns:
         # The extreme lies where a linear velocity is 0.
         fraction = v / (v - end)
         now[Now.EVENT] = fraction
         first = 0.5 * v * fraction * h
         advance(numbers, memory, j, load, Step(first, fraction * h, v, 0.0, 0.0))
+        now[Now.TURN_FORCE] = read(numbers, memory, j, load).force
+        now[Now.SHARE_BEFORE] = slip_share(numbers, memory, j, load, v)
+        now[Now.SHARE_AFTER] = slip_share(numbers, memory, j, load, end)
         h -= fraction * h
         v = 0.0
 
@@ -346,7 +372,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     now[Now.VELOCITY] = end
     now[Now.MEAN] = force
     now[Now.TIME_MEAN] = time_mean
-    return True
+    return 0
 
 
 @njit(**NJIT_KERNEL)
@@ -359,7 +385,7 @@ def find_force(wave, case, now, numbers, memory, j):
         Sine of the drive at the end of the step.
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -377,6 +403,7 @@ def find_force(wave, case, now, numbers, memory, j):
         now[Now.FORCE] = hold / case[Number.MOBILITY]
     if numbers[0, j] == Law.COULOMB and now[Now.EVENT] >= 0:
         now[Now.TIME_MEAN] = before + (1 - now[Now.EVENT]) * (now[Now.FORCE] - before)
+        now[Now.SHARE_AFTER] = abs(memory[0, j])
 
 
 class Middle(NamedTuple):
@@ -399,7 +426,7 @@ def find_middle(h, start, now):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`.
     """
     q = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
@@ -408,69 +435,8 @@ def find_middle(h, start, now):
 
 
 @njit(**NJIT_KERNEL)
-def add_energies(waves, h, case, start, now):
-    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule.
-
-    Parameters
-    ----------
-    waves : tuple of float
-        Sines of the drive at the start, in the middle and at the end of the step.
-    h : float
-        Duration of the step [s].
-    case : (12,) array
-        Numbers of the case, in the order of `case_rows.Number`.
-    start : tuple of float
-        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
-    """
-    middle = find_middle(h, start, now).velocity
-    end = now[Now.VELOCITY]
-    power = case[Number.DRIVE] * h / 6
-    work = power * (waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end)
-    now[Now.WORK_IN] += work
-    now[Now.POWER] += abs(work)
-    squares = start[1] * start[1] + 4 * middle * middle + end * end
-    now[Now.VISCOUS] += case[Number.DAMPING] * h / 6 * squares
-    now[Now.FRICTION] += case[Number.MOBILITY] * now[Now.MEAN] * (now[Now.SLIDE] - start[0])
-    energy = 0.5 * (end * end + case[Number.STIFFNESS] * now[Now.SLIDE] * now[Now.SLIDE])
-    now[Now.STORED] = max(now[Now.STORED], energy)
-
-
-@njit(**NJIT_KERNEL)
-def find_turn(h, start, now):
-    """Return the part of a step and the slide at which the velocity, a parabola in the step, is 0.
-
-    Its mean is that of the slide; its signs at both ends differ.
-
-    Parameters
-    ----------
-    h : float
-        Duration of the step [s].
-    start : tuple of float
-        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
-    """
-    first = start[1]
-    last = now[Now.VELOCITY]
-    middle = find_middle(h, start, now).velocity
-    slope = 4 * middle - 3 * first - last
-    bend = 2 * (first + last) - 4 * middle
-    # The root between the ends, without a difference of large numbers
-    size = sqrt(max(slope * slope - 4 * bend * first, 0.0))
-    sum_ = slope + (size if slope > 0 else -size)
-    part = -2 * first / sum_ if sum_ != 0 else 0.5
-    if not 0 <= part <= 1:
-        part = -0.5 * sum_ / bend if bend != 0 else 0.5
-    if not 0 <= part <= 1:
-        part = first / (first - last)
-    return part, start[0] + h * part * (first + part * (slope / 2 + part * bend / 3))
-
-
-@njit(**NJIT_KERNEL)
-def observe_extremes(h, law, start, now, seen, observes):
-    """Update the extremes of the slide in the cycle, and the friction forces there.
+def find_work(h, law, start, now):
+    """Return the friction work of a step [J], exact for a law of the path and by Simpson's rule for one of the velocity.
 
     Parameters
     ----------
@@ -480,9 +446,88 @@ def observe_extremes(h, law, start, now, seen, observes):
         Number of the `law_rows.Law`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
+        State of the case, in the order of `case_rows.Now`.
+    """
+    if law != Law.TANH:
+        return now[Now.MEAN] * (now[Now.SLIDE] - start[0])
+    middle = find_middle(h, start, now)
+    power = start[2] * start[1] + now[Now.FORCE] * now[Now.VELOCITY]
+    return h / 6 * (power + 4 * middle.force * middle.velocity)
+
+
+@njit(**NJIT_KERNEL)
+def add_energies(waves, h, work, case, start, now):
+    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule.
+
+    Parameters
+    ----------
+    waves : tuple of float
+        Sines of the drive at the start, in the middle and at the end of the step.
+    h : float
+        Duration of the step [s].
+    work : float
+        Friction work of the step [J].
+    case : (12,) array
+        Numbers of the case, in the order of `case_rows.Number`.
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
-    seen : (30,) array
+    """
+    middle = find_middle(h, start, now).velocity
+    end = now[Now.VELOCITY]
+    power = case[Number.DRIVE] * h / 6
+    power *= waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end
+    now[Now.WORK_IN] += power
+    now[Now.POWER] += abs(power)
+    squares = start[1] * start[1] + 4 * middle * middle + end * end
+    now[Now.VISCOUS] += case[Number.DAMPING] * h / 6 * squares
+    now[Now.FRICTION] += case[Number.MOBILITY] * work
+    energy = 0.5 * (end * end + case[Number.STIFFNESS] * now[Now.SLIDE] * now[Now.SLIDE])
+    now[Now.STORED] = max(now[Now.STORED], energy)
+
+
+@njit(**NJIT_KERNEL)
+def find_turn(h, value, rate, last_value, last):
+    """Return the extreme of a cubic in a step, where its rate, a parabola, is 0; the rates at both ends differ in sign.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    value, rate : float
+        Value [m] and its rate [m/s] at the start of the step.
+    last_value, last : float
+        The same at its end.
+    """
+    middle = 1.5 * (last_value - value) / h - 0.25 * (rate + last)
+    slope = 4 * middle - 3 * rate - last
+    bend = 2 * (rate + last) - 4 * middle
+    # The root between the ends, without a difference of large numbers
+    size = sqrt(max(slope * slope - 4 * bend * rate, 0.0))
+    sum_ = slope + (size if slope > 0 else -size)
+    part = -2 * rate / sum_ if sum_ != 0 else 0.5
+    if not 0 <= part <= 1:
+        part = -0.5 * sum_ / bend if bend != 0 else 0.5
+    if not 0 <= part <= 1:
+        part = rate / (rate - last)
+    return value + h * part * (rate + part * (slope / 2 + part * bend / 3))
+
+
+@njit(**NJIT_KERNEL)
+def observe_extremes(h, start, now, seen, observes):
+    """Update the extremes of the slide in the cycle, and the friction forces there.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, in the order of `case_rows.Now`; changed in place.
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     observes : bool
         Whether the cycle is measured.
@@ -490,19 +535,10 @@ def observe_extremes(h, law, start, now, seen, observes):
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
 
-    # The force at the extreme lies between those at both ends of the step.
+    # The law "tanh" has no force at a reversal.
     if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
-        fraction, q = find_turn(h, start, now)
-        force = start[2] + fraction * (now[Now.FORCE] - start[2])
-        if law == Law.TANH:
-            force = 0.0
-        elif law == Law.LUGRE:
-            bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
-            force += bend * fraction * (1 - fraction)
-        elif now[Now.FORCE] * start[2] < 0:
-            force = 0.5 * (start[2] + now[Now.FORCE])
-        elif now[Now.VELOCITY] == 0:
-            force = nan  # rigid friction at rest takes many values
+        q = find_turn(h, start[0], start[1], q, now[Now.VELOCITY])
+        force = now[Now.TURN_FORCE] if now[Now.EVENT] >= 0 else 0.0
 
     if q > now[Now.MAX]:
         now[Now.MAX] = q
@@ -575,9 +611,9 @@ def observe_acceleration(waves, h, case, start, now, seen):
         Numbers of the case, in the order of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
-    seen : (30,) array
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -611,9 +647,9 @@ def observe_harmonics(time, h, omega, start, now, seen):
         Circular frequency of the drive [rad/s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
-    seen : (30,) array
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -639,110 +675,81 @@ def observe_harmonics(time, h, omega, start, now, seen):
 
 
 @njit(**NJIT_KERNEL)
-def observe_stick(time, h, omega, is_rigid, start, now, seen):
-    """Add the time of stick, in which less than half of the slide is irreversible.
-
-    The irreversible fraction is interpolated between the middles of steps.
+def add_stick(angle, turn, speeds, first, last, mean, seen):
+    """Add the phase during which less than half of the motion is irreversible, in a piece without reversal.
 
     Parameters
     ----------
-    time : float
-        Time at the start of the step [s].
-    h : float
-        Duration of the step [s].
-    omega : float
-        Circular frequency of the drive [rad/s].
-    is_rigid : bool
-        Whether the law sticks without a stretch.
-    start : tuple of float
-        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
-    seen : (30,) array
+    angle, turn : float
+        Phase of the drive at the start of the piece, and that which passes in it [rad].
+    speeds : (float, float)
+        Magnitudes of the velocity at both ends [m/s].
+    first, last, mean : float
+        Irreversible part of the motion at the start and at the end of the piece, and its mean.
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
-    # Irreversible fraction of the path in the step, less one half.
-    dq = now[Now.SLIDE] - start[0]
-    event = now[Now.EVENT]
-    path = abs(dq)
-    excess = -0.5
-    if event >= 0 and is_rigid:
-        # The point stops, is released or turns.
-        moves_first = event if start[1] != 0 else 0.0
-        moves_last = 1 - event if now[Now.VELOCITY] != 0 else 0.0
-        excess += moves_first + moves_last
-    elif path > 0:
-        slip = abs(now[Now.SLIP] - start[3])
-        if event >= 0:
-            # Slip belongs to the part before the reversal first, and fractions of the path become those of the time.
-            first = 0.5 * start[1] * event * h
-            rest = abs(dq - first)
-            first = abs(first)
-            before = min(slip, first)
-            excess += event * before / first if first > 0 else 0.0
-            excess += (1 - event) * min(slip - before, rest) / rest if rest > 0 else 0.0
-        else:
-            excess += slip / path
-
-    centre = time + 0.5 * h
-    elapsed = centre - seen[Seen.MIDDLE]
-    last = seen[Seen.EXCESS]
-    if seen[Seen.SPAN] == h:
-        # The first step of the window has no step before it.
-        last = excess
-
-    # Time of stick between the middles of the last step and this one.
-    sticking = 0.0
-    if last < 0 and excess < 0:
-        sticking = elapsed
-    elif last < 0 or excess < 0:
-        # The law changes at once if it sticks or slips completely in one of both steps, else gradually.
-        before = elapsed - 0.5 * h
-        part = last / (last - excess)
-        crossing = 2 * part * before if part < 0.5 else before + (part - 0.5) * h
-        if 0.5 - abs(last) < FULL_STICK_TOL:
-            crossing = before + (0.5 - abs(excess)) * h
-        elif 0.5 - abs(excess) < FULL_STICK_TOL:
-            crossing = 2 * before * abs(last)
-        sticking = crossing if last < 0 else elapsed - crossing
-        if last < 0:
-            angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
+    first = abs(first)
+    last = abs(last)
+    sticks = first < 0.5
+    part = 1.0 if sticks else 0.0
+    if sticks != (last < 0.5):
+        # The irreversible part is a parabola of the path; that of a law with a corner jumps where this gives the mean.
+        rise = 0.5 - first
+        bend = 6 * mean - 3 * (first + last)
+        slope = last - first + bend
+        root = sqrt(max(slope * slope - 4 * bend * rise, 0.0))
+        crossing = 2 * rise / (slope + (root if slope > 0 else -root))
+        if abs(last - first) > MIN_SHARE_JUMP:
+            crossing = (last - mean) / (last - first)
+        crossing = min(max(crossing, 0.0), 1.0)
+        # From the part of the path to that of the time, with a linear velocity
+        v = speeds[0]
+        crossing *= (v + speeds[1]) / (v + sqrt(v * v + crossing * (speeds[1] * speeds[1] - v * v)))
+        part = crossing if sticks else 1 - crossing
+        if sticks:
+            start = 2 * (angle + crossing * turn)
             seen[Seen.STARTS] += 1
-            seen[Seen.SLIP_START_PHASE_COS] += cos(angle)
-            seen[Seen.SLIP_START_PHASE_SIN] += sin(angle)
-
-    seen[Seen.STUCK] += sticking
-    seen[Seen.MIDDLE] = centre
-    seen[Seen.EXCESS] = excess
+            seen[Seen.SLIP_START_PHASE_COS] += cos(start)
+            seen[Seen.SLIP_START_PHASE_SIN] += sin(start)
+    seen[Seen.STUCK] += part * turn
 
 
 @njit(**NJIT_KERNEL)
-def find_extreme_slip(h, start, now, numbers, memory, j, load):
-    """Return the irreversible slide at its extreme in a step, or at the end of the step.
+def observe_stick(angle, turn, share, start, now, seen):
+    """Add the phase of stick in a step.
 
     Parameters
     ----------
-    h : float
-        Duration of the step [s].
+    angle, turn : float
+        Phase of the drive at the start of the step, and that which passes in it [rad].
+    share : float
+        Irreversible part of the motion at the end of the step.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
-    numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    load : float
-        Normal load [N].
+    now : (20,) array
+        State of the case, in the order of `case_rows.Now`.
+    seen : (29,) array
+        What was observed, in the order of `case_rows.Seen`; changed in place.
     """
-    if numbers[0, j] == Law.TANH and start[1] * now[Now.VELOCITY] < 0:
-        return find_turn(h, start, now)[1]
-    slip = now[Now.SLIP]
-    if (start[0] - start[3]) * (now[Now.SLIDE] - slip) < 0:
-        slip -= slip_since_zero(numbers, memory, j, load, now[Now.VELOCITY])
-    return slip
+    first = seen[Seen.SHARE]
+    seen[Seen.SHARE] = share
+    part = now[Now.EVENT]
+    v = abs(start[1])
+    last = abs(now[Now.VELOCITY])
+    if part < 0:
+        path = now[Now.SLIDE] - start[0]
+        mean = abs((now[Now.SLIP] - start[3]) / path) if path != 0 else first
+        add_stick(angle, turn, (v, last), first, share, mean, seen)
+        return
+
+    # A point that stops, turns or is released changes its law at once.
+    before = now[Now.SHARE_BEFORE]
+    after = now[Now.SHARE_AFTER]
+    event = angle + part * turn
+    add_stick(angle, part * turn, (v, 0.0), first, before, 0.5 * (first + before), seen)
+    add_stick(event, 0.0, (1.0, 1.0), before, after, 0.5, seen)
+    add_stick(event, (1 - part) * turn, (0.0, last), after, share, 0.5 * (after + share), seen)
 
 
 @njit(**NJIT_KERNEL)
@@ -758,7 +765,7 @@ def find_largest_force(h, start, now, numbers, j, load):
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -781,37 +788,43 @@ def find_largest_force(h, start, now, numbers, j, load):
 
 
 @njit(**NJIT_KERNEL)
-def observe_forces(h, start, now, numbers, memory, j, load, seen):
+def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     """Add the extremes of force and slip, and the friction work.
 
     Parameters
     ----------
     h : float
         Duration of the step [s].
+    work : float
+        Friction work of the step [J].
+    share : float
+        Irreversible part of the motion at the end of the step.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
         Normal load [N].
-    seen : (30,) array
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
-    slip = find_extreme_slip(h, start, now, numbers, memory, j, load)
+    slip = now[Now.SLIP]
+    first = seen[Seen.SHARE] * start[1]
+    last = share * now[Now.VELOCITY]
+    if first * last < 0:
+        slip = find_turn(h, start[3], first, slip, last)
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], force)
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
     seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
-    seen[Seen.WORK] += now[Now.MEAN] * dq
+    seen[Seen.WORK] += work
     seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
-    seen[Seen.PASSED] += abs(now[Now.MEAN] * dq)
+    seen[Seen.PASSED] += abs(work)
 
 
 @njit(**NJIT_KERNEL)
@@ -829,9 +842,9 @@ def end_cycle(now, seen, history):
 
     Parameters
     ----------
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
-    seen : (30,) array
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor; output.
@@ -869,7 +882,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         Whether the cycle is measured.
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (17,) array
+    now : (20,) array
         State of the case, in the order of `case_rows.Now`; changed in place.
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
@@ -877,7 +890,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
-    seen : (30,) array
+    seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
     omega = case[Number.OMEGA]
@@ -885,9 +898,6 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     max_bend = (
         MAX_FORCE_BEND * (omega * step) ** 2 * abs(case[Number.DRIVE]) / case[Number.MOBILITY]
     )
-    is_rigid = numbers[0, j] == Law.COULOMB
-    max_change = MAX_SLIP_CHANGE * omega * step
-    change = 0.0
     level = 0
     tick = 0
     sine = 0.0
@@ -911,31 +921,30 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         middle_cosine = cosine * half_cosine - sine * half_sine
         drive = sine, middle_sine, middle_sine * half_cosine + middle_cosine * half_sine
         start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
-        if not try_step(
+        halvings = try_step(
             drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
-        ):
-            level += 1
+        )
+        if halvings > 0:
+            level = min(level + halvings, LEVELS)
             continue
 
         find_force(drive[2], case, now, numbers, memory, j)
-        add_energies(drive, h, case, start, now)
+        work = find_work(h, numbers[0, j], start, now)
+        add_energies(drive, h, work, case, start, now)
         last_cosine = cosine
         sine = drive[2]
         cosine = middle_cosine * half_cosine - middle_sine * half_sine
         now[Now.COS] += 0.5 * h * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
         now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * sine)
-        observe_extremes(h, numbers[0, j], start, now, seen, observes)
+        observe_extremes(h, start, now, seen, observes)
         if observes:
-            observe_forces(h, start, now, numbers, memory, j, case[Number.LOAD], seen)
+            share = slip_share(numbers, memory, j, case[Number.LOAD], now[Now.VELOCITY])
+            observe_forces(h, work, share, start, now, numbers, j, case[Number.LOAD], seen)
             observe_acceleration(drive, h, case, start, now, seen)
             observe_harmonics(time, h, omega, start, now, seen)
-            excess = seen[Seen.EXCESS]
-            observe_stick(time, h, omega, is_rigid, start, now, seen)
-            change = 0.0 if is_rigid else abs(seen[Seen.EXCESS] - excess)
+            observe_stick(omega * time, omega * h, share, start, now, seen)
         tick += size
-        if change > 2 * max_change and level < LEVELS:
-            level += 1
-        elif level > 0 and tick % (2 * size) == 0 and change <= max_change:
+        if level > 0 and tick % (2 * size) == 0:
             level -= 1
 
 
@@ -953,9 +962,9 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
         Numbers of the laws; row 0 is the `Law`.
     memory : (l, c) array
         Memory of the laws; changed in place.
-    nows : (c, 17) array
+    nows : (c, 20) array
         States of the cases, in the order of `case_rows.Now`; output.
-    seens : (c, 30) array
+    seens : (c, 29) array
         What was observed, in the order of `case_rows.Seen`; output.
     histories : (c, n, 4) array
         Extremes and phasor of every cycle; output.
@@ -988,11 +997,13 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
             observes = cycle >= first
             if cycle == first:
                 start_window(now, seen)
+                seen[Seen.SHARE] = slip_share(
+                    numbers, memory, j, case[Number.LOAD], now[Now.VELOCITY]
+                )
             begin = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE]
             sums = now[Now.WORK_IN], now[Now.POWER], now[Now.VISCOUS], now[Now.FRICTION]
             if observes:
                 seen[Seen.LAST_MEAN] = 0.0
-                seen[Seen.MIDDLE] -= 2 * np.pi / omega if seen[Seen.N_CYCLES] > 0 else 0.0
             march_cycle(steps, table, observes, case, now, numbers, memory, j, seen)
 
             end_cycle(now, seen, histories[j, cycle])
@@ -1010,14 +1021,9 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
                 for k in range(cycle, cycle + n_skipped):
                     for column in range(4):
                         histories[j, k, column] = histories[j, cycle - 1, column]
-                now[Now.WORK_IN] += n_skipped * (now[Now.WORK_IN] - sums[0])
-                now[Now.POWER] += n_skipped * (now[Now.POWER] - sums[1])
-                now[Now.VISCOUS] += n_skipped * (now[Now.VISCOUS] - sums[2])
-                now[Now.FRICTION] += n_skipped * (now[Now.FRICTION] - sums[3])
+                for k in range(4):
+                    now[Now.WORK_IN + k] += n_skipped * (now[Now.WORK_IN + k] - sums[k])
                 cycle += n_skipped
                 first = cycle
 
         now[Now.ELASTIC] = read(numbers, memory, j, case[Number.LOAD]).energy
-        if seen[Seen.EXCESS] < 0:
-            # The second half of the last step
-            seen[Seen.STUCK] += 2 * np.pi / omega - seen[Seen.MIDDLE]

@@ -42,7 +42,7 @@ class Number(IntEnum):
 
 
 class Now(IntEnum):
-    """Columns of the state (c, 17) of c cases; kernels get the row of one case.
+    """Columns of the state (c, 20) of c cases; kernels get the row of one case.
 
     - SLIDE, VELOCITY: at the end of the last step [m], [m/s]
     - MEAN: friction force [N] as a mean over the path of the last step
@@ -59,6 +59,8 @@ class Now(IntEnum):
       released; -1 without such an event
     - ELASTIC: elastic energy of the friction law at the end of the run [J]
     - TIME_MEAN: friction force [N] as a mean over the time of the last step
+    - SHARE_BEFORE, SHARE_AFTER: irreversible part of the motion just before and after `EVENT`
+    - TURN_FORCE: friction force [N] at `EVENT`; NaN of a rigid point that stops
     """
 
     SLIDE = 0
@@ -78,19 +80,21 @@ class Now(IntEnum):
     EVENT = 14
     ELASTIC = 15
     TIME_MEAN = 16
+    SHARE_BEFORE = 17
+    SHARE_AFTER = 18
+    TURN_FORCE = 19
 
 
 class Seen(IntEnum):
-    """Columns of what is observed (c, 30) in the window of c cases; kernels get the row of one case.
+    """Columns of what is observed (c, 29) in the window of c cases; kernels get the row of one case.
 
     - MAX_ACCELERATION: largest magnitude of the acceleration of the output [m s-2]
     - MAX_FORCE: largest magnitude of the friction force [N]
     - MIN_SLIP, MAX_SLIP: smallest and largest irreversible slide [m]
-    - STUCK: time of stick [s]
+    - STUCK: phase of the drive that passes during stick [rad]
     - STARTS: number of starts of slip
     - SLIP_START_PHASE_COS, SLIP_START_PHASE_SIN: sums of cosine and sine of twice the phases of the drive at these starts
-    - MIDDLE: time in the cycle at the middle of the last step [s]
-    - EXCESS: irreversible fraction of the path of the last step, less 1/2
+    - SHARE: irreversible part of the motion at the end of the last step
     - COS_1, SIN_1: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) [m s]
     - FORCE_COS_1, FORCE_SIN_1: the same of the friction force [N s]
     - WORK: friction work by the mean forces of the steps [J]
@@ -114,28 +118,27 @@ class Seen(IntEnum):
     STARTS = 5
     SLIP_START_PHASE_COS = 6
     SLIP_START_PHASE_SIN = 7
-    MIDDLE = 8
-    EXCESS = 9
-    COS_1 = 10
-    SIN_1 = 11
-    FORCE_COS_1 = 12
-    FORCE_SIN_1 = 13
-    WORK = 14
-    SAMPLED = 15
-    PASSED = 16
-    FIRST_MEAN = 17
-    LAST_MEAN = 18
-    RANGE = 19
-    SECANT = 20
-    N_SECANTS = 21
-    FORCE_AT_MIN = 22
-    FORCE_AT_MAX = 23
-    START_SLIDE = 24
-    START_VELOCITY = 25
-    SPAN = 26
-    N_CYCLES = 27
-    FORCE_COS_3 = 28
-    FORCE_SIN_3 = 29
+    SHARE = 8
+    COS_1 = 9
+    SIN_1 = 10
+    FORCE_COS_1 = 11
+    FORCE_SIN_1 = 12
+    WORK = 13
+    SAMPLED = 14
+    PASSED = 15
+    FIRST_MEAN = 16
+    LAST_MEAN = 17
+    RANGE = 18
+    SECANT = 19
+    N_SECANTS = 20
+    FORCE_AT_MIN = 21
+    FORCE_AT_MAX = 22
+    START_SLIDE = 23
+    START_VELOCITY = 24
+    SPAN = 25
+    N_CYCLES = 26
+    FORCE_COS_3 = 27
+    FORCE_SIN_3 = 28
 
 
 class Cases(NamedTuple):

@@ -100,9 +100,9 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     ----------
     cases : Cases
         The cases that were run.
-    now : (c, 17) array
+    now : (c, 20) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 30) array
+    seen : (c, 29) array
         What was observed, in the order of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.
@@ -119,7 +119,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     low = history[:, -window:, 0].min(axis=1)
     high = history[:, -window:, 1].max(axis=1)
     work = seen[:, Seen.WORK]
-    stuck = seen[:, Seen.STUCK] / span
+    stuck = seen[:, Seen.STUCK] / (omega * span)
 
     energies = _compute_energies(cases, now, mass)
     gap = np.abs(seen[:, Seen.SAMPLED] - work)
@@ -169,9 +169,9 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, 
     ----------
     cases : Cases
         The c cases that were run.
-    now : (c, 17) array
+    now : (c, 20) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 30) array
+    seen : (c, 29) array
         What was observed, in the order of `case_rows.Seen`.
     area : (c,) array
         Friction work per cycle [J].

@@ -28,7 +28,7 @@ LIST          mu, length [m]                                       see `lists_ke
 ============= ==================================================== =================================================
 """
 
-from math import exp, log1p, sin, sqrt, tanh
+from math import exp, sin, sqrt, tanh
 from typing import NamedTuple
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
@@ -45,7 +45,6 @@ from ..friction.laws.lugre_kernels import rate_equation, relaxation_length
 from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
-MIN_DISTANCE = 1e-9  # smallest distance of a stretch from its limit, relative to it
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
 
 
@@ -564,12 +563,9 @@ def read(numbers, memory, j, load):
     return PointState(mu / turn * sin(turn * state), 2 * mu * sine * sine / (turn * turn), 0.0)
 
 
-@njit(**NJIT_KERNEL)
-def slip_since_zero(numbers, memory, j, load, velocity):
-    """Return the irreversible slide [m] since the stretch of a point was 0, where it is extreme; 0 without such an extreme.
-
-    Over the path the stretch s changes by ds/dq = 1 - s/l: for bonds with l = m eps/load, for the LuGre law with its
-    stretch during steady slip at the velocity [m/s]. The rest of the path slips; that of the Bouc-Wen law is |z|^n dq.
+@njit(**NJIT_CALL)
+def slip_share(numbers, memory, j, load, velocity):
+    """Return the part of the motion of point j that is irreversible at this instant, d(slide - stretch)/d(slide).
 
     Parameters
     ----------
@@ -582,24 +578,38 @@ def slip_since_zero(numbers, memory, j, load, velocity):
     load : float
         Normal load [N].
     velocity : float
-        Velocity [m/s].
+        Velocity [m/s]; its sign is the direction of the motion.
     """
     law = numbers[0, j]
-    if law == Law.BOUC_WEN:
-        z = memory[0, j]
-        power = numbers[3, j]
-        return numbers[2, j] * z * abs(z) ** power / (power + 1)
+    state = memory[0, j]
+    direction = 1.0 if velocity > 0 else -1.0
+    if law == Law.COULOMB:
+        return abs(state)
+    if law == Law.JENKINS:
+        return 1.0 if direction * state >= load else 0.0
+
+    # Stretch z/m of bonds relative to m eps/load, and that of the LuGre law, relative to their stretches in steady slip
     if law == Law.BONDS:
-        stretch = memory[2, j] / memory[1, j]
-        longest = memory[1, j] * memory[0, j] / load
-    elif law == Law.LUGRE:
-        stretch = memory[0, j]
-        longest = relaxation_length(numbers[:, j], velocity)[0]
-    else:
-        return 0.0
-    x = min(abs(stretch) / longest, 1 - MIN_DISTANCE)
-    slip = longest * (-log1p(-x) - x)
-    return slip if stretch > 0 else -slip
+        m = memory[1, j]
+        return direction * memory[2, j] * load / (m * m * state)
+    if law == Law.LUGRE:
+        return direction * state / relaxation_length(numbers[:, j], velocity)[0]
+    if law == Law.BOUC_WEN:
+        share = abs(state) ** numbers[3, j]
+        return share if direction * state > 0 else (1 - 2 * numbers[4, j]) * share
+
+    # The sliders that slip carry B - x B' of the limit, see `_first_loading`; none of them does after a reversal.
+    if law == Law.MASING:
+        if direction * memory[Masing.DIRECTION, j] < 0:
+            return 0.0
+        n = int(memory[Masing.COUNT, j])
+        start = memory[Masing.STACK + 2 * n - 2, j] if n > 0 else 0.0
+        half = 0.5 if n > 0 else 1.0
+        ratio = half * abs(memory[Masing.SLIDE, j] - start) / numbers[2, j]
+        if ratio < 1 and (n > 0 or memory[Masing.VIRGIN, j] > 0):
+            order = numbers[3, j]
+            return ratio ** (order + 1) * order / (numbers[4, j] * (order + 1) + order)
+    return 1.0
 
 
 @njit(**NJIT_CALL)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 from time import perf_counter
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import collect_columns
+from ...points.case_kernels import TICKS
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
@@ -54,14 +56,9 @@ from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements, solve_in_parts
 
 ENGINE = "points"  # name of the engine in the settings of a case
-STEPS = (
-    32,
-    64,
-    128,
-    256,
-    512,
-    1024,
-)  # steps per cycle, after two marches with a half and a quarter
+# Steps per cycle of successive marches; no two of them have a step in common, whose error would not show in their
+# difference
+STEPS = (20, 34, 54, 86, 138, 222, 354, 566, 906)
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
 MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
@@ -244,50 +241,53 @@ def _may_create_energy(model: Model):
 
 
 def refine(cases: Cases, scales: Scales) -> Refined:
-    """March cases, and double the steps of those that miss their tolerance.
+    """March cases, and those that miss their tolerance again with more steps.
 
-    The errors follow from the marches with a half and a quarter of the steps.
+    The errors follow from the march before, with fewer steps.
     """
     left = np.arange(len(cases.parameters))
-    quarter, half = march_cases(cases, STEPS[0] // 4), march_cases(cases, STEPS[0] // 2)
-
-    # In each turn the former fine march becomes the one with half the steps (Richardson's series).
+    coarse = march_cases(cases, STEPS[0])
     refined = None
-    for count in STEPS:
+    for fewer, count in pairwise(STEPS):
         fine = march_cases(cases.select(left), count)
         part = _select(scales, left)
-        values = [march.values for march in (fine, half, quarter)]
-        allowed = {
-            name: part.tolerance * np.abs(value) + find_floor(name, values[0], part)
-            for name, value in values[0].items()
-        }
-        errors = estimate_errors(values)
+        errors = estimate_errors(fine.values, coarse.values, count, fewer)
         is_met = np.ones(left.size, bool)
-        for name in allowed.keys() - set(INTERNAL_VALUES):
-            # A measure that only one of the two finest marches has shows an event that the other missed.
-            is_absent = np.isnan(values[0][name]) & np.isnan(values[1][name])
-            is_met &= (errors[name] <= allowed[name]) | is_absent
+        for name in fine.values.keys() - set(INTERNAL_VALUES):
+            value = fine.values[name]
+            allowed = part.tolerance * np.abs(value) + find_floor(name, fine.values, part)
+            # A measure that only one of the two marches has shows an event that the other missed.
+            is_absent = np.isnan(value) & np.isnan(coarse.values[name])
+            is_met &= (errors[name] <= allowed) | is_absent
 
-        # Only cases beyond their tolerance are marched again with twice the steps.
+        # Only cases beyond their tolerance are marched again.
         done = Refined(fine, errors, np.full(left.size, count), is_met)
         refined = done if refined is None else _insert(refined, left, done)
         left = left[~is_met]
         if not left.size:
             break
-        quarter, half = _select(half, ~is_met), _select(fine, ~is_met)
+        coarse = _select(fine, ~is_met)
     return refined
 
 
-def estimate_errors(values: Sequence[dict]) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name from marches with all, a half and a quarter of the steps.
+def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[str, np.ndarray]:
+    """Return the errors (n,) by name from the values of two marches with `count` and `fewer` steps per cycle.
 
-    Motions that differ by SAME_CASE_CYCLE from cycle to cycle count as periodic.
+    Instants are resolved to the shortest steps. Motions that differ by SAME_CASE_CYCLE from cycle to cycle count as
+    periodic.
+
+    Parameters
+    ----------
+    fine, coarse : dict
+        Values (n,) by name.
+    count, fewer : int
+        Their steps per cycle.
     """
-    amplitude = values[0][AMPLITUDE]
     errors = {}
     with np.errstate(all="ignore"):
-        for name, error in convergence_errors(*values).items():
-            errors[name] = total_error(name, values[0][name], [error], SAME_CASE_CYCLE, amplitude)
+        found = convergence_errors(fine, coarse, ratio=count / fewer, steps=count * TICKS)
+        for name, error in found.items():
+            errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
     return errors
 
 
