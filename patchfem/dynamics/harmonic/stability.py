@@ -148,12 +148,12 @@ def _make_cells(motion: SteadyMotion) -> _Cells:
     for i, forces in enumerate(motion.group.evaluate(slides)):
         for force in forces:
             if force.states is not None:
-                memories.append(_Memory(i, *_find_fading(force.states, widths)))
                 damping[i] += _average(force.states.slopes[1])
+                if force.states.slopes[0].any():
+                    memories.append(_Memory(i, *_find_fading(force.states, widths)))
                 continue
             weight = _weigh_ends(slides.q[i], force)
             slope[i] += _average(force.slope, weight)
-            damping[i] += _average(force.by_velocity)
             if np.ndim(force.holds):
                 held = _average(force.holds - force.holds.max(axis=1, keepdims=True), weight)
                 still = np.zeros(widths.size)
