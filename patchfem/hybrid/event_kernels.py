@@ -159,7 +159,7 @@ def write_probes(rig, state, t, y, probes):
         probes[first + Probe.LOAD] = max(point.load, 0.0)
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
         is_still = rests(memory) or point.velocity == 0
-        probes[first + Probe.SLIPPING] = -1.0 if is_still else slipping
+        probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
 
 
 @njit(**NJIT_KERNEL)

@@ -9,15 +9,19 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
+from ..core import NotConverged
 from .cases import Case, make_arrays
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
-from .runs import Motion, run_case
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State, Status
+from .runs import Motion, describe_end, run_case
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
 )
 MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
+N_MEMORY_CYCLES = (
+    3  # cycles in which the laws take the memory of a motion that another method has found
+)
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
@@ -129,6 +133,39 @@ def find_periodic_motion(
         shooting.n_periods,
         grows=may_grow and _grows_for_ever(case, size),
     )
+
+
+def find_multipliers(case: Case, modal_state) -> np.ndarray:
+    """Return the Floquet multipliers (k,) of a motion that another method has found, in decreasing magnitude.
+
+    Its modes are those of the other method at the start of each of N_MEMORY_CYCLES periods, in which the laws take the
+    memory of the periodic motion.
+
+    Parameters
+    ----------
+    case : Case
+        Its schedule is not used.
+    modal_state : (2 n,) array
+        Modal coordinates [m] and velocities [m/s] at phase 0 of the drive.
+
+    Raises
+    ------
+    NotConverged
+        If a period cannot be computed.
+    """
+    shooting = _Shooting(case)
+    shooting.relax(1)
+    for _ in range(N_MEMORY_CYCLES):
+        before = shooting.state
+        before.y[: modal_state.size] = modal_state
+        shooting.relax(1)
+    status = Status(int(shooting.state.clock[Clock.STATUS]))
+    if status != Status.DONE:
+        raise NotConverged(
+            f"the stability of the steady motion is unknown: {describe_end(case, status)}"
+        )
+    multipliers, _ = shooting.find_multipliers(before)
+    return multipliers[np.argsort(-np.abs(multipliers))]
 
 
 def _grows_for_ever(case: Case, size: float) -> bool:

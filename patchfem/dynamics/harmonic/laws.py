@@ -189,20 +189,19 @@ class FlowLaw(Law):
     def evaluate(self, slides: Slides, row: int) -> LawForce:
         """Return the periodic force that a cycle from an unstretched contact reaches."""
         q = slides.q[row]
-        dt = np.maximum(slides.widths / slides.omega, 1e-300)
-        force, stretch = np.empty((2, q.size))
-        states = FlowStates(np.empty((3, q.size)), np.empty((2, q.size)))
-        name = "speed_kernels" if self.element.form == "speed" else "flow_kernels"
-        load_kernels(name, self.element.kernels).solve_cycle(
-            self.element.numbers,
-            q,
-            slides.omega * slides.rate[row],
-            dt,
-            stretch,
-            states.steps,
-            force,
-            states.slopes,
-        )
+        numbers = self.element.numbers
+        velocity = slides.omega * slides.rate[row]
+        force, stretch = np.zeros((2, q.size))
+        states = FlowStates(np.zeros((3, q.size)), np.zeros((2, q.size)))
+        if self.element.form == "speed":
+            kernels = load_kernels("speed_kernels", self.element.kernels)
+            kernels.sample_forces(numbers, velocity, force, states.slopes[1])
+        else:
+            dt = np.maximum(slides.widths / slides.omega, 1e-300)
+            kernels = load_kernels("flow_kernels", self.element.kernels)
+            kernels.solve_cycle(
+                numbers, q, velocity, dt, stretch, states.steps, force, states.slopes
+            )
         limit = self.element.limit
         return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
 

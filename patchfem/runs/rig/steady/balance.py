@@ -5,27 +5,30 @@ frequency with its folds (`dynamics.harmonic`).
 """
 
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
+from .... import compiled
 from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Spring
 from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
-from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import list_coexisting_slides, refine_steady_motion
 from ....formatting import format_length, format_quantity
+from ....hybrid import cases, periodic
 from ....response.errors import finer_errors
 from ....response.measures import Values, compute_peak
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
+from ..hybrid_laws import make_joints
 from ..interface import make_single_law
 from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
@@ -45,6 +48,7 @@ REASONS_OF_END = {
 }
 # Number of samples per cycle from which the measures of a steady motion are computed.
 BALANCE_SAMPLES_PER_CYCLE = 4096
+STABILITY_RTOL = 1e-11  # tolerance of a step of the map of a period, far below its differences
 
 
 class CycleRun(NamedTuple):
@@ -107,15 +111,10 @@ class CycleMeasures(NamedTuple):
     book: Values
 
 
-class StableMotion(NamedTuple):
-    """Reported steady motion, with its stability and notes on coexisting motions.
-
-    - motion, stability: SteadyMotion without and with its Floquet multipliers.
-    - notes: sentences on other motions under the same drive.
-    """
+class ReportedMotion(NamedTuple):
+    """Reported steady motion with its Floquet multipliers, and sentences on other motions under the same drive."""
 
     motion: SteadyMotion
-    stability: SteadyMotion
     notes: tuple[str, ...] = ()
 
 
@@ -136,6 +135,7 @@ class BalanceFinder:
         if rig.springs.cubic is not None:
             parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
         self.model = model
+        self.say = say
         self.modes = rig.modes
         self.patch = patch
         self.harmonics = model.accuracy.harmonics
@@ -156,8 +156,7 @@ class BalanceFinder:
             Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
-        motion = self._solve_balance(drive, guess)
-        motion, stability, notes = self._find_stable_motion(drive, motion)
+        motion, notes = self._find_stable_motion(drive, self._solve_balance(drive, guess))
         values, response, book = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
@@ -177,12 +176,12 @@ class BalanceFinder:
                 errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
             )
         name = balanced_regime(motion)
-        regime = name if stability.stable else f"{name}, unstable"
+        regime = name if motion.stable else f"{name}, unstable"
         outcome = Outcome.STUCK if name == "stuck" else Outcome.STEADY
         message = ""
-        if not stability.stable:
+        if not motion.stable:
             outcome = Outcome.NOT_CONVERGED
-            message = describe_instability(stability.multipliers)
+            message = describe_instability(motion.multipliers)
 
         return Solution(
             values,
@@ -198,7 +197,7 @@ class BalanceFinder:
             errors=errors,
             notes=notes,
             settings=Settings(harmonics=motion.harmonics),
-            periodic=SteadyData(regime, stability.multipliers),
+            periodic=SteadyData(regime, motion.multipliers),
         )
 
     def _solve_balance(self, drive, guess) -> SteadyMotion:
@@ -230,14 +229,14 @@ class BalanceFinder:
             return errors
         return errors | finer_errors(values, compute_measures(finer, drive))
 
-    def _find_stable_motion(self, drive, motion) -> StableMotion:
+    def _find_stable_motion(self, drive, motion) -> ReportedMotion:
         """Return a steady motion if it is stable, otherwise the smallest stable one.
 
         If no motion under this drive is stable, the given motion is returned.
         """
-        stability = add_stability(motion, self.modes)
-        if stability.stable:
-            return StableMotion(motion, stability)
+        motion = self._add_stability(motion, drive)
+        if motion.stable:
+            return ReportedMotion(motion)
 
         # An unstable motion is not seen in a test, so that all motions under this drive are compared.
         motions = []
@@ -246,12 +245,12 @@ class BalanceFinder:
                 found = self._solve_balance(drive, slides)
             except NotConverged:
                 continue
-            motions.append(add_stability(found, self.modes))
+            motions.append(self._add_stability(found, drive))
         output = self.modes.output
         motions.sort(key=lambda each: each.amplitude(output))
         stable_motions = [each for each in motions if each.stable]
         if not stable_motions:
-            return StableMotion(motion, stability)
+            return ReportedMotion(motion)
 
         sizes = ", ".join(format_length(each.amplitude(output), 3) for each in motions)
         note = (
@@ -263,7 +262,22 @@ class BalanceFinder:
                 "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
-        return StableMotion(stable_motions[0], stable_motions[0], (note,))
+        return ReportedMotion(stable_motions[0], (note,))
+
+    def _add_stability(self, motion, drive) -> SteadyMotion:
+        """Return a steady motion with its Floquet multipliers, from the map of a period of the engine `hybrid`."""
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        case = cases.make_rig_case(
+            self.model.rig, self._joints.laws, schedule, signal=drive, rtol=STABILITY_RTOL
+        )
+        multipliers = periodic.find_multipliers(case, motion.modal_state)
+        return replace(motion, multipliers=multipliers)
+
+    @cached_property
+    def _joints(self):
+        """Interfaces in the form of the engine `hybrid`."""
+        compiled.load("hybrid.engine_kernels", self.say)
+        return make_joints(self.model, self.numerics, self.patch)
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
         """Compute what sensors see of the steady motion under a drive, without errors.
@@ -367,8 +381,8 @@ class BalanceFinder:
 
     def _make_curve_point(self, motion, drive) -> CurvePoint:
         """Convert a steady motion on a branch to a curve point with error estimates."""
-        motion = add_stability(motion, self.modes) if motion.stable is None else motion
         sine = SineDrive(motion.level, motion.omega, drive.moving)
+        motion = self._add_stability(motion, sine)
         values = self._compute_curve_measures(motion, sine)
         errors = self._estimate_errors(values, motion, sine, self._compute_curve_measures)
         for name in errors:

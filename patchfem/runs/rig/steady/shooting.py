@@ -16,7 +16,7 @@ from ....dynamics.curve_points import sample_adaptively
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
-from ....hybrid.records import Status, Window
+from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
@@ -201,8 +201,8 @@ class ShootingFinder:
         faces = motion.run.record.faces[: len(laws)]
         if laws and all(law.law == "masing" for law in laws):
             limits = np.array([law.numbers[2] for law in laws])
-            forces = np.maximum(faces[:, Window.MAX_FORCE], -faces[:, Window.MIN_FORCE])
-            slides = (forces >= limits * (1 - FULL_SLIP_TOL)).all()
+            forces = motion.run.record.get_face_extremes(Probe.FORCE)[: len(laws)]
+            slides = (np.abs(forces).max(axis=1) >= limits * (1 - FULL_SLIP_TOL)).all()
             return "slides" if slides else "partial slip"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
@@ -233,8 +233,8 @@ class ShootingFinder:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
         values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
-        faces = motion.run.record.faces[: len(self.joints.laws)]
-        slips = faces[:, Window.MAX_SLIP] - faces[:, Window.MIN_SLIP]
+        slips = np.ptp(motion.run.record.get_face_extremes(Probe.SLIP), axis=1)
+        slips = slips[: len(self.joints.laws)]
         is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.is_stable
