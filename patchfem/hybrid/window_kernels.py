@@ -10,6 +10,7 @@ from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
 from .event_kernels import LAST_PROBES, find_root, find_value, find_vertex
 from .motion_kernels import (
+    copy_values,
     find_phase,
     find_rates,
     look,
@@ -164,8 +165,7 @@ def observe_window(rig, state, record, cycle, fraction):
     clock[Clock.SPAN] += length
     for node in range(N_NODES):
         find_value(rig, state, fraction * NODES[node], -1, 0)
-        for k in range(state.probes.shape[1]):
-            state.probes[node, k] = state.probes[LAST_PROBES, k]
+        copy_values(state.probes[LAST_PROBES], state.probes[node])
 
     # First and third harmonics of all quantities.
     for node in range(N_NODES):
@@ -321,8 +321,7 @@ def write_row(rig, state, t, y, row):
     n_faces = rig.faces.shape[0]
     find_rates(rig, state, t, y, state.rows[RATES])
     row[0] = t
-    for k in range(y.size):
-        row[1 + k] = y[k]
+    copy_values(y, row[1 : 1 + y.size])
     for i in range(n_faces):
         point = look(rig, state, i, t, y)
         row[1 + y.size + i] = state.memory[i, Memory.FORCE]
