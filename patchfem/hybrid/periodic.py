@@ -45,6 +45,7 @@ MIN_SIZE_RATIO = (
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
+N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion that another method has found
 
 
 class PeriodicMotion(NamedTuple):
