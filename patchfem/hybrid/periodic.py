@@ -19,9 +19,6 @@ MIN_DIFFERENCE = (
 )
 MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
-N_MEMORY_CYCLES = (
-    3  # cycles in which the laws take the memory of a motion that another method has found
-)
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
@@ -45,7 +42,7 @@ MIN_SIZE_RATIO = (
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
-N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion that another method has found
+N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion from another method
 
 
 class PeriodicMotion(NamedTuple):
