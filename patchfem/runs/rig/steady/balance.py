@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .... import compiled
 from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
@@ -21,14 +20,12 @@ from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import list_coexisting_slides, refine_steady_motion
 from ....formatting import format_length, format_quantity
-from ....hybrid import cases, periodic
 from ....response.errors import finer_errors
 from ....response.measures import Values, compute_peak
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ...results.result import Settings, SteadyData
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
-from ..hybrid_laws import make_joints
 from ..interface import make_single_law
 from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
@@ -39,6 +36,7 @@ from .curves import (
     ResponseCurve,
     describe_instability,
 )
+from .shooting import PeriodMap
 
 # Reasons why a branch ends before the last frequency, by the value of `Branch.ended`.
 REASONS_OF_END = {
@@ -48,7 +46,6 @@ REASONS_OF_END = {
 }
 # Number of samples per cycle from which the measures of a steady motion are computed.
 BALANCE_SAMPLES_PER_CYCLE = 4096
-STABILITY_RTOL = 1e-11  # tolerance of a step of the map of a period, far below its differences
 
 
 class CycleRun(NamedTuple):
@@ -111,10 +108,15 @@ class CycleMeasures(NamedTuple):
     book: Values
 
 
-class ReportedMotion(NamedTuple):
-    """Reported steady motion with its Floquet multipliers, and sentences on other motions under the same drive."""
+class StableMotion(NamedTuple):
+    """Reported steady motion, with its stability and notes on coexisting motions.
+
+    - motion, stability: SteadyMotion without and with its Floquet multipliers.
+    - notes: sentences on other motions under the same drive.
+    """
 
     motion: SteadyMotion
+    stability: SteadyMotion
     notes: tuple[str, ...] = ()
 
 
@@ -135,13 +137,13 @@ class BalanceFinder:
         if rig.springs.cubic is not None:
             parts.append((rig.modes.output, Spring(cubic=rig.springs.cubic)))
         self.model = model
-        self.say = say
         self.modes = rig.modes
         self.patch = patch
         self.harmonics = model.accuracy.harmonics
         self.numerics = numerics
         self.group = LawGroup(rig.modes, parts)
         self.tolerance = model.accuracy.tolerance
+        self.say = say
 
     def compute_steady_motion(self, drive, guess=None) -> Solution:
         """Compute the steady motion under sinusoidal drive, with error estimates.
@@ -156,7 +158,8 @@ class BalanceFinder:
             Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
-        motion, notes = self._find_stable_motion(drive, self._solve_balance(drive, guess))
+        motion = self._solve_balance(drive, guess)
+        motion, stability, notes = self._find_stable_motion(drive, motion)
         values, response, book = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
@@ -176,12 +179,12 @@ class BalanceFinder:
                 errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
             )
         name = balanced_regime(motion)
-        regime = name if motion.stable else f"{name}, unstable"
+        regime = name if stability.stable else f"{name}, unstable"
         outcome = Outcome.STUCK if name == "stuck" else Outcome.STEADY
         message = ""
-        if not motion.stable:
+        if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
-            message = describe_instability(motion.multipliers)
+            message = describe_instability(stability.multipliers)
 
         return Solution(
             values,
@@ -197,7 +200,7 @@ class BalanceFinder:
             errors=errors,
             notes=notes,
             settings=Settings(harmonics=motion.harmonics),
-            periodic=SteadyData(regime, motion.multipliers),
+            periodic=SteadyData(regime, stability.multipliers),
         )
 
     def _solve_balance(self, drive, guess) -> SteadyMotion:
@@ -229,14 +232,14 @@ class BalanceFinder:
             return errors
         return errors | finer_errors(values, compute_measures(finer, drive))
 
-    def _find_stable_motion(self, drive, motion) -> ReportedMotion:
+    def _find_stable_motion(self, drive, motion) -> StableMotion:
         """Return a steady motion if it is stable, otherwise the smallest stable one.
 
         If no motion under this drive is stable, the given motion is returned.
         """
-        motion = self._add_stability(motion, drive)
-        if motion.stable:
-            return ReportedMotion(motion)
+        stability = self._add_stability(motion, drive)
+        if stability.stable:
+            return StableMotion(motion, stability)
 
         # An unstable motion is not seen in a test, so that all motions under this drive are compared.
         motions = []
@@ -250,7 +253,7 @@ class BalanceFinder:
         motions.sort(key=lambda each: each.amplitude(output))
         stable_motions = [each for each in motions if each.stable]
         if not stable_motions:
-            return ReportedMotion(motion)
+            return StableMotion(motion, stability)
 
         sizes = ", ".join(format_length(each.amplitude(output), 3) for each in motions)
         note = (
@@ -262,22 +265,17 @@ class BalanceFinder:
                 "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
-        return ReportedMotion(stable_motions[0], (note,))
+        return StableMotion(stable_motions[0], stable_motions[0], (note,))
 
     def _add_stability(self, motion, drive) -> SteadyMotion:
         """Return a steady motion with its Floquet multipliers, from the map of a period of the engine `hybrid`."""
-        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
-        case = cases.make_rig_case(
-            self.model.rig, self._joints.laws, schedule, signal=drive, rtol=STABILITY_RTOL
-        )
-        multipliers = periodic.find_multipliers(case, motion.modal_state)
+        multipliers = self._period_map.find_multipliers(drive, motion.modal_state)
         return replace(motion, multipliers=multipliers)
 
     @cached_property
-    def _joints(self):
-        """Interfaces in the form of the engine `hybrid`."""
-        compiled.load("hybrid.engine_kernels", self.say)
-        return make_joints(self.model, self.numerics, self.patch)
+    def _period_map(self) -> PeriodMap:
+        """Map of a period of this rig."""
+        return PeriodMap(self.model, self.numerics, self.patch, self.say)
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
         """Compute what sensors see of the steady motion under a drive, without errors.
