@@ -10,6 +10,7 @@ from harmonic_cases import (
     make_elements,
     make_five_modes,
     make_sdof,
+    make_speed_law,
 )
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
@@ -255,6 +256,23 @@ def test_exact_multipliers_of_bonds_agree_with_dop853():
         p, modes, [cases.Interface(numbers, cases.Load(1.0), modes.slide)]
     )
     assert np.abs(multipliers[:2]) == pytest.approx(np.abs(exact[:2]), abs=1e-4)
+
+
+@pytest.mark.parametrize("speed", [0.1, 3e-3])
+def test_exact_product_of_multipliers_of_rate_law_is_its_damping(speed):
+    """Liouville's formula: the product of the multipliers is exp(-int (2 zeta + dF/dv) dt), within 1 %, also for a law
+    whose force changes its sign between two samples of a cycle."""
+    modes = make_sdof(0.05)
+    drive = SineDrive(1.0, 1.2)
+    p = find_steady_motion(modes, drive, make_speed_law(0.4, speed), tolerance=1e-3)
+    response = make_cycle_response(p, modes, drive, 2**17)
+    slope = 0.4 / speed / np.cosh(np.minimum(np.abs(response.slide_rate / speed), 300)) ** 2
+    damping = drive.period * (0.1 + slope[:-1].mean())
+    numbers = LawNumbers("tanh", (0.4, speed))
+    multipliers = find_multipliers(
+        p, modes, [cases.Interface(numbers, cases.Load(1.0), modes.slide)]
+    )
+    assert np.prod(multipliers).real == pytest.approx(np.exp(-damping), rel=1e-2)
 
 
 # ---- backbones
