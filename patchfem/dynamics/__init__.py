@@ -3,12 +3,11 @@
 In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A module imports its own
 entry of this list and the entries before it:
 
-1. `exponentials`     exponentials of many small matrices
-2. `curve_points`     adaptive points of a curve, denser where its curvature is larger
-3. `harmonic`         steady motions by harmonic balance, branches and stability
-4. `limit_cycles`     limit cycles of modes with negative damping and friction
+1. `curve_points`     adaptive points of a curve, denser where its curvature is larger
+2. `harmonic`         steady motions by harmonic balance, and their branches
+3. `limit_cycles`     limit cycles of modes with negative damping and friction
 
-Motion in time is computed by `hybrid` and `points`.
+Motion in time, and the stability of steady motions, are computed by `hybrid` and `points`.
 """
 
 # Names that other folders use, by module.
@@ -35,7 +34,6 @@ PUBLIC = {
         "find_static_motions",
         "find_static_motions_from_loops",
     ),
-    "harmonic.stability": ("add_stability",),
     "harmonic.steady": (
         "find_steady_motion",
         "list_coexisting_slides",

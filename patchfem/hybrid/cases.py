@@ -15,6 +15,7 @@ from .records import (
     Clock,
     Cycle,
     Face,
+    Integral,
     LawNumbers,
     Memory,
     Mode,
@@ -23,7 +24,6 @@ from .records import (
     Rig,
     Setting,
     State,
-    Whole,
     Window,
 )
 
@@ -337,6 +337,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
     rig = case.rig
     n_faces = rig.faces.shape[0]
     n = case.y.size
+    n_observed = Probe.FACES + Probe.COUNT * n_faces
     clock = np.zeros(len(Clock))
     clock[Clock.STEP] = 0.1 * rig.settings[Setting.LONGEST_STEP]
 
@@ -356,7 +357,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
         clock,
         np.zeros((N_STATE_ROWS, n)),
         np.full((5, n_faces, 4), np.inf),
-        np.zeros((6, Probe.FACES + Probe.COUNT * n_faces)),
+        np.zeros((6, n_observed + 2 + n_faces)),
         np.zeros((n_faces, n_faces)),
     )
 
@@ -366,13 +367,11 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
     cycles[:, Cycle.WINDOW] = case.windows
     cycles[:, [Cycle.MIN, Cycle.MIN_SLIDE]] = np.inf
     cycles[:, [Cycle.MAX, Cycle.MAX_SLIDE]] = -np.inf
-    whole = np.zeros(len(Whole))
-    whole[[Whole.MIN, Whole.MIN_ACCELERATION]] = np.inf
-    whole[[Whole.MAX, Whole.MAX_ACCELERATION]] = -np.inf
+    extremes = np.tile([np.inf, -np.inf], (n_observed, 1))
+    integrals = np.zeros((n_observed, len(Integral)))
     faces = np.zeros((n_faces, len(Window)))
-    faces[:, Window.MIN_FORCE : Window.STUCK : 2] = np.inf
-    faces[:, Window.MAX_FORCE : Window.STUCK : 2] = -np.inf
     width = 1 + n + 3 * n_faces + 2
     samples = np.zeros((case.samples.size, width))
     samples[:, 0] = case.samples
-    return state, Record(cycles, whole, faces, samples, np.zeros((n_events, width)))
+    events = np.zeros((n_events, width))
+    return state, Record(cycles, extremes, integrals, faces, samples, events)

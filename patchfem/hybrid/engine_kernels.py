@@ -18,7 +18,7 @@ from .event_kernels import (
     hold_or_release,
     start_directions,
 )
-from .motion_kernels import find_integrals, find_rates, look, project
+from .motion_kernels import copy_values, find_integrals, find_rates, look, project
 from .records import (
     N_FACE_INTEGRALS,
     WINDOW_START,
@@ -70,7 +70,7 @@ REPEAT_TOL = (
 
 @njit(**NJIT_KERNEL)
 def update_scales(rig, state):
-    """Raise the scales of the errors to the magnitudes of a state.
+    """Raise the scales of the errors to the magnitudes of a state; those of `rig.scales` are the smallest.
 
     The error of a mode counts by what it adds to the slides and to the output, relative to their magnitudes, and to the
     friction force of laws without states.
@@ -82,8 +82,12 @@ def update_scales(rig, state):
     clock = state.clock
 
     # Magnitudes of the output, and the errors of the modes that they allow.
-    clock[Clock.OUTPUT_SIZE] = max(clock[Clock.OUTPUT_SIZE], abs(project(output, y[:n])))
-    clock[Clock.OUTPUT_SPEED] = max(clock[Clock.OUTPUT_SPEED], abs(project(output, y[n : 2 * n])))
+    x = y[:n]
+    v = y[n : 2 * n]
+    least_size = rig.scales[0]
+    least_speed = rig.scales[n]
+    clock[Clock.OUTPUT_SIZE] = max(clock[Clock.OUTPUT_SIZE], least_size, abs(project(output, x)))
+    clock[Clock.OUTPUT_SPEED] = max(clock[Clock.OUTPUT_SPEED], least_speed, abs(project(output, v)))
     for j in range(n):
         scale[j] = clock[Clock.OUTPUT_SIZE] / max(abs(output[j]), MIN_PARTICIPATION)
         scale[n + j] = clock[Clock.OUTPUT_SPEED] / max(abs(output[j]), MIN_PARTICIPATION)
@@ -92,8 +96,8 @@ def update_scales(rig, state):
     for i in range(rig.faces.shape[0]):
         row = rig.rows[0, i]
         memory = state.memory[i]
-        memory[Memory.SIZE] = max(memory[Memory.SIZE], abs(project(row, y[:n])))
-        memory[Memory.SPEED] = max(memory[Memory.SPEED], abs(project(row, y[n : 2 * n])))
+        memory[Memory.SIZE] = max(memory[Memory.SIZE], least_size, abs(project(row, x)))
+        memory[Memory.SPEED] = max(memory[Memory.SPEED], least_speed, abs(project(row, v)))
         size = min(memory[Memory.SIZE], MAX_LENGTHS * rig.faces[i, Face.LENGTH])
         for j in range(n):
             part = max(abs(row[j]), MIN_PARTICIPATION)
@@ -101,20 +105,6 @@ def update_scales(rig, state):
             scale[n + j] = min(scale[n + j], memory[Memory.SPEED] / part)
     for k in range(2 * n, y.size):
         scale[k] = max(scale[k], abs(y[k]))
-
-
-@njit(**NJIT_KERNEL)
-def begin_scales(rig, state):
-    """Set the scales of the errors at the start of a run."""
-    n = rig.modes.shape[1]
-    for k in range(state.y.size):
-        state.rows[SCALE, k] = rig.scales[k]
-    state.clock[Clock.OUTPUT_SIZE] = max(state.clock[Clock.OUTPUT_SIZE], rig.scales[0])
-    state.clock[Clock.OUTPUT_SPEED] = max(state.clock[Clock.OUTPUT_SPEED], rig.scales[n])
-    for i in range(rig.faces.shape[0]):
-        state.memory[i, Memory.SIZE] = max(state.memory[i, Memory.SIZE], rig.scales[0])
-        state.memory[i, Memory.SPEED] = max(state.memory[i, Memory.SPEED], rig.scales[n])
-    update_scales(rig, state)
 
 
 @njit(**NJIT_KERNEL)
@@ -222,8 +212,7 @@ def advance(rig, state, record, t_end, cycle):
         before = state.y[state.y.size - 4]
         if fraction == 1:
             # The last stage and the last margins are those of the start of the next step.
-            for k in range(state.y.size):
-                state.rows[0, k] = state.rows[N_STAGES, k]
+            copy_values(state.rows[N_STAGES], state.rows[0])
             copy_margins(state, N_CHECKS)
         else:
             clock[Clock.IS_SMOOTH] = 0.0
@@ -312,8 +301,7 @@ def repeat_row(rig, state, row, source, count):
     count : int
         Number of cycles between them.
     """
-    for k in range(row.size):
-        row[k] = source[k]
+    copy_values(source, row)
     row[0] += count * rig.settings[Setting.PERIOD]
     for k in range(find_integrals(rig, state.y), state.y.size):
         row[1 + k] += count * (state.y[k] - state.rows[CYCLE, k])
@@ -339,8 +327,7 @@ def skip_cycles(rig, state, record, cycle, count):
     clock = state.clock
     period = rig.settings[Setting.PERIOD]
     for c in range(cycle + 1, cycle + 1 + count):
-        for k in range(Cycle.MIN, record.cycles.shape[1]):
-            record.cycles[c, k] = record.cycles[cycle, k]
+        copy_values(record.cycles[cycle, Cycle.MIN :], record.cycles[c, Cycle.MIN :])
         record.cycles[c, Cycle.REPEATS] = 1.0
     end = record.cycles[cycle + count, Cycle.END]
 
@@ -455,7 +442,8 @@ def run_cycles(rig, state, record):
         `Status.DONE` at the end of the last cycle; any other value ends the run at once.
     """
     clock = state.clock
-    begin_scales(rig, state)
+    copy_values(rig.scales, state.rows[SCALE])
+    update_scales(rig, state)
     clock[Clock.IS_SMOOTH] = 0.0
     start_directions(rig, state)
     add_energies(rig, state, state.y[state.y.size - 4])
@@ -467,14 +455,12 @@ def run_cycles(rig, state, record):
         row = record.cycles[cycle]
         in_window = row[Cycle.WINDOW] >= 0
         if in_window and (cycle == 0 or record.cycles[cycle - 1, Cycle.WINDOW] < 0):
-            for k in range(state.y.size):
-                state.rows[WINDOW_START, k] = state.y[k]
+            copy_values(state.y, state.rows[WINDOW_START])
 
         # State at the start of a cycle for the check of repetition.
         add_output(rig, state.y, row)
         if repeat and cycle % repeat == 0:
-            for k in range(state.y.size):
-                state.rows[CYCLE, k] = state.y[k]
+            copy_values(state.y, state.rows[CYCLE])
         clock[Clock.EXCHANGED_BEFORE] = clock[Clock.EXCHANGED]
         if rig.faces.shape[0]:
             start = look(rig, state, 0, clock[Clock.TIME], state.y)

@@ -11,6 +11,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
 from .motion_kernels import (
+    copy_values,
     find_drive,
     find_integrals,
     find_rates,
@@ -75,8 +76,7 @@ def write_margins(rig, state, t, y, margins):
     for i in range(rig.faces.shape[0]):
         face = rig.faces[i]
         first = 2 * n + int(face[Face.FIRST_STATE])
-        for k in range(N_MARGINS):
-            margins[i, k] = np.inf
+        margins[i, :] = np.inf
         point = look(rig, state, i, t, y)
         write_law_margins(
             int(face[Face.LAW]),
@@ -92,8 +92,7 @@ def write_margins(rig, state, t, y, margins):
 def copy_margins(state, row):
     """Copy a row of the margins to row 0, that of the start of the next step."""
     for i in range(state.margins.shape[1]):
-        for k in range(N_MARGINS):
-            state.margins[0, i, k] = state.margins[row, i, k]
+        copy_values(state.margins[row, i], state.margins[0, i])
 
 
 @njit(**NJIT_KERNEL)
@@ -159,7 +158,7 @@ def write_probes(rig, state, t, y, probes):
         probes[first + Probe.LOAD] = max(point.load, 0.0)
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
         is_still = rests(memory) or point.velocity == 0
-        probes[first + Probe.SLIPPING] = -1.0 if is_still else slipping
+        probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
 
 
 @njit(**NJIT_KERNEL)

@@ -13,12 +13,14 @@ from .records import (
     WINDOW_START,
     Clock,
     Cycle,
+    Extreme,
     Face,
+    Integral,
     Mode,
+    Probe,
     Record,
     Setting,
     State,
-    Whole,
     Window,
 )
 
@@ -43,19 +45,20 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
     """
     period = case.rig.settings[Setting.PERIOD]
     # Extremes of a window that the run has not reached have no value.
-    whole, faces = (np.where(np.isinf(row), np.nan, row) for row in (record.whole, record.faces))
-    span = whole[Whole.SPAN]
+    extremes = np.where(np.isinf(record.extremes), np.nan, record.extremes)
+    half_ranges = (extremes[:, Extreme.MAX] - extremes[:, Extreme.MIN]) / 2
+    peaks = np.maximum(extremes[:, Extreme.MAX], -extremes[:, Extreme.MIN])
+    span = state.clock[Clock.SPAN]
     has_cycle = span > period * (1 - 1e-6)
     harmonic_1 = harmonic_3 = np.nan
     if has_cycle:
-        harmonic_1 = np.hypot(whole[Whole.COS_1], whole[Whole.SIN_1]) * 2 / span
-        harmonic_3 = np.hypot(whole[Whole.COS_3], whole[Whole.SIN_3]) * 2 / span
+        row = record.integrals[Probe.ACCELERATION]
+        harmonic_1 = np.hypot(row[Integral.COS_1], row[Integral.SIN_1]) * 2 / span
+        harmonic_3 = np.hypot(row[Integral.COS_3], row[Integral.SIN_3]) * 2 / span
     distortion = harmonic_3 / harmonic_1 if harmonic_1 > MIN_ACCELERATION else np.nan
     values = {
-        "relative_displacement_amplitude": (whole[Whole.MAX] - whole[Whole.MIN]) / 2,
-        "absolute_acceleration_peak": max(
-            whole[Whole.MAX_ACCELERATION], -whole[Whole.MIN_ACCELERATION]
-        ),
+        "relative_displacement_amplitude": half_ranges[Probe.GAUGE],
+        "absolute_acceleration_peak": peaks[Probe.ACCELERATION],
         "absolute_acceleration_fundamental": harmonic_1,
         "acceleration_distortion": distortion,
     }
@@ -65,27 +68,29 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
 
     # Measures of every interface; those of further ones carry its number.
     work = (split_integrals(case, state.y) - split_integrals(case, state.rows[WINDOW_START]))[:, 0]
-    for i, row in enumerate(faces[: case.n_friction]):
+    for i, row in enumerate(record.faces[: case.n_friction]):
+        first = Probe.FACES + Probe.COUNT * i
         suffix = f"_{i + 1}" if i else ""
         # A reversal without stick takes a time of the size of round-off.
         stuck = row[Window.STUCK] / span
         if min(abs(stuck), abs(stuck - 1)) <= FULL_STICK:
             stuck = round(stuck)
         values |= {
-            f"slip_amplitude{suffix}": (row[Window.MAX_SLIP] - row[Window.MIN_SLIP]) / 2,
+            f"slip_amplitude{suffix}": half_ranges[first + Probe.SLIP],
             f"stick_fraction{suffix}": stuck,
-            f"friction_force_peak{suffix}": max(row[Window.MAX_FORCE], -row[Window.MIN_FORCE]),
+            f"friction_force_peak{suffix}": peaks[first + Probe.FORCE],
             f"loop_area{suffix}": work[i] * period / span if has_cycle else np.nan,
         }
 
     # Measures of the first interface alone.
-    row = faces[0]
+    row = record.faces[0]
     values["slip_start_phase"] = path_work.mean_slip_phase(
         row[Window.STARTS], row[Window.COS_START], row[Window.SIN_START]
     )
     if case.rig.faces[0, Face.SWING] or case.rig.faces[0, Face.STIFFNESS]:
-        values["normal_load_least"] = row[Window.MIN_LOAD]
-        values["normal_load_peak"] = row[Window.MAX_LOAD]
+        loads = extremes[Probe.FACES + Probe.LOAD]
+        values["normal_load_least"] = loads[Extreme.MIN]
+        values["normal_load_peak"] = loads[Extreme.MAX]
         values["open_fraction"] = row[Window.OPEN] / span
     loop = _compute_loop(case, record, values["loop_area"])
     return values | (loop if has_cycle else dict.fromkeys(loop, np.nan))
@@ -152,9 +157,9 @@ def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, flo
     loop_area : float
         Friction work per cycle [J].
     """
-    row = record.faces[0]
-    slide = row[Window.SLIDE_COS] - 1j * row[Window.SLIDE_SIN]
-    force = row[Window.FORCE_COS] - 1j * row[Window.FORCE_SIN]
+    phasors = record.integrals[:, Integral.COS_1] - 1j * record.integrals[:, Integral.SIN_1]
+    slide = phasors[Probe.FACES + Probe.SLIDE]
+    force = phasors[Probe.FACES + Probe.FORCE]
 
     # Ranges and forces at the reversals of every cycle.
     cycles = record.cycles[record.cycles[:, Cycle.WINDOW] >= 0]

@@ -12,6 +12,13 @@ N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance lea
 
 
 @njit(**NJIT_KERNEL)
+def copy_values(source, target):
+    """Copy an array of one dimension; an assignment of a slice would need reference counts."""
+    for k in range(source.size):
+        target[k] = source[k]
+
+
+@njit(**NJIT_KERNEL)
 def project(row, vector):
     """Return the product of a row of participations and a vector of the modes."""
     total = 0.0

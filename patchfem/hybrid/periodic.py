@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
+from ..core import NotConverged
 from .cases import Case, make_arrays
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
-from .runs import Motion, run_case
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State, Status
+from .runs import Motion, describe_end, run_case
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
@@ -42,6 +43,7 @@ MIN_SIZE_RATIO = (
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
+N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion from another method
 
 
 class PeriodicMotion(NamedTuple):
@@ -130,6 +132,39 @@ def find_periodic_motion(
         shooting.n_periods,
         grows=may_grow and _grows_for_ever(case, size),
     )
+
+
+def find_multipliers(case: Case, modal_state) -> np.ndarray:
+    """Return the Floquet multipliers (k,) of a motion that another method has found, in decreasing magnitude.
+
+    Its modes are those of the other method at the start of each of N_MEMORY_CYCLES periods, in which the laws take the
+    memory of the periodic motion.
+
+    Parameters
+    ----------
+    case : Case
+        Its schedule is not used.
+    modal_state : (2 n,) array
+        Modal coordinates [m] and velocities [m/s] at phase 0 of the drive.
+
+    Raises
+    ------
+    NotConverged
+        If a period cannot be computed.
+    """
+    shooting = _Shooting(case)
+    shooting.relax(1)
+    for _ in range(N_MEMORY_CYCLES):
+        before = shooting.state
+        before.y[: modal_state.size] = modal_state
+        shooting.relax(1)
+    status = Status(int(shooting.state.clock[Clock.STATUS]))
+    if status != Status.DONE:
+        raise NotConverged(
+            f"the stability of the steady motion is unknown: {describe_end(case, status)}"
+        )
+    multipliers, _ = shooting.find_multipliers(before)
+    return multipliers[np.argsort(-np.abs(multipliers))]
 
 
 def _grows_for_ever(case: Case, size: float) -> bool:

@@ -197,6 +197,7 @@ class Clock(IntEnum):
     - OUTPUT_SIZE, OUTPUT_SPEED: largest magnitudes of the output [m] and of its velocity [m/s] so far
     - LENGTH: length of the present step [s]
     - EXCHANGED_BEFORE: value of EXCHANGED at the start of the cycle [J]
+    - SPAN: duration of the window so far [s]
     """
 
     TIME = 0
@@ -214,6 +215,7 @@ class Clock(IntEnum):
     OUTPUT_SPEED = 12
     LENGTH = 13
     EXCHANGED_BEFORE = 14
+    SPAN = 15
 
 
 class Status(IntEnum):
@@ -244,7 +246,7 @@ class State(NamedTuple):
       slip [m] and dissipated energy [J], then work of the drive, loss of the dampers, and the integrals of the output
       times cosine and sine of the cycle
     - memory (M, k): see `Memory`
-    - clock (15,): see `Clock`
+    - clock (16,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
     - margins (5, M, 4): margins at the points of a step, and those at the last evaluation
     - probes (6, 4 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
@@ -261,37 +263,41 @@ class State(NamedTuple):
 
 
 class Probe(IntEnum):
-    """Columns of `State.probes`: 4 of the whole motion, then 5 of each interface.
+    """Columns of `State.probes`, and rows of `Record.extremes` and `Record.integrals` up to the last interface.
 
-    - SPEED: velocity of the output [m/s]
-    - TRAVEL: largest displacement of the output, less its present magnitude [m]
     - GAUGE: displacement of the point whose displacement is measured [m]
     - ACCELERATION: acceleration of the output [m/s2]
 
-    Column FACES + COUNT i + k has quantity k of interface i. As these k begin at 0 again, FORCE, SLIP, SLIDE, LOAD and
-    SLIPPING have the same values as names above.
+    Column FACES + COUNT i + k has quantity k of interface i. As these k begin at 0 again, FORCE, SLIP, SLIDE and LOAD
+    have the same values as other names.
 
     - FACES: first column of the interfaces
     - FORCE: friction force [N]
     - SLIP: path of slip [m]
     - SLIDE: relative displacement [m]
     - LOAD: normal load, 0 after lift-off [N]
-    - SLIPPING: |slip rate| - |velocity|/2 [m/s]; negative in stick
     - COUNT: number of columns of an interface
+
+    The columns from the end on serve to find instants alone.
+
+    - SPEED: velocity of the output [m/s]
+    - TRAVEL: largest displacement of the output, less its present magnitude [m]
+    - SLIPPING: |slip rate| - |velocity|/2 [m/s] of the first interface, negative in stick; others precede it
     """
 
-    SPEED = 0
-    TRAVEL = 1
-    GAUGE = 2
-    ACCELERATION = 3
-    FACES = 4
+    GAUGE = 0
+    ACCELERATION = 1
+    FACES = 2
     # per interface
     FORCE = 0
     SLIP = 1
     SLIDE = 2
     LOAD = 3
-    SLIPPING = 4
-    COUNT = 5
+    COUNT = 4
+    # from the end
+    SPEED = -1
+    TRAVEL = -2
+    SLIPPING = -3
 
 
 class Cycle(IntEnum):
@@ -321,77 +327,61 @@ class Cycle(IntEnum):
     REPEATS = 11
 
 
-class Whole(IntEnum):
-    """Entries of `Record.whole`, over the window.
-
-    - MIN, MAX: smallest and largest displacement of the gauge [m]
-    - MIN_ACCELERATION, MAX_ACCELERATION: smallest and largest acceleration of the output [m/s2]
-    - COS_1, SIN_1: integrals of this acceleration times the cosine and the sine of the cycle [m/s]
-    - COS_3, SIN_3: the same for the third harmonic [m/s]
-    - SPAN: duration [s]
-    """
+class Extreme(IntEnum):
+    """Columns of `Record.extremes`: smallest and largest value in the window."""
 
     MIN = 0
     MAX = 1
-    MIN_ACCELERATION = 2
-    MAX_ACCELERATION = 3
-    COS_1 = 4
-    SIN_1 = 5
-    COS_3 = 6
-    SIN_3 = 7
-    SPAN = 8
+
+
+class Integral(IntEnum):
+    """Columns of `Record.integrals`: integrals over the window times the cosine or sine of the first or third harmonic."""
+
+    COS_1 = 0
+    SIN_1 = 1
+    COS_3 = 2
+    SIN_3 = 3
 
 
 class Window(IntEnum):
     """Columns of `Record.faces`, a row for each interface, over the window.
 
-    - MIN_FORCE, MAX_FORCE: smallest and largest friction force [N]
-    - MIN_SLIP, MAX_SLIP: smallest and largest path of slip [m]
-    - MIN_SLIDE, MAX_SLIDE: smallest and largest relative displacement [m]
-    - MIN_LOAD, MAX_LOAD: smallest and largest normal load [N]
     - STUCK, OPEN: time of stick and time without contact [s]
     - STARTS: number of starts of slip
     - COS_START, SIN_START: sums of the cosine and the sine of twice the phases of the cycle at these starts
     - STICKS: duration of the stick at the end [s]; -1 if the interface slips there
-    - SLIDE_COS, SLIDE_SIN: integrals of the slide times the cosine and the sine of the cycle [m s]
-    - FORCE_COS, FORCE_SIN: the same for the friction force [N s]
     """
 
-    MIN_FORCE = 0
-    MAX_FORCE = 1
-    MIN_SLIP = 2
-    MAX_SLIP = 3
-    MIN_SLIDE = 4
-    MAX_SLIDE = 5
-    MIN_LOAD = 6
-    MAX_LOAD = 7
-    STUCK = 8
-    OPEN = 9
-    STARTS = 10
-    COS_START = 11
-    SIN_START = 12
-    STICKS = 13
-    SLIDE_COS = 14
-    SLIDE_SIN = 15
-    FORCE_COS = 16
-    FORCE_SIN = 17
+    STUCK = 0
+    OPEN = 1
+    STARTS = 2
+    COS_START = 3
+    SIN_START = 4
+    STICKS = 5
 
 
 class Record(NamedTuple):
     """What a run records.
 
     - cycles (C, 12): see `Cycle`
-    - whole (9,), faces (M, 18): measures of the window, the last cycles, see `Whole` and `Window`
+    - extremes (2 + 4 M, 2), integrals (2 + 4 M, 4): of the quantities of `Probe` over the window, the last cycles; see
+      `Extreme` and `Integral`
+    - faces (M, 6): further measures of the window, see `Window`
     - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
       of an event; the first column of the samples is given. Force and load of an event are those before it, the
       directions of slip those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it
     """
 
     cycles: np.ndarray
-    whole: np.ndarray
+    extremes: np.ndarray
+    integrals: np.ndarray
     faces: np.ndarray
     samples: np.ndarray
     events: np.ndarray
+
+    def get_face_extremes(self, quantity: int) -> np.ndarray:
+        """Return the smallest and the largest value (M, 2) of a quantity of all interfaces, such as `Probe.FORCE`."""
+        return self.extremes[Probe.FACES + quantity :: Probe.COUNT]
 
 
 class Point(NamedTuple):

@@ -195,7 +195,7 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
     return Motion(
         case=case,
         status=status,
-        message=MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS]),
+        message=describe_end(case, status),
         values={name: float(value) for name, value in values.items()},
         extremes=cycles[:, [Cycle.MIN, Cycle.MAX]],
         phasors=2 / duration * (cycles[:, Cycle.COS] - 1j * cycles[:, Cycle.SIN]),
@@ -207,6 +207,11 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
         time=float(clock[Clock.TIME]),
         repeats=bool(cycles[:, Cycle.REPEATS].any()),
     )
+
+
+def describe_end(case: Case, status: Status) -> str:
+    """Return why a run of a case ended early; "" for the end of its last cycle."""
+    return MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS])
 
 
 def _restart(case: Case, end: State) -> State:

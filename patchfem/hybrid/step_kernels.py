@@ -12,7 +12,7 @@ from scipy.integrate import DOP853
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .motion_kernels import find_rates
+from .motion_kernels import copy_values, find_rates
 from .records import Clock
 
 N_STAGES = 12
@@ -57,8 +57,7 @@ def find_stages(rig, state, h, first, last, y):
         State of the last stage, which is written.
     """
     for stage in range(first, last):
-        for k in range(y.size):
-            y[k] = state.y[k]
+        copy_values(state.y, y)
         for j in range(stage):
             weight = h * A[stage, j]
             if weight != 0:
@@ -113,8 +112,7 @@ def find_curve(state, h):
         rows[CURVE + 1, k] = h * rows[0, k] - change
         rows[CURVE + 2, k] = 2 * change - h * (rows[N_STAGES, k] + rows[0, k])
     for i in range(4):
-        for k in range(state.y.size):
-            rows[CURVE + 3 + i, k] = 0.0
+        rows[CURVE + 3 + i, :] = 0.0
         for j in range(N_ALL_STAGES):
             weight = h * D[i, j]
             if weight != 0:

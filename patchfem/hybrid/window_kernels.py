@@ -10,6 +10,7 @@ from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
 from .event_kernels import LAST_PROBES, find_root, find_value, find_vertex
 from .motion_kernels import (
+    copy_values,
     find_phase,
     find_rates,
     look,
@@ -18,13 +19,14 @@ from .motion_kernels import (
 from .records import (
     Clock,
     Cycle,
+    Extreme,
     Face,
+    Integral,
     Memory,
     Mode,
     Piece,
     Probe,
     Setting,
-    Whole,
     Window,
 )
 from .step_kernels import POINT, RATES, read_curve
@@ -158,74 +160,43 @@ def observe_window(rig, state, record, cycle, fraction):
     fraction : float
         Fraction of the step at which its motion ends.
     """
-    whole = record.whole
-    t = state.clock[Clock.TIME]
-    length = fraction * state.clock[Clock.LENGTH]
+    clock = state.clock
+    length = fraction * clock[Clock.LENGTH]
+    clock[Clock.SPAN] += length
     for node in range(N_NODES):
         find_value(rig, state, fraction * NODES[node], -1, 0)
-        for k in range(state.probes.shape[1]):
-            state.probes[node, k] = state.probes[LAST_PROBES, k]
+        copy_values(state.probes[LAST_PROBES], state.probes[node])
 
-    raise_both(rig, state, fraction, Probe.GAUGE, whole, Whole.MIN)
-    raise_both(rig, state, fraction, Probe.ACCELERATION, whole, Whole.MIN_ACCELERATION)
+    # First and third harmonics of all quantities.
     for node in range(N_NODES):
         weight = length * WEIGHTS[node]
-        phase = rig.settings[Setting.OMEGA] * (t + length * NODES[node])
-        value = weight * state.probes[node, Probe.ACCELERATION]
-        whole[Whole.COS_1] += value * np.cos(phase)
-        whole[Whole.SIN_1] += value * np.sin(phase)
-        whole[Whole.COS_3] += value * np.cos(3 * phase)
-        whole[Whole.SIN_3] += value * np.sin(3 * phase)
-        whole[Whole.SPAN] += weight
+        phase = rig.settings[Setting.OMEGA] * (clock[Clock.TIME] + length * NODES[node])
+        for k in range(record.integrals.shape[0]):
+            row = record.integrals[k]
+            value = weight * state.probes[node, k]
+            row[Integral.COS_1] += value * np.cos(phase)
+            row[Integral.SIN_1] += value * np.sin(phase)
+            row[Integral.COS_3] += value * np.cos(3 * phase)
+            row[Integral.SIN_3] += value * np.sin(3 * phase)
 
-        # First harmonics of slide and force.
-        for i in range(rig.faces.shape[0]):
-            first = Probe.FACES + Probe.COUNT * i
-            row = record.faces[i]
-            slide = weight * state.probes[node, first + Probe.SLIDE]
-            force = weight * state.probes[node, first + Probe.FORCE]
-            row[Window.SLIDE_COS] += slide * np.cos(phase)
-            row[Window.SLIDE_SIN] += slide * np.sin(phase)
-            row[Window.FORCE_COS] += force * np.cos(phase)
-            row[Window.FORCE_SIN] += force * np.sin(phase)
-            if i == 0:
-                record.cycles[cycle, Cycle.SLIDE] += slide
-
+    # Mean and reversals of the first interface in each cycle.
     if rig.faces.shape[0]:
-        row = record.cycles[cycle]
-        observe_reversal(rig, state, fraction, row, -1.0, Cycle.MIN_SLIDE)
-        observe_reversal(rig, state, fraction, row, 1.0, Cycle.MAX_SLIDE)
+        cycle_row = record.cycles[cycle]
+        for node in range(N_NODES):
+            slide = state.probes[node, Probe.FACES + Probe.SLIDE]
+            cycle_row[Cycle.SLIDE] += length * WEIGHTS[node] * slide
+        observe_reversal(rig, state, fraction, cycle_row, -1.0, Cycle.MIN_SLIDE)
+        observe_reversal(rig, state, fraction, cycle_row, 1.0, Cycle.MAX_SLIDE)
+
+    for k in range(record.extremes.shape[0]):
+        row = record.extremes[k]
+        row[Extreme.MIN] = raise_extreme(rig, state, fraction, k, -1.0, row[Extreme.MIN])
+        row[Extreme.MAX] = raise_extreme(rig, state, fraction, k, 1.0, row[Extreme.MAX])
     for i in range(rig.faces.shape[0]):
-        first = Probe.FACES + Probe.COUNT * i
         row = record.faces[i]
-        for k in range(4):  # force, slip, slide and load, in the order of `Probe` and `Window`
-            raise_both(rig, state, fraction, first + k, row, Window.MIN_FORCE + 2 * k)
         add_stick(rig, state, fraction, i, row)
         if state.memory[i, Memory.CONTACT] < 0:
             row[Window.OPEN] += length
-
-
-@njit(**NJIT_KERNEL)
-def raise_both(rig, state, fraction, column, values, k):
-    """Update the smallest and the largest value of a scalar, at k and k + 1 of an array.
-
-    Parameters
-    ----------
-    rig : Rig
-        Arrays of the rig.
-    state : State
-        Motion, which is updated.
-    fraction : float
-        Fraction of the step at which its motion ends.
-    column : int
-        Column of `State.probes`.
-    values : array
-        Values, two of which are updated.
-    k : int
-        Index of the smallest value; the largest follows.
-    """
-    values[k] = raise_extreme(rig, state, fraction, column, -1.0, values[k])
-    values[k + 1] = raise_extreme(rig, state, fraction, column, 1.0, values[k + 1])
 
 
 @njit(**NJIT_KERNEL)
@@ -275,10 +246,10 @@ def add_stick(rig, state, fraction, i, row):
         Fraction of the step at which its motion ends.
     i : int
         Number of the interface.
-    row : (18,) array
+    row : (6,) array
         Row of `records.Record.faces`.
     """
-    column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
+    column = Probe.SLIPPING - i
     h = state.clock[Clock.LENGTH]
 
     # A reversal without stick is a stick of a duration of round-off, after which slip does not start.
@@ -316,7 +287,7 @@ def add_start(rig, clock, t, row):
         Row of `records.State.clock`.
     t : float
         Time [s].
-    row : (18,) array
+    row : (6,) array
         Row of `records.Record.faces`.
     """
     phase = 0.0
@@ -350,8 +321,7 @@ def write_row(rig, state, t, y, row):
     n_faces = rig.faces.shape[0]
     find_rates(rig, state, t, y, state.rows[RATES])
     row[0] = t
-    for k in range(y.size):
-        row[1 + k] = y[k]
+    copy_values(y, row[1 : 1 + y.size])
     for i in range(n_faces):
         point = look(rig, state, i, t, y)
         row[1 + y.size + i] = state.memory[i, Memory.FORCE]

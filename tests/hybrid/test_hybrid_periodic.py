@@ -7,7 +7,7 @@ from hybrid_cases import coulomb, make_oscillator
 from patchfem.hybrid import runs
 from patchfem.hybrid.laws import masing
 from patchfem.hybrid.periodic import find_periodic_motion
-from patchfem.hybrid.records import LawNumbers, Memory, Window
+from patchfem.hybrid.records import LawNumbers, Memory, Probe
 
 AMPLITUDE = "relative_displacement_amplitude"
 LAWS = {
@@ -49,8 +49,8 @@ def test_force_of_elements_that_slide_on_both_sides_is_their_limit():
     start = first.run.final
     stack = start.memory[0, Memory.STACK :]
     stack[1 : 2 * int(start.memory[0, Memory.COUNT]) : 2] -= 0.3
-    faces = find_periodic_motion(case, start=start, n_first=1).run.record.faces[0]
-    assert faces[[Window.MIN_FORCE, Window.MAX_FORCE]] == pytest.approx([-0.8, 0.8], abs=1e-9)
+    record = find_periodic_motion(case, start=start, n_first=1).run.record
+    assert record.get_face_extremes(Probe.FORCE)[0] == pytest.approx([-0.8, 0.8], abs=1e-9)
 
 
 def test_multipliers_of_a_linear_rig():

@@ -4,14 +4,14 @@ import numpy as np
 from modal_bases import make_modal_basis
 from scipy.linalg import expm
 
-from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
+from patchfem.dynamics.harmonic.laws import FlowLaw
 from patchfem.friction import Bonds, LuGre, points_element
 from patchfem.friction.laws.tanh import TanhLaw
 
 
 def make_speed_law(limit, speed):
     """Return the law limit tanh(v/speed)."""
-    return SpeedLaw(TanhLaw(limit, speed).element(1.0))
+    return FlowLaw(TanhLaw(limit, speed).element(1.0))
 
 
 def make_bond_law(limit, length):

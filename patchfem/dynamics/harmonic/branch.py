@@ -9,7 +9,6 @@ from .continuation import NEWTON_TOL, PathEquations, PathSettings, correct_point
 from .equations import HarmonicBalance
 from .motion import SteadyMotion
 from .series import pack_harmonics, pad_harmonics
-from .stability import add_stability
 from .steady import (
     HARMONIC_COUNTS,
     find_amplitudes,
@@ -73,8 +72,7 @@ def trace_over_frequency(
         branch = _trace_with_harmonics(modes, drive, omegas, first, h)
         left_out = max(point.error for point in branch.points)
         if harmonics or left_out <= limit:
-            points = tuple(add_stability(point, modes) for point in branch.points)
-            return replace(branch, points=points)
+            return branch
     raise NotConverged(
         f"harmonic balance with {HARMONIC_COUNTS[-1]} harmonics leaves out {left_out:.1e} of the motion, more than "
         f"the limit of {limit:g}; raise the tolerance"

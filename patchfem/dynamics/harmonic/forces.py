@@ -149,32 +149,19 @@ class LawGroup:
         waves at its angle.
         """
         h = slides.harmonics.shape[1] - 1
-        omega = slides.omega
-        names = ("force", "slope", "by_velocity", "holds")
-        force, slope, by_velocity, holds = (
-            sum(getattr(law_force, name) for law_force in forces) for name in names
+        force, slope, holds = (
+            sum(getattr(law_force, name) for law_force in forces)
+            for name in ("force", "slope", "holds")
         )
-        velocity_part = by_velocity * slides.rate[i]
-        sampled = [
-            force,
-            slope + 0 * force,
-            by_velocity + 0 * force,
-            velocity_part,
-            *np.atleast_2d(holds + 0 * force),
-        ]
+        sampled = [force, slope + 0 * force, *np.atleast_2d(holds + 0 * force)]
         x = find_harmonics(np.array(sampled)[:, slides.is_sample], 2 * h)
         jacobian = find_local_jacobian(x[1])
-        by_omega = x[3, : h + 1]
+        by_omega = np.zeros(h + 1, complex)
 
-        # The velocity has the harmonics i k omega X_k.
-        k_omega = omega * np.arange(1, h + 1)
-        damping = find_local_jacobian(x[2])
-        jacobian[:, 1 : h + 1] += damping[:, h + 1 :] * k_omega
-        jacobian[:, h + 1 :] -= damping[:, 1 : h + 1] * k_omega
         if np.ndim(holds):
             phase = np.outer(slides.angle[slides.reversals[i]], np.arange(h + 1))
             waves = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
-            jacobian += x[4:, : h + 1].T @ waves
+            jacobian += x[2:, : h + 1].T @ waves
         for law, law_force in zip(self.laws[i], forces):
             if law_force.states is not None:
                 by_slide, by_frequency = law.differentiate(slides, i, law_force.states)

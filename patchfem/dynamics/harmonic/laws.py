@@ -6,7 +6,6 @@ exact up to their number, so only the corners of the force alias, by (slope jump
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +47,7 @@ class LawForce(NamedTuple):
     """Force of a law at the M nodes of a cycle, and its derivatives.
 
     - force: (M,) [N]
-    - slope, by_velocity: (M,) derivatives by slide [N/m] and velocity [N s/m], or 0
+    - slope: (M,) derivative by the slide [N/m], or 0
     - holds: (r, M) derivatives by the slides at the reversals of the interface [N/m], or 0
     - limit, stretch: friction limit [N], and the elastic stretch times it (M,) [N m]
     - states: states of a law whose memory is no slide at a reversal; its derivatives follow from them alone
@@ -56,7 +55,6 @@ class LawForce(NamedTuple):
 
     force: np.ndarray
     slope: np.ndarray | float = 0.0
-    by_velocity: np.ndarray | float = 0.0
     holds: np.ndarray | float = 0.0
     limit: float = 0.0
     stretch: np.ndarray | float = 0.0
@@ -95,107 +93,42 @@ class Law:
 
 
 class Jenkins(Law):
-    """Parallel elastic-plastic (Jenkins) elements, by Masing's rules.
-
-    On first loading to the slide x the force is B(x) = sum k min(x, w). From a reversal at (q_r, F_r) in the direction
-    d it is F_r + 2 d B(d (q - q_r)/2), until the branch before the last one is met. The stretch times the limit follows
-    the same rules with k w in place of k.
+    """Parallel elastic-plastic (Jenkins) elements, each a spring in series with a slider.
 
     Parameters
     ----------
     stiffness : (t,) array_like
         [N/m], >= 0.
     limit_slide : (t,) array_like
-        Slides w [m] >= 0 at which the elements yield.
+        Slides [m] >= 0 at which the elements yield.
     """
 
     def __init__(self, stiffness, limit_slide):
-        k = frozen_array(np.atleast_1d(stiffness))
-        w = frozen_array(np.atleast_1d(limit_slide))
-        self.stiffness = k
-        self.limit_slide = w
-        self.total = float(k.sum())
+        self.stiffness = frozen_array(np.atleast_1d(stiffness))
+        self.limit_slide = frozen_array(np.atleast_1d(limit_slide))
+        self.total = float(self.stiffness.sum())
         # Sum of the slip forces [N]
-        self.limit = float(k @ w)
-
-        # Corners of the curve of first loading: slides, forces, stretches times limit, and stiffness after each of them.
-        corners = np.append(0.0, np.unique(w))
-        reached = np.minimum.outer(corners, w)
-        self.curve = (corners, reached @ k, reached @ (k * w), (w > corners[:, None]) @ k)
+        self.limit = float(self.stiffness @ self.limit_slide)
 
     def count_samples(self, amplitude: float) -> int:
         """Return the number of samples that resolve the phases of stick at an amplitude [m]."""
         yield_slide = self.limit / max(self.total, 1e-300)
         return _count_stick_samples(yield_slide / max(amplitude, 1e-300))
 
-    def load_first(self, x) -> tuple[np.ndarray, np.ndarray]:
-        """Return force and stretch times limit (2, ...), and stiffness (...), on first loading to slides x >= 0 [m]."""
-        corners, forces, stretches, sticking = self.curve
-        values = np.array([np.interp(x, corners, forces), np.interp(x, corners, stretches)])
-        return values, sticking[np.searchsorted(corners, x, side="right") - 1]
-
     def evaluate(self, slides: Slides, row: int) -> LawForce:
         """Return the steady force for the slide of an interface that starts from an unstretched contact."""
         q = slides.q[row]
         turns = slides.reversals[row]
-        if not turns.size:
-            values, slope = self.load_first(np.abs(q))
-            force, stretch = np.sign(q) * values
-            return LawForce(force, slope, limit=self.limit, stretch=stretch)
-
+        reversal_of_node = np.full(q.size, -1)
+        reversal_of_node[turns] = np.arange(turns.size)
         # The largest slide erases the memory of all others; the cycle begins there.
-        turns = np.roll(turns, -int(np.argmax(np.abs(q[turns]))))
-        largest = q[turns[0]]
-        values, slope = self.load_first(abs(largest))
-        known = np.append(np.sign(largest) * values, np.zeros(turns.size))
-        known[2] = slope
-        memory = [(0, largest, known)]
+        first = int(turns[np.argmax(np.abs(q[turns]))]) if turns.size else 0
 
-        # Rows: force, stretch times limit, and derivatives of the force by the slides at the reversals.
-        out = np.empty((2 + turns.size, q.size))
-        slopes = np.empty(q.size)
-        for end, (begin, stop) in enumerate(pairwise([*turns, turns[0]]), 1):
-            count = (stop - begin - 1) % q.size + 1
-            nodes = (begin + 1 + np.arange(count)) % q.size
-            self._follow_branches(q[nodes], nodes, memory, out, slopes)
-            known = out[:, stop].copy()
-            known[2 + end % turns.size] += slopes[stop]
-            memory.append((end % turns.size, q[stop], known))
-        holds = out[2 + np.argsort(turns)]
-        return LawForce(out[0], slopes, holds=holds, limit=self.limit, stretch=out[1])
-
-    def _follow_branches(
-        self, q, nodes, memory: list[tuple[int, float, np.ndarray]], out, slopes
-    ) -> None:
-        """Write the forces between two reversals, and remove the reversals that are passed from the memory.
-
-        Parameters
-        ----------
-        q, nodes : (k,) array
-            Slides [m] after the last reversal in the memory up to the next one, and their columns in `out`.
-        memory : list
-            Reversals that are not yet passed, the last one at the end: number, slide [m] and column (2 + r,) of `out`.
-        out : (2 + r, M) array
-            Force, stretch times limit, and derivatives by the slides at reversals.
-        slopes : (M,) array
-            Stiffness of the elements that stick [N/m].
-        """
-        direction = np.sign(q[-1] - memory[-1][1])
-        done = 0
-        while done < q.size:
-            number, slide, known = memory[-1]
-            end = q.size
-            if len(memory) > 2:
-                end = int(np.sum(direction * (q - memory[-2][1]) <= 0))
-            part = nodes[done:end]
-            x = np.maximum(direction * (q[done:end] - slide) / 2, 0.0)
-            values, slopes[part] = self.load_first(x)
-            out[:, part] = known[:, None]
-            out[:2, part] += 2 * direction * values
-            out[2 + number, part] -= slopes[part]
-            done = end
-            if done < q.size:
-                del memory[-2:]
+        # Rows: force, stretch times limit, stiffness, and derivatives of the force by the slides at the reversals.
+        out = np.zeros((3 + turns.size, q.size))
+        kernels = load("dynamics.harmonic.element_kernels")
+        kernels.follow_elements(self.stiffness, self.limit_slide, q, reversal_of_node, first, out)
+        return LawForce(out[0], out[2], out[3:], self.limit, out[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,23 +162,11 @@ class Spring(Law):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SpeedLaw(Law):
-    """Friction law that is a function of the velocity, from an Element of form "speed"."""
-
-    element: Element
-
-    def evaluate(self, slides: Slides, row: int) -> LawForce:
-        """Return the force at the velocities of the cycle."""
-        velocity = slides.omega * slides.rate[row]
-        force, slope = np.empty((2, velocity.size))
-        kernels = load_kernels("speed_kernels", self.element.kernels)
-        kernels.sample_forces(self.element.numbers, velocity, force, slope)
-        return LawForce(force, 0.0, slope, 0.0, self.element.limit)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class FlowLaw(Law):
-    """Friction law whose only memory is its elastic stretch, from an Element of form "flow" or "points"."""
+    """Friction law whose only memory is its elastic stretch, from an Element of form "flow" or "points".
+
+    A law that is a function of the velocity, of form "speed", has no stretch and no stiffness at rest.
+    """
 
     element: Element
 
@@ -257,28 +178,30 @@ class FlowLaw(Law):
     @property
     def total(self) -> float:
         """Tangent stiffness at rest [N/m]."""
-        return self.element.limit / self.element.length
+        return self.element.limit / self.length if self.length else 0.0
 
     def count_samples(self, amplitude: float) -> int:
         """Return the number of samples that resolve the force after a reversal at an amplitude [m]."""
+        if not self.length:
+            return 0
         return _count_stick_samples(self.length / max(amplitude, 1e-300))
 
     def evaluate(self, slides: Slides, row: int) -> LawForce:
         """Return the periodic force that a cycle from an unstretched contact reaches."""
         q = slides.q[row]
-        dt = np.maximum(slides.widths / slides.omega, 1e-300)
-        force, stretch = np.empty((2, q.size))
-        states = FlowStates(np.empty((3, q.size)), np.empty((2, q.size)))
-        load_kernels("flow_kernels", self.element.kernels).solve_cycle(
-            self.element.numbers,
-            q,
-            slides.omega * slides.rate[row],
-            dt,
-            stretch,
-            states.steps,
-            force,
-            states.slopes,
-        )
+        numbers = self.element.numbers
+        velocity = slides.omega * slides.rate[row]
+        force, stretch = np.zeros((2, q.size))
+        states = FlowStates(np.zeros((3, q.size)), np.zeros((2, q.size)))
+        if self.element.form == "speed":
+            kernels = load_kernels("speed_kernels", self.element.kernels)
+            kernels.sample_forces(numbers, velocity, force, states.slopes[1])
+        else:
+            dt = np.maximum(slides.widths / slides.omega, 1e-300)
+            kernels = load_kernels("flow_kernels", self.element.kernels)
+            kernels.solve_cycle(
+                numbers, q, velocity, dt, stretch, states.steps, force, states.slopes
+            )
         limit = self.element.limit
         return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
 
@@ -366,10 +289,8 @@ def make_law(element: Element | None) -> Law:
     if form == "parallel":
         count = int(element.numbers[1])
         return Jenkins(element.numbers[2 : 2 + count], element.numbers[2 + count :])
-    if form == "speed":
-        return SpeedLaw(element)
     # If bonds do not grow, one stretch describes the memory of a bond point.
-    if form == "flow" or (form == "points" and element.numbers[3] < 0):
+    if form in ("flow", "speed") or (form == "points" and element.numbers[3] < 0):
         return FlowLaw(element)
     if form == "rigid":
         raise PatchfemError(

@@ -13,6 +13,8 @@ from .slides import Slides, make_slides
 
 # Largest range of slip at which bonds count as sticking, in bond lengths.
 STUCK_SLIDE_RATIO = 1e-3
+# Largest magnitude of a multiplier of a stable motion; above 1, because the multipliers are those of differences.
+MAX_STABLE_MULTIPLIER = 1 + 1e-5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -25,7 +27,7 @@ class SteadyMotion:
     - samples: samples per cycle
     - error: relative error of the motion
     - iterations: number of Newton steps
-    - stable, multipliers: None until they are computed
+    - multipliers: Floquet multipliers in decreasing magnitude; None until they are computed
     """
 
     omega: float
@@ -37,13 +39,23 @@ class SteadyMotion:
     error: float
     iterations: int
     group: LawGroup
-    stable: bool | None = None
     multipliers: np.ndarray | None = None
 
     @property
     def harmonics(self) -> int:
         """Number of harmonics H."""
         return self.slides.shape[1] - 1
+
+    @property
+    def stable(self) -> bool:
+        """Whether disturbances do not grow, once the multipliers are known."""
+        return bool(np.abs(self.multipliers).max(initial=0.0) <= MAX_STABLE_MULTIPLIER)
+
+    @property
+    def modal_state(self) -> np.ndarray:
+        """Modal coordinates [m] and velocities [m/s] (2 n,) at phase 0 of the drive."""
+        speeds = 1j * self.omega * np.arange(len(self.modal))[:, None] * self.modal
+        return np.concatenate([self.modal, speeds], axis=1).sum(axis=0).real
 
     def amplitude(self, row) -> float:
         """Return the displacement amplitude [m]: half the range of row @ modal coordinates, for a row (n,)."""

@@ -1,7 +1,6 @@
 """Continuation, stability and backbones of the harmonic balance against closed forms and time
 integration."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +10,11 @@ from harmonic_cases import (
     make_elements,
     make_five_modes,
     make_sdof,
-    march_exactly,
+    make_speed_law,
 )
-from harmonic_motions import find_coexisting_motions
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
-from yielding_points import jenkins_forces
 
 from patchfem import plan, run
 from patchfem.core import G_N, NotConverged, SineDrive
@@ -26,6 +23,7 @@ from patchfem.dynamics import (
     Spring,
     find_free_motions,
     find_steady_motion,
+    list_coexisting_slides,
     make_cycle_response,
     make_free_balance,
     trace_over_frequency,
@@ -33,7 +31,8 @@ from patchfem.dynamics import (
 from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.series import evaluate_series, half_range
-from patchfem.dynamics.harmonic.stability import find_monodromy
+from patchfem.hybrid import cases, drives, periodic
+from patchfem.hybrid.records import LawNumbers
 
 W = 2 * np.pi * 143
 MASS = 0.884
@@ -41,6 +40,52 @@ RIG = make_modal_basis(W, 0.003, mass=MASS)
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the stiffness of the flexure at 1 mm [N/m^3]
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
+
+
+# ---- multipliers from the map of a period
+
+
+def find_multipliers(motion, modes, interfaces) -> np.ndarray:
+    """Return the Floquet multipliers of a steady motion with interfaces of the engine `hybrid`."""
+    period = 2 * np.pi / motion.omega
+    signal = drives.make_tones([(motion.level, motion.omega, 0.0)], period)
+    size = motion.amplitude(modes.output)
+    options = cases.Options(moves_base=True, rtol=1e-11)
+    rig = cases.make_rig(modes, signal, interfaces, (size, size * motion.omega), options)
+    start = cases.make_start(rig, interfaces)
+    case = cases.Case(rig, start, np.array([period]), np.zeros(1), np.zeros(0), len(interfaces))
+    return periodic.find_multipliers(case, motion.modal_state)
+
+
+def make_element(limit, length):
+    """Return the law of an elastic-plastic element in the engine `hybrid`."""
+    return LawNumbers("masing", (0.0, -1.0, limit, length, 1, 0.0, length, 0.0, limit))
+
+
+def make_interfaces(group) -> list[cases.Interface]:
+    """Return the interfaces of the engine `hybrid` for an elastic-plastic element and a cubic spring of a group."""
+    interfaces = []
+    for row, law in group.parts:
+        slide = row if np.ndim(row) else group.modes.interfaces[row]
+        if isinstance(law, Jenkins):
+            numbers = make_element(law.limit, float(law.limit_slide[0]))
+        else:
+            assert law.stiffness == 0 and np.isinf(law.wavelength)
+            numbers = LawNumbers("springs", (law.cubic, 0.0, 1.0))
+        interfaces.append(cases.Interface(numbers, cases.Load(1.0), slide))
+    return interfaces
+
+
+def find_coexisting_motions(modes, drive, group, tolerance: float = 1e-3) -> list:
+    """Return the steady motions with their multipliers, in increasing amplitude of the output."""
+    motion = find_steady_motion(modes, drive, group, tolerance=tolerance)
+    starts = list_coexisting_slides(motion, drive)
+    motions = [find_steady_motion(modes, drive, group, None, tolerance, start) for start in starts]
+    interfaces = make_interfaces(motion.group)
+    motions = [
+        replace(found, multipliers=find_multipliers(found, modes, interfaces)) for found in motions
+    ]
+    return sorted(motions, key=lambda motion: motion.amplitude(modes.output))
 
 
 # ---- continuation of a curve
@@ -90,8 +135,8 @@ def duffing_equation(drive, friction=0.0):
 
 
 def test_exact_branch_stability_agrees_with_time_integration():
-    """At 160 Hz DOP853 stays on each stable branch over 5 cycles. On the unstable branch a
-    perturbation grows as its Floquet multiplier predicts, within 1e-3."""
+    """At 160 Hz DOP853 stays on each branch over 5 cycles. The Floquet multipliers are the eigenvalues of differences of
+    DOP853 over a cycle, within 1e-3, and one of the middle branch is above 1."""
     drive = SineDrive(LEVEL, 2 * np.pi * 160)
     points = find_coexisting_motions(RIG, drive, STIFF, 1e-7)
     assert [p.stable for p in points] == [True, False, True]
@@ -111,27 +156,24 @@ def test_exact_branch_stability_agrees_with_time_integration():
             solution.y[0] - np.interp(response.time * 0.99999, response.time, response.modal[:, 0])
         ).max() < 3e-4 * p.amplitude([1.0])
         assert not np.isnan(solution.y).any()
-    middle = points[1]
-    eigen = np.linalg.eig(find_monodromy(middle, RIG))
-    k = int(np.argmax(np.abs(eigen[0])))
-    # the monodromy matrix acts on (z, z'/omega)
-    perturbation = eigen[1][:, k].real * np.array([1.0, drive.omega])
-    response = make_cycle_response(middle, RIG, drive, 200)
-    start = np.array([response.modal[0, 0], response.modal_rate[0, 0]])
-    perturbation *= 1e-6 / abs(perturbation[0])
-    ends = [
-        solve_ivp(
-            duffing_equation(drive),
-            (0, 3 * drive.period),
-            start + sign * perturbation,
-            "DOP853",
-            rtol=1e-11,
-            atol=1e-14,
-        ).y[:, -1]
-        for sign in (1, -1)
-    ]
-    growth = (ends[0] - ends[1])[0] / (2 * perturbation[0])
-    assert growth == pytest.approx(eigen[0][k].real ** 3, rel=1e-3) and growth > 1.2
+        columns = []
+        for step in (np.array([1e-8, 0.0]), np.array([0.0, 1e-8 * drive.omega])):
+            ends = [
+                solve_ivp(
+                    duffing_equation(drive),
+                    (0, drive.period),
+                    start + sign * step,
+                    "DOP853",
+                    rtol=1e-12,
+                    atol=1e-15,
+                ).y[:, -1]
+                for sign in (1, -1)
+            ]
+            columns.append((ends[0] - ends[1]) / (2 * step.max()))
+        exact = np.linalg.eigvals(np.array(columns).T)
+        exact = exact[np.argsort(-np.abs(exact))]
+        assert np.abs(p.multipliers) == pytest.approx(np.abs(exact), rel=1e-3)
+    assert points[1].multipliers[0].real > 1.06
 
 
 def test_exact_folds_agree_with_closed_form():
@@ -156,38 +198,27 @@ def test_exact_folds_agree_with_closed_form():
         assert size * np.hypot(stiff, 0.006 * W * p.omega) == pytest.approx(LEVEL, rel=1e-6)
 
 
+@pytest.mark.slow
+def test_exact_all_three_motions_near_fold_are_found():
+    """Near the end of the upper branch two stable motions and one unstable motion are found,
+    although two of them differ by only 8 %."""
+    w = 2 * np.pi * 143
+    mass = 0.884
+    limit = 0.3 * 26 * 4.4482216152605
+    modes = make_modal_basis(w, 0.003, mass=mass)
+    laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
+    for hertz in np.linspace(147.2, 147.6, 5):
+        drive = SineDrive(6 * G_N, 2 * np.pi * hertz)
+        points = find_coexisting_motions(modes, drive, LawGroup(modes, laws))
+        assert [p.stable for p in points] == [True, False, True], hertz
+
+
 # ---- Floquet multipliers
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("omega", [0.8, 1.2])
-def test_exact_monodromy_agrees_with_perturbed_march(omega):
-    """For five modes and 40 elements the modal part of the monodromy matrix agrees with central
-    differences of a march within 0.15 %."""
-    modes, (k, w), drive = make_five_modes(), make_elements(40), SineDrive(1.5, omega)
-    p = find_steady_motion(modes, drive, Jenkins(k, w), tolerance=1e-5)
-    response = make_cycle_response(p, modes, drive, 2000)
-    stretch = jenkins_forces(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
-    start = np.concatenate([response.modal[0], response.modal_rate[0]])
-    columns = []
-    for j in (0, 1, 4, 5, 6):
-        perturbation = np.zeros(10)
-        perturbation[j] = 1e-4
-        ends = [
-            march_exactly(modes, drive, k, w, start + s * perturbation, stretch, 2000)[0][-1]
-            for s in (1, -1)
-        ]
-        columns.append((ends[0] - ends[1]) / 2e-4)
-    monodromy = find_monodromy(replace(p, samples=4096), modes)
-    scale = np.repeat([1.0, omega], 5)
-    block = (monodromy[:10, :10] * scale[:, None] / scale)[:, [0, 1, 4, 5, 6]]
-    assert np.abs(block - np.array(columns).T).max() < 1.5e-3 * np.abs(block).max()
-    assert np.sum(np.abs(np.linalg.eigvals(monodromy)) < 1e-4) >= monodromy.shape[0] - 10
-
-
-def test_exact_monodromy_of_bonds_agrees_with_dop853():
-    """For one mode with bonds the whole monodromy matrix, including the bond state u with u' = (q'
-    - |q'| u)/length, agrees with differences of DOP853 solutions."""
+def test_exact_multipliers_of_bonds_agree_with_dop853():
+    """For one mode with bonds, whose state u obeys u' = (q' - |q'| u)/length, the multipliers agree with those of
+    differences of DOP853 solutions within 1e-4."""
     modes = make_sdof(0.05)
     drive = SineDrive(1.0, 1.2)
     limit = 0.4
@@ -213,25 +244,35 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
         ],
         axis=1,
     )
-    scale = np.array(
-        [1.0, 1.2, 1 / length]
-    )  # the matrix uses rates per radian and the stretch u length
-    monodromy = find_monodromy(replace(p, samples=4096), modes) * scale[:, None] / scale
-    assert monodromy == pytest.approx(columns, abs=2e-5)
+    exact = np.linalg.eigvals(columns)
+    exact = exact[np.argsort(-np.abs(exact))]
+    numbers = LawNumbers(
+        "bonds",
+        (limit, length, length, 0.0, 1.0, 1.0),
+        (1.0, 0.0, 0.0, length),
+        (1.0, 1e-2 * length, 1e-4 * length**2, length),
+    )
+    multipliers = find_multipliers(
+        p, modes, [cases.Interface(numbers, cases.Load(1.0), modes.slide)]
+    )
+    assert np.abs(multipliers[:2]) == pytest.approx(np.abs(exact[:2]), abs=1e-4)
 
 
-def test_always_many_samples_of_two_stiffnesses_need_little_memory():
-    """An element that sticks for a short time needs thousands of samples, but few matrices; perturbations decay by the
-    damping of the mode within 1 %."""
+@pytest.mark.parametrize("speed", [0.1, 3e-3])
+def test_exact_product_of_multipliers_of_rate_law_is_its_damping(speed):
+    """Liouville's formula: the product of the multipliers is exp(-int (2 zeta + dF/dv) dt), within 1 %, also for a law
+    whose force changes its sign between two samples of a cycle."""
     modes = make_sdof(0.05)
-    p = find_steady_motion(modes, SineDrive(1.0, 1.0), Jenkins([1.0], [0.02]))
-    tracemalloc.start()
-    multipliers = np.linalg.eigvals(find_monodromy(p, modes))
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert np.abs(multipliers).max() == pytest.approx(np.exp(-0.05 * 2 * np.pi), rel=0.01)
-    # Matrices of all cells would take 180 numbers of 8 bytes per sample.
-    assert p.samples >= 4096 and peak < 60 * 8 * p.samples
+    drive = SineDrive(1.0, 1.2)
+    p = find_steady_motion(modes, drive, make_speed_law(0.4, speed), tolerance=1e-3)
+    response = make_cycle_response(p, modes, drive, 2**17)
+    slope = 0.4 / speed / np.cosh(np.minimum(np.abs(response.slide_rate / speed), 300)) ** 2
+    damping = drive.period * (0.1 + slope[:-1].mean())
+    numbers = LawNumbers("tanh", (0.4, speed))
+    multipliers = find_multipliers(
+        p, modes, [cases.Interface(numbers, cases.Load(1.0), modes.slide)]
+    )
+    assert np.prod(multipliers).real == pytest.approx(np.exp(-damping), rel=1e-2)
 
 
 # ---- backbones

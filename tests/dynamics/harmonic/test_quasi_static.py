@@ -9,7 +9,7 @@ from modal_bases import make_modal_basis
 from patchfem.core import PatchfemError
 from patchfem.dynamics import LawGroup
 from patchfem.dynamics.harmonic import quasi_static
-from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw
+from patchfem.dynamics.harmonic.laws import FlowLaw, Jenkins
 from patchfem.friction.laws import tanh
 
 
@@ -87,6 +87,6 @@ def test_exact_two_modes_satisfy_secant_eigenproblem():
 def test_refuses_rate_dependent_friction():
     """Friction that depends on the sliding speed has no quasi-static backbone and is refused."""
     friction = SimpleNamespace(static=0.3, reference_speed=1e-3)
-    group = LawGroup(ONE, SpeedLaw(tanh.from_keys(friction, 1.0).element(9.0)))
+    group = LawGroup(ONE, FlowLaw(tanh.from_keys(friction, 1.0).element(9.0)))
     with pytest.raises(PatchfemError, match="sliding speed"):
         quasi_static.find_static_motions(ONE, group, 0, [1e-4], ONE.output)

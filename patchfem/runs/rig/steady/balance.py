@@ -5,6 +5,7 @@ frequency with its folds (`dynamics.harmonic`).
 """
 
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 from typing import NamedTuple
 
@@ -14,7 +15,6 @@ from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDr
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
-from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import list_coexisting_slides, refine_steady_motion
 from ....formatting import format_length, format_quantity
@@ -33,6 +33,7 @@ from .curves import (
     ResponseCurve,
     describe_instability,
 )
+from .shooting import PeriodMap
 
 # Reasons why a branch ends before the last frequency, by the value of `Branch.ended`.
 REASONS_OF_END = {
@@ -117,6 +118,7 @@ class BalanceFinder:
         self.numerics = numerics
         self.group = make_law_group(model, numerics, patch)
         self.tolerance = model.accuracy.tolerance
+        self.say = say
 
     def compute_steady_motion(self, drive, guess=None) -> Solution:
         """Compute the steady motion under sinusoidal drive, with error estimates.
@@ -208,7 +210,7 @@ class BalanceFinder:
 
         If no motion under this drive is stable, the given motion is returned.
         """
-        stability = add_stability(motion, self.modes)
+        stability = self._add_stability(motion, drive)
         if stability.stable:
             return StableMotion(motion, stability)
 
@@ -219,7 +221,7 @@ class BalanceFinder:
                 found = self._solve_balance(drive, slides)
             except NotConverged:
                 continue
-            motions.append(add_stability(found, self.modes))
+            motions.append(self._add_stability(found, drive))
         output = self.modes.output
         motions.sort(key=lambda each: each.amplitude(output))
         stable_motions = [each for each in motions if each.stable]
@@ -237,6 +239,16 @@ class BalanceFinder:
                 '"march" gives the motion that is reached from rest'
             )
         return StableMotion(stable_motions[0], stable_motions[0], (note,))
+
+    def _add_stability(self, motion, drive) -> SteadyMotion:
+        """Return a steady motion with its Floquet multipliers, from the map of a period of the engine `hybrid`."""
+        multipliers = self._period_map.find_multipliers(drive, motion.modal_state)
+        return replace(motion, multipliers=multipliers)
+
+    @cached_property
+    def _period_map(self) -> PeriodMap:
+        """Map of a period of this rig."""
+        return PeriodMap(self.model, self.numerics, self.patch, self.say)
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
         """Compute what sensors see of the steady motion under a drive, without errors.
@@ -339,8 +351,8 @@ class BalanceFinder:
 
     def _make_curve_point(self, motion, drive) -> CurvePoint:
         """Convert a steady motion on a branch to a curve point with error estimates."""
-        motion = add_stability(motion, self.modes) if motion.stable is None else motion
         sine = SineDrive(motion.level, motion.omega, drive.moving)
+        motion = self._add_stability(motion, sine)
         values = self._compute_curve_measures(motion, sine)
         errors = self._estimate_errors(values, motion, sine, self._compute_curve_measures)
         for name in errors:

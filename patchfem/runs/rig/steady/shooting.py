@@ -16,7 +16,7 @@ from ....dynamics.curve_points import sample_adaptively
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
-from ....hybrid.records import Status, Window
+from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
@@ -52,11 +52,28 @@ FULL_SLIP_TOL = (
 )
 
 
+class PeriodMap:
+    """Map of a period of a rig by the engine `hybrid`."""
+
+    def __init__(self, model, numerics, patch, say=None):
+        compiled.load("hybrid.engine_kernels", say)
+        self.rig = model.rig
+        self.joints = make_joints(model, numerics, patch)
+
+    def make_case(self, drive) -> cases.Case:
+        """Return the case of a period from rest under sinusoidal drive."""
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        return cases.make_rig_case(self.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
+
+    def find_multipliers(self, drive, modal_state) -> np.ndarray:
+        """Return the Floquet multipliers of a motion from its modal state (2 n,) at phase 0 of the drive."""
+        return periodic.find_multipliers(self.make_case(drive), modal_state)
+
+
 class ShootingFinder:
     """Solver for steady motions by Newton's method on the map of a period."""
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        compiled.load("hybrid.engine_kernels", say)
         self.model = model
         self.modes = model.rig.modes
         self.patch = patch
@@ -64,7 +81,8 @@ class ShootingFinder:
         self.numerics = replace(
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
-        self.joints = make_joints(model, self.numerics, patch)
+        self.period_map = PeriodMap(model, self.numerics, patch, say)
+        self.joints = self.period_map.joints
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
 
     def find_periodic_motion(self, drive, guess=None) -> periodic.PeriodicMotion:
@@ -82,10 +100,7 @@ class ShootingFinder:
         NotConverged
             If no motion is found that repeats after each cycle.
         """
-        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
-        case = cases.make_rig_case(
-            self.model.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL
-        )
+        case = self.period_map.make_case(drive)
         n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
         motion = periodic.find_periodic_motion(
             case, start=guess, n_first=n_first, has_kinks=self.joints.has_kinks
@@ -200,8 +215,8 @@ class ShootingFinder:
         faces = motion.run.record.faces[: len(laws)]
         if laws and all(law.law == "masing" for law in laws):
             limits = np.array([law.numbers[2] for law in laws])
-            forces = np.maximum(faces[:, Window.MAX_FORCE], -faces[:, Window.MIN_FORCE])
-            slides = (forces >= limits * (1 - FULL_SLIP_TOL)).all()
+            forces = motion.run.record.get_face_extremes(Probe.FORCE)[: len(laws)]
+            slides = (np.abs(forces).max(axis=1) >= limits * (1 - FULL_SLIP_TOL)).all()
             return "slides" if slides else "partial slip"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
@@ -232,8 +247,8 @@ class ShootingFinder:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
         values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
-        faces = motion.run.record.faces[: len(self.joints.laws)]
-        slips = faces[:, Window.MAX_SLIP] - faces[:, Window.MIN_SLIP]
+        slips = np.ptp(motion.run.record.get_face_extremes(Probe.SLIP), axis=1)
+        slips = slips[: len(self.joints.laws)]
         is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.is_stable
