@@ -27,7 +27,7 @@ class LinearAsperities:
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m] at s (m,) [m], which is 0 where the layer is not compressed."""
+        """Stiffness -dP/ds (m,) [Pa/m] at the separations s (m,) [m]; 0 where the layer is not compressed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
@@ -51,13 +51,13 @@ class SmoothAsperities:
         return np.exp(np.minimum(self.log_pressure(np.asarray(s, float))[0], 700.0))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m] at s (m,) [m]: P times the decay rate of log P."""
+        """Stiffness -dP/ds (m,) [Pa/m] at the separations s (m,) [m]: P times the decay rate of log P."""
         return self.pressure(s) * self.log_pressure(np.asarray(s, float))[1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ExponentialAsperities(SmoothAsperities):
-    """Exponential law of the asperity layer: P = reference exp(-s/u0).
+    """Exponential law of the asperity layer: P = reference exp(-s/u0) at the separation s [m] of the mean planes.
 
     u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `press.press_strips`
     takes the mean pressure of the given load. Flat aligned pieces then have s = 0, and the approach is the closing of

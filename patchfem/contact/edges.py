@@ -307,8 +307,8 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
     (r,) ndarray
         [N/m], or [N m/rad] for a rotation.
     """
-    # Forces that cause the motions, the displacements by a unit force beyond each edge, and a unit displacement of the last
-    # node before each edge
+    # The forces for three kinds of displacements are solved at once: `force` for the motions, `outer` for those by a unit
+    # force beyond each edge, and `inner` for a unit displacement of the last node before each edge
     compliance = contact.compliance
     outside = [edge.node + edge.side for edge in edges]
     nodes = [edge.node for edge in edges]

@@ -193,7 +193,8 @@ def _refine_column(sets, column):
         else:
             values[i, n_nodes + column] = displacement + given
 
-    # The tableau multiplies residuals as the inverse of the equations does, to the accuracy that it has kept
+    # One step of iterative refinement: the tableau is nearly the inverse of the equations, so its product with the
+    # residuals corrects the column
     residual = error / scale if scale > 0 else 0.0
     if residual > MIN_TABLEAU_RESIDUAL:
         for i in range(n_nodes):

@@ -59,15 +59,15 @@ def cho_factor(matrix) -> np.ndarray:
     LinAlgError
         If the matrix is not positive definite.
     """
-    low, info = dpotrf(np.asarray(matrix, float), lower=1, clean=0)
-    if info != 0 or not np.isfinite(low[-1, -1]):
+    lower_factor, info = dpotrf(np.asarray(matrix, float), lower=1, clean=0)
+    if info != 0 or not np.isfinite(lower_factor[-1, -1]):
         raise np.linalg.LinAlgError("not positive definite")
-    return low
+    return lower_factor
 
 
-def cho_solve(low, right) -> np.ndarray:
-    """Solve a symmetric system from its `cho_factor` `low`, for right-hand sides (n,) or (n, k)."""
-    return dpotrs(low, right, lower=1)[0]
+def cho_solve(lower_factor, right) -> np.ndarray:
+    """Solve a symmetric system from its factor by `cho_factor`, for right-hand sides (n,) or (n, k)."""
+    return dpotrs(lower_factor, right, lower=1)[0]
 
 
 def cho_inverse(low) -> np.ndarray:

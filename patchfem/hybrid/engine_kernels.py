@@ -32,6 +32,7 @@ from .records import (
     Probe,
     Setting,
     Status,
+    Tail,
 )
 from .step_kernels import CYCLE, N_STAGES, RATES, SCALE, read_curve, step_factor, take_step
 from .window_kernels import (
@@ -108,7 +109,7 @@ def update_scales(rig, state):
 
 
 @njit(**NJIT_KERNEL)
-def add_energies(rig, state, before):
+def add_energies(rig, state, work_before):
     """Update the exchanged energy and the largest energy of the modes after a step.
 
     Parameters
@@ -117,7 +118,7 @@ def add_energies(rig, state, before):
         Arrays of the rig.
     state : State
         Motion, which is updated.
-    before : float
+    work_before : float
         Work of the drive before the step [J].
     """
     n = rig.modes.shape[1]
@@ -126,7 +127,7 @@ def add_energies(rig, state, before):
     for j in range(n):
         energy += y[n + j] ** 2 + rig.modes[Mode.STIFFNESS, j] * y[j] ** 2
     energy *= 0.5 * rig.settings[Setting.MASS]
-    state.clock[Clock.EXCHANGED] += abs(y[y.size - 4] - before)
+    state.clock[Clock.EXCHANGED] += abs(y[Tail.WORK] - work_before)
     state.clock[Clock.STORED] = max(state.clock[Clock.STORED], energy)
 
 
@@ -177,7 +178,8 @@ def advance(rig, state, record, t_end, cycle):
     first_seen = MIN_SEEN * rig.settings[Setting.PERIOD]
     if cycle > 0:
         first_seen += record.cycles[cycle - 1, Cycle.END]
-    # The step error of a bench includes its integrals: besides the friction work no state may depend on the path.
+    # The step error is that of the states before the first integral. On a bench it includes the integrals: besides the
+    # friction work no state may depend on the path.
     n_checked = find_integrals(rig, state.y)
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]
@@ -209,7 +211,7 @@ def advance(rig, state, record, t_end, cycle):
             if in_window and clock[Clock.TIME] + fraction * h > first_seen:
                 observe_window(rig, state, record, cycle, fraction)
         write_samples(rig, state, record, fraction)
-        before = state.y[state.y.size - 4]
+        work_before = state.y[Tail.WORK]
         if fraction == 1:
             # The last stage and the last margins are those of the start of the next step.
             copy_values(state.rows[N_STAGES], state.rows[0])
@@ -219,7 +221,7 @@ def advance(rig, state, record, t_end, cycle):
         is_end = face < 0 and fraction == 1 and h == t_end - clock[Clock.TIME]
         read_curve(state, fraction, state.y)
         update_scales(rig, state)
-        add_energies(rig, state, before)
+        add_energies(rig, state, work_before)
         clock[Clock.TIME] = t_end if is_end else clock[Clock.TIME] + fraction * h
         if travel_end <= 1 and face < 0:
             return Status.EXCEEDS_TRAVEL
@@ -234,6 +236,7 @@ def advance(rig, state, record, t_end, cycle):
             if number < record.events.shape[0]:
                 find_rates(rig, state, clock[Clock.TIME], state.y, state.rows[RATES])
                 write_directions(rig, state, record.events[number])
+            # The force of a rigid law may jump at an event, so a second row has the force after it.
             if rig.settings[Setting.HAS_RIGID] > 0:
                 write_event(rig, state, record, face, Margin.AFTER)
         elif h == clock[Clock.STEP] or h == longest:
@@ -446,7 +449,7 @@ def run_cycles(rig, state, record):
     update_scales(rig, state)
     clock[Clock.IS_SMOOTH] = 0.0
     start_directions(rig, state)
-    add_energies(rig, state, state.y[state.y.size - 4])
+    add_energies(rig, state, state.y[Tail.WORK])
     n_cycles = record.cycles.shape[0]
     repeat = int(rig.settings[Setting.REPEAT])
     last_change = np.inf

@@ -21,6 +21,7 @@ from .records import (
     Record,
     Setting,
     State,
+    Tail,
     Window,
 )
 
@@ -113,8 +114,8 @@ def compute_energies(case: Case, state: State) -> dict[str, float]:
     work, _, loss = split_integrals(case, state.y).T
     change = _find_modal_energy(case, state.y) - _find_modal_energy(case, case.y)
     return {
-        "work_in": float(state.y[-4]),
-        "viscous": float(state.y[-3]),
+        "work_in": float(state.y[Tail.WORK]),
+        "viscous": float(state.y[Tail.LOSS]),
         "power": float(state.clock[Clock.EXCHANGED]),
         "friction": float(loss.sum()),
         "stored": float(change + (work - loss).sum()),

@@ -4,7 +4,18 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Mode, Piece, Point, Setting
+from .records import (
+    N_FACE_INTEGRALS,
+    N_INTEGRALS,
+    Clock,
+    Face,
+    Memory,
+    Mode,
+    Piece,
+    Point,
+    Setting,
+    Tail,
+)
 from .table_kernels import force_and_rates
 
 SHARED_GRIP = 1e-7  # relative compliance by which more interfaces than modes share their forces
@@ -189,10 +200,10 @@ def find_rates(rig, state, t, y, rates):
 
     output = project(rig.modes[Mode.OUTPUT], y[:n])
     phase = rig.settings[Setting.OMEGA] * t
-    rates[y.size - 4] = power
-    rates[y.size - 3] = loss
-    rates[y.size - 2] = output * np.cos(phase)
-    rates[y.size - 1] = output * np.sin(phase)
+    rates[Tail.WORK] = power
+    rates[Tail.LOSS] = loss
+    rates[Tail.COSINE] = output * np.cos(phase)
+    rates[Tail.SINE] = output * np.sin(phase)
 
 
 @njit(**NJIT_KERNEL)

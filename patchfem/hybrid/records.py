@@ -9,10 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 N_FACE_INTEGRALS = 3  # work, slip and loss of every interface, near the end of a state
-N_INTEGRALS = (
-    4  # work of the drive, loss of the dampers, output times cosine and sine, at the end of a state
-)
+N_INTEGRALS = 4  # number of integrals at the end of a state, see `Tail`
 WINDOW_START = 28  # row of `State.rows` with the state at the start of the window
+
+
+class Tail(IntEnum):
+    """Integrals of a motion over time, by their places from the end of a state (`State.y`)."""
+
+    WORK = -4  # work of the drive [J]
+    LOSS = -3  # energy that the dampers dissipate [J]
+    COSINE = -2  # output times the cosine of the phase of the drive [m s]
+    SINE = -1  # output times the sine of this phase [m s]
 
 
 class Mode(IntEnum):

@@ -27,6 +27,9 @@ MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, i
 N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].
+N_FIRST_CYCLES = 1.2  # cycles at the beginning of a decay to which the first sinusoid is fitted
+# Smallest place of the middle of the first half cycle, in half periods; one half less the error of the fit
+MIN_FIRST_MIDDLE = 0.48
 FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
@@ -147,9 +150,9 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     if not frequency > 0 or not np.ptp(value) > 0:
         raise PatchfemError("the record contains no oscillation")
 
-    # a sinusoid that is fitted to the first cycle
-    is_first = time - time[0] <= 1.2 / frequency
-    n_samples = round(np.count_nonzero(is_first) / 1.2)
+    # a sinusoid that is fitted to the first cycle, and a little more for an inexact frequency
+    is_first = time - time[0] <= N_FIRST_CYCLES / frequency
+    n_samples = round(np.count_nonzero(is_first) / N_FIRST_CYCLES)
     if n_samples < 2 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
             f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
@@ -162,12 +165,12 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     cycle = problem.refine([[omega, 0.0]], MAX_EVALUATIONS, START_TOL)
     cosine, sine = cycle.coefficients[0]
 
-    # the first half cycle must lie completely in the record
+    # A half cycle goes from peak to peak around a zero of the sinusoid, and must lie completely in the record.
     half_period = np.pi / cycle.poles[0, 0]
-    start = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
-    if start < 0.48 * half_period:
-        start += half_period
-    return time[0] + start, half_period
+    middle = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
+    if middle < MIN_FIRST_MIDDLE * half_period:
+        middle += half_period
+    return time[0] + middle, half_period
 
 
 def _follow_half_cycles(time, value, middle: float, length: float) -> list[_FittedSines]:

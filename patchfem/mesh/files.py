@@ -228,9 +228,9 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
 
 
 def _read_with_meshio(path: Path):
-    """Read the mesh file `path` with meshio, which may print to stdout and call sys.exit.
+    """Return the `meshio.Mesh` of the file `path`.
 
-    Its output is hidden, and any failure becomes a PatchfemError.
+    What meshio prints is hidden; any failure, also sys.exit, becomes a PatchfemError.
     """
     import meshio
 

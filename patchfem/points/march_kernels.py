@@ -439,9 +439,10 @@ def write_residual(system, level, h):
 
 @njit(**NJIT_CALL)
 def write_matrix(system, level):
-    """Write the Jacobian of the residuals.
+    """Write the Jacobian of the residuals of a step of length h / 2^level to `ports.matrix`.
 
-    Entry (p, k) of the ports is -(df/dq C_pk + df/dv G_pk), summed over the points of port p, less 1 on the diagonal.
+    A force at port k reduces the slide of port p by C_pk and its velocity at the end of the step by G_pk, the compliances
+    of the structure. Entry (p, k) is -(df/dq C_pk + df/dv G_pk), summed over the points of port p, less 1 on the diagonal.
     """
     ports = system.ports
     points = system.points
@@ -459,7 +460,7 @@ def write_matrix(system, level):
         for k in range(points.stiffness.size):
             matrix[p, n_ports + k] = 0.0
 
-    # The contact couples heave and pitch by the derivatives of its load and moment.
+    # The contact couples heave and pitch by the derivatives of its load and moment (`ports.contact[7:11]`).
     heave = int(ports.contact[0])
     if heave >= 0:
         pitch = int(ports.contact[1])
@@ -469,7 +470,8 @@ def write_matrix(system, level):
                 change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
                 matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
 
-    # All points that share shear coordinates act on the port of the first one.
+    # All points that share shear coordinates act on the port of the first one. The residual of a coordinate has
+    # kappa (b + db/2) and the damping of Newton's change of db.
     slopes = points.values[Point.BY_SLIDE, :n_points]
     for k in range(points.stiffness.size):
         row = n_ports + k
@@ -484,7 +486,8 @@ def write_matrix(system, level):
         for q in range(n_ports):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
 
-    # Ports that hold have the derivative of their end velocity in place of that of a force.
+    # Ports that hold have the derivative of their end velocity in place of that of a force. A small compliance of their
+    # own makes the forces unique where more ports hold than there are modes.
     for p in range(n_ports):
         if is_held(points, p):
             matrix[p, :] = 0.0

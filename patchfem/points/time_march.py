@@ -142,7 +142,14 @@ def load_kernels(contact: Contact, say=None):
 
 
 class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`."""
+    """Motion, viscous loss and work of the drive in steps of several lengths (`levels`), from the longest one.
+
+    The N = 3 n + 3 states at the start of a step are those of `make_responses`.
+
+    - motion (levels, 2 n, N): coordinates [m] and velocities [m/s] at its end for each state
+    - loss (levels, N, N): quadratic form of the energy that the dampers dissipate [J]
+    - work (levels, 3, N): bilinear form of the work of the drive [J]
+    """
 
     motion: np.ndarray
     loss: np.ndarray
@@ -163,6 +170,8 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     levels : int
         Number of lengths of steps.
     """
+    # The state (3 n + 3,): coordinates, velocities, the acceleration of the base with two derivatives, and constant
+    # forces per mass.
     n = modes.omega.size
     matrix = np.zeros((3 * n + 3, 3 * n + 3))
     velocities = slice(n, 2 * n)
@@ -178,6 +187,7 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
     short = step / 2**n_halvings
     nodes, weights = leggauss(N_GAUSS)
+    # The units of these states are [m s^-power].
     powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
     loss = np.zeros_like(matrix)
     loss[velocities, velocities] = modes.mass * modes.damping_matrix

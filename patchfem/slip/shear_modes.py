@@ -178,7 +178,7 @@ class _YieldSequence(NamedTuple):
 
     - order (n,): indices of the nodes in reverse order of yielding
     - cholesky_factor (n, n): lower Cholesky factor L of the compliance in that order
-    - inverse_ones, factored_force (n,): L^-1 1 and L' force
+    - inverse_ones, factored_force (n,): L^-1 1 and L^T f, with the yield forces f (n,) [N] in that order
     - displacements (n,): yield displacements [m], factored_force/inverse_ones
     """
 

@@ -36,19 +36,31 @@ def force_and_rates(p, memory, point, s, rates):
     rates : (n,) array
         Rates, which are written.
     """
+    density = s[0]
+    stretch = s[1]
+    square = s[2]
+    bond_length = s[3]
+    friction = p[0]
+    first_length = p[1]
     v = point.velocity
     speed = memory[Memory.DIRECTION] * v
-    if p[3] > 0:
-        healing_speed = speed if memory[Memory.FLAG] > 0 else p[5]
-        rates[3] = p[3] / healing_speed * (p[1] - s[3]) + speed / p[4] * (p[2] - s[3])
-    breaking = speed / s[3]
-    rates[0] = (1 - s[0]) * breaking
-    rates[1] = s[0] * v - s[1] * breaking
-    rates[2] = 2 * s[1] * v - s[2] * breaking
 
-    stiffness = p[0] * point.load / p[1]
-    slip_rate = s[1] * breaking / s[0] ** 2 if s[0] > MIN_DENSITY else 0.0
-    return Friction(stiffness * s[1], slip_rate, 0.5 * stiffness * s[2] * breaking)
+    # Growth: eps' = a_s/max(|v|, v_h) (eps_0 - eps) + |v|/l_k (eps_k - eps)
+    growth = p[3]
+    if growth > 0:
+        growth_speed = speed if memory[Memory.FLAG] > 0 else p[5]
+        rest_rate = growth / growth_speed * (first_length - bond_length)
+        rates[3] = rest_rate + speed / p[4] * (p[2] - bond_length)
+
+    # Moments of the bonds: density, mean stretch and mean square stretch
+    breaking = speed / bond_length
+    rates[0] = (1 - density) * breaking
+    rates[1] = density * v - stretch * breaking
+    rates[2] = 2 * stretch * v - square * breaking
+
+    stiffness = friction * point.load / first_length
+    slip_rate = stretch * breaking / density**2 if density > MIN_DENSITY else 0.0
+    return Friction(stiffness * stretch, slip_rate, 0.5 * stiffness * square * breaking)
 
 
 def write_margins(p, memory, point, s, margins):

@@ -14,8 +14,8 @@ from .view import UNKNOWN_VALUE
 class SettingScope(NamedTuple):
     """Kinds of scenes, solvers and friction laws for which a key of [accuracy] has an effect.
 
-    - kinds: kinds of scenes.
-    - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
+    - kinds: names of kinds of scenes, separated by blanks.
+    - methods: names of methods and engines, separated by blanks. "auto" stands for the engines that the program may choose, "bench" for
       that of a bench.
     - trait: trait of `effects.LAWS[...].traits` that a friction law of the scene must have; "" for any law.
     """

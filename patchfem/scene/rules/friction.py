@@ -57,7 +57,7 @@ def _check_bonds(law: TableFacts, unused: list[str]) -> None:
             missing = "keys for the growth of the bonds; add rest_growth and slip_growth"
         law.add_remark("temperature", f"has no effect without {missing}")
 
-    # The bonds of the average pressure have no stretch.
+    # Bonds of the average pressure have no stretch, so that their order has the limit of reading 'report'.
     is_averaged = law_has_trait(law.table.law, "averaged")
     needed = "> -1" if is_averaged else "> -1 (reading 'report')"
     is_wrong = law.order <= -1

@@ -183,9 +183,8 @@ def default_output(index: int) -> float:
 def describe_default_outputs(tables: Tables) -> list[str]:
     """Return a sentence on each mode whose default of `output` decides what a drive or sensor does.
 
-    These are the first mode under a force, which acts at the output point, and other modes that slide.
-
-    `tables` are those of the scene.
+    The default is 1 for the first mode, which matters if a force drives the output point, and 0 for the others, which
+    matters for those that slide and have no sensor key. `tables` are those of the scene.
     """
     modes = tables.structure.mode if tables.structure is not None else ()
     drive = tables.drive

@@ -175,13 +175,12 @@ def _is_same_place(aligned: Aligned) -> bool:
     significance = aligned.place.significance
     if significance > SURE_SIGNIFICANCE:
         return True
-    chance = _estimate_chance(*waves, noise)
-    agreeing = fit.unworn.mean()
-    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS_AGREEMENT * (
-        1 - chance
-    ):
+    chance_fraction = _estimate_chance(*waves, noise)
+    agreeing_fraction = fit.unworn.mean()
+    min_excess = MIN_EXCESS_AGREEMENT * (1 - chance_fraction)
+    if significance > LIKELY_SIGNIFICANCE and agreeing_fraction - chance_fraction > min_excess:
         return True
-    return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
+    return agreeing_fraction > MIN_AGREEMENT * chance_fraction + MIN_AGREEING
 
 
 def _estimate_chance(first, second, noise: float) -> float:

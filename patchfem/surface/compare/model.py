@@ -126,7 +126,10 @@ class Model:
         return (turned + start) / self._shape(self.other.steps)
 
     def compute_depth(self, state) -> np.ndarray:
-        """Return the depth (n,) [m] below the datum at the known points and a state."""
+        """Return the depth (n,) [m] of the second surface below the datum at the n known points.
+
+        `state` (k,) has the shifts [m], the turn [rad], the factors of the datum, and the change of the gain.
+        """
         pixels = self._map_pixels(state)[:, self.known]
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
@@ -228,7 +231,10 @@ class Model:
         return (smooth(image, width) - smooth(image, np.hypot(self.smoothing, width)))[self.known]
 
     def find_datum(self, state, n_terms: int) -> np.ndarray:
-        """Return a state whose datum, of the first `n_terms` functions, goes through the unworn heights."""
+        """Return a copy of a state whose first `n_terms` factors of the datum put it through the unworn heights.
+
+        `state` is that of `compute_depth`.
+        """
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
         parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]

@@ -30,8 +30,13 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
     depth : (n,) array
         Depths about the unworn surface.
     fraction : float, optional
-        Quantile of the sizes on one side, which that of normal values scales. More than this fraction of
-        them must be unchanged.
+        More than this fraction of the depths on the smaller side must be unchanged.
+
+    Returns
+    -------
+    float
+        Standard deviation [m]: the quantile `fraction` of the sizes on the side where it is smaller, divided by that of
+        the sizes of normal values of variance one.
     """
     halves = (depth[depth > 0], depth[depth < 0])
     sides = [np.abs(side) for side in halves if side.size >= MIN_SIDE_DEPTHS]

@@ -105,8 +105,8 @@ def _find_roles(
     notes : tuple of str
         A note if the roles follow from the order.
     """
-    names = {2: "xz", 3: "xyz"}.get(header.count, "z")
-    columns = header.columns or [Column(role) for role in names]
+    default_roles = {2: "xz", 3: "xyz"}.get(header.count, "z")
+    columns = header.columns or [Column(role) for role in default_roles]
     data = [column for column in columns if column.role != "index"]
     if len(data) not in (2, 3):
         raise PatchfemError(
