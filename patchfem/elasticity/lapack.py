@@ -71,7 +71,7 @@ def cho_solve(lower_factor, right) -> np.ndarray:
 
 
 def cho_inverse(low) -> np.ndarray:
-    """Return the symmetric inverse (n, n) of a matrix from its `cho_factor` `low`."""
+    """Return the symmetric inverse (n, n) of a matrix from its factor by `cho_factor`."""
     lower_half, _ = _LAPACK.dpotri(np.asfortranarray(low), lower=1)
     return np.tril(lower_half) + np.tril(lower_half, -1).T
 

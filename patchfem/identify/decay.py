@@ -65,8 +65,9 @@ def fit_decay(time, value) -> FittedModes:
 def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:
     """Return initial poles (angular frequency [rad/s], decay rate [1/s]) of a further sinusoid.
 
-    It is at the highest spectral line of the residual of `fit` at the times `time` (n,) [s]. Several decay rates are tried. Lines near a fitted sinusoid are excluded, because a residual there is due
-    to a decay that is not exponential, which increases the misfit.
+    It is at the highest spectral line of the residual of `fit` at the times `time` (n,) [s]. Several decay rates
+    are tried. Lines near a fitted sinusoid are excluded, because a residual there is due to a decay that is not
+    exponential, which increases the misfit.
     """
     even_times, step = np.linspace(0, time[-1], time.size, retstep=True)
     n_padded = 4 * time.size

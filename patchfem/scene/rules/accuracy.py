@@ -15,8 +15,8 @@ class SettingScope(NamedTuple):
     """Kinds of scenes, solvers and friction laws for which a key of [accuracy] has an effect.
 
     - kinds: names of kinds of scenes, separated by blanks.
-    - methods: names of methods and engines, separated by blanks. "auto" stands for the engines that the program may choose, "bench" for
-      that of a bench.
+    - methods: names of methods and engines, separated by blanks. "auto" stands for the engines that the
+      program may choose, "bench" for that of a bench.
     - trait: trait of `effects.LAWS[...].traits` that a friction law of the scene must have; "" for any law.
     """
 
