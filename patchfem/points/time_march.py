@@ -142,7 +142,15 @@ def load_kernels(contact: Contact, say=None):
 
 
 class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`."""
+    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`.
+
+    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
+    mass.
+
+    - motion: (levels, 2 n, N) motion at the end of a step per input
+    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
+    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
+    """
 
     motion: np.ndarray
     loss: np.ndarray
@@ -400,7 +408,12 @@ def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
-    """Return the arrays of the lists of bonds; empty ones without lists."""
+    """Return the arrays of the lists of bonds; empty ones without lists.
+
+    contact: law, and the numbers of the sum over bonds.
+    points: arrays of the contact points, with their ports, laws and loads.
+    is_prescribed: whether the slide of the points is given, and does not follow from forces.
+    """
     count = points.port.size
     if contact.bond_sum is None:
         empty = np.zeros(0)
@@ -726,7 +739,12 @@ class March:
 
 
 class MarchedSteps(NamedTuple):
-    """Arrays of a march at its end, number of steps done, and status (`march_rows`)."""
+    """Arrays of a march at its end.
+
+    - system: arrays of the march, which is a copy if lists of bonds were made longer
+    - n_done: number of steps done
+    - status: why the march ended, a status of `march_rows`
+    """
 
     system: System
     n_done: int
@@ -1096,6 +1114,7 @@ class Record:
         if not self.keeps_samples:
             rows = rows[rows[:, NUMBER] >= run.done - self.n_window]
 
+        # The last n_window steps are the window of the measures
         in_window = rows[:, NUMBER] >= run.done - self.n_window
         response = make_histories(run, rows)
         n = 2 * run.modes.omega.size
