@@ -26,7 +26,12 @@ from .table_kernels import switch_law, write_law_margins
 
 
 class StepEvent(NamedTuple):
-    """Fraction of a step at an event, its interface (-1: there is no event) and its margin."""
+    """First event of a step.
+
+    - fraction: of the step, 0 to 1, at the event
+    - face: number of its interface; -1 without an event
+    - which: `Margin` that vanishes there
+    """
 
     fraction: float
     face: int

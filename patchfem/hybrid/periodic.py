@@ -355,7 +355,12 @@ class _Shooting:
 
 
 class _Map(NamedTuple):
-    """Linear map of a period: indices (k,) and scales (k,) of the unknowns, and derivatives (k, k) in scaled unknowns."""
+    """Linear map of a period in k scaled unknowns.
+
+    - columns: (k,) indices of the unknowns in the packed state and memory
+    - slopes: (k, k) derivatives of the end of the period by its start
+    - scale: (k,) sizes of the unknowns, by which they are divided
+    """
 
     columns: np.ndarray
     slopes: np.ndarray
@@ -365,7 +370,8 @@ class _Map(NamedTuple):
 def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).
 
-    The matrix is singular where a state does not matter, such as bonds that have long been forgotten.
+    linear: map of the period; rcond: singular values below this fraction of the largest one count as 0. The matrix is
+    singular where a state does not matter, such as bonds that have long been forgotten.
     """
     return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 
