@@ -189,6 +189,7 @@ class _Relay:
         speeds = self.find_reversal_speeds(half_periods)
 
         def find_speed(half_period: float) -> float:
+            """Return the velocity of the slide at the reversal for a half period [s], as `find_reversal_speeds`."""
             return float(self.find_reversal_speeds(np.array([half_period]))[0])
 
         cycles = []

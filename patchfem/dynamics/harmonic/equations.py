@@ -198,12 +198,25 @@ class HarmonicBalance:
     ) -> tuple[np.ndarray, Equations, int]:
         """Solve the balance from unknowns x (N,).
 
+        Parameters
+        ----------
+        x : (N,) array
+            First guess of the packed slides [m].
+        omega : float
+            Circular frequency [rad/s].
+        level : float
+            Amplitude of the acceleration of the drive [m s-2].
+        max_steps : int
+            Largest number of Newton steps.
+
         Returns
         -------
         x : (N,) array
+            Packed slides of the solution [m].
         equations : Equations
             Those before the last step.
         n_steps : int
+            Number of Newton steps.
 
         Raises
         ------
@@ -212,6 +225,17 @@ class HarmonicBalance:
         """
 
         def is_solved(equations, residual, size) -> bool:
+            """Return whether the residual is small beside the slides and the drive after the last step.
+
+            Parameters
+            ----------
+            equations : Equations
+                Equations before the step, with their derivatives by the drive level.
+            residual : (N,) array
+                Their linearised residual after it [m].
+            size : float
+                Norm of the packed slides [m].
+            """
             drive = abs(level) * float(np.linalg.norm(equations.by_level))
             return float(np.linalg.norm(residual)) <= MAX_RESIDUAL * (size + drive)
 
