@@ -292,7 +292,17 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
 
 
 def find_floor(name: str, values: dict, scales: Scales) -> np.ndarray:
-    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms."""
+    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure.
+    values : dict of str to (n,) array
+        All measures of the cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    """
     floor = error_floor(name, scales.displacement)
     return np.fmax(floor, scales.tolerance * larger_term(name, values))
 
@@ -307,7 +317,10 @@ def _select(record, rows):
 
 
 def _insert(record, rows, part):
-    """Replace rows of all arrays of a record or dict; return the record."""
+    """Replace rows of all arrays of a record or dict, nested ones too; return the record.
+
+    record: changed in place; rows: indices or mask; part: record of the same kind with only these rows.
+    """
     pairs = record.items() if isinstance(record, dict) else zip(record._fields, record)
     for name, one in pairs:
         new = part[name] if isinstance(record, dict) else getattr(part, name)
@@ -390,7 +403,10 @@ def make_results(
 
 
 def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
-    """Replace values of a measure by a reason."""
+    """Replace values of a measure by the reason why they are missing.
+
+    results: changed; name: of the measure; cases: indices of the cases.
+    """
     if not cases.size:
         return
     results.add_measure(name, TABLE[name].unit)

@@ -70,7 +70,7 @@ class CoupledRun:
 
     @property
     def model(self):
-        """Model of the run."""
+        """Model of the plan, which names rig, friction and accuracy."""
         return self.inputs.plan.model
 
     @property
@@ -268,6 +268,8 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
 
     Such a motion has its own period, because the drive is not periodic. The result is 0 if there is
     no period, or if the run is shorter than two windows.
+
+    model, numerics: the rig, and its settings with the cycles of the run; solution: its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):

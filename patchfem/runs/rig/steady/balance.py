@@ -285,7 +285,10 @@ class BalanceFinder:
     def _compute_measures(
         self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
     ) -> tuple[Values, CycleRun]:
-        """Compute the measures of a steady motion by name, and its cycle, from samples."""
+        """Compute the measures of a steady motion by name, and its cycle, from samples.
+
+        motion, drive: solution of the balance, and the sinusoidal drive; samples: number per cycle.
+        """
         window = make_cycle_response(motion, self.modes, drive, samples)
         energies = find_cycle_energies(motion, self.modes)
         speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)

@@ -209,7 +209,10 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
-    """Return the differences of all measures between a curve point and a Solution."""
+    """Return the differences of all measures between a curve point and a Solution; {} if the point has no steady motion.
+
+    finder: computes steady motions; neighbour: curve point with drive and first guess; solution: motion at the peak.
+    """
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)
     except NotConverged:
