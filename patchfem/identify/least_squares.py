@@ -202,7 +202,12 @@ def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
 def _assemble_fit(
     model: UnitCubeResidual, best: Descent, descent_rms: np.ndarray, kind: str
 ) -> Fit:
-    """Return the result of a fit from its best descent; `kind` is a value of `IntervalKind`."""
+    """Return the result of a fit from its best descent.
+
+    model, best: the residual, and the descent with the smallest sum of squares.
+    descent_rms: root mean square of the residual after each descent.
+    kind: value of `IntervalKind`.
+    """
     u = best.u
     cost = best.cost
     intervals = None
@@ -228,6 +233,8 @@ def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarr
 
     A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are
     fitted again. Returns the point u (n,) and the sum of squares.
+
+    model: the residual; u, cost: (n,) point in the unit cube, and its sum of squares.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
     belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)
