@@ -136,7 +136,10 @@ def _make_quantities(backbone: Backbone) -> Quantities:
 
 
 def _take(curve: Curve, name: str, k: int) -> Quantity:
-    """Return a value of point k of a curve with its error."""
+    """Return a value of point k of a curve with its error.
+
+    curve, name: a backbone curve, and one of its columns, such as "frequency" or "damping".
+    """
     return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
 
 
@@ -250,6 +253,8 @@ def _make_details(backbone: Backbone) -> JsonObject:
     curves = {}
     for method, curve in backbone.curves.items():
         curves[method] = {name: getattr(curve, name) for name in COLUMNS}
+
+    # A backbone without a band has None in place of its method and columns
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
@@ -271,6 +276,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
     """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
     axis = cases.axis
     verdict, measures = _compare_ends(cases)
+    # The page compares the ends of the values; the file has measures and curves of each value
     return Answer(
         kind="backbone",
         title=cases.source.title,
@@ -357,7 +363,10 @@ def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | 
 
 
 def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
-    """Return the change of the frequency or of the damping ratio between two values as a clause."""
+    """Return the change of the frequency or of the damping ratio between two values as a clause.
+
+    name: "frequency" or "damping"; step: the change with its error; ends: first and last value [SI].
+    """
     texts = [format_quantity(value, UNITS[name], DIGITS[name]) for value in ends]
     if abs(step.value) <= step.error:
         return f"keeps the {NAMES[name]} at {texts[0]}"

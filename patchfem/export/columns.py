@@ -129,6 +129,7 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
 def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
     """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
 
+    rows, column: cells by name of all rows, and the column with its heading and style.
     part: of the quantities: "value", "low" or "high".
     """
     heading = column.heading

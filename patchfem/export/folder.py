@@ -106,6 +106,10 @@ class Folder:
             raise
 
     def __exit__(self, kind, value, trace) -> None:
+        """Put the results in place, or give the partial folder up after an error; the lock is released in any case.
+
+        kind, value, trace: type of the error, the error and its traceback; None without an error.
+        """
         with defer_signals():
             try:
                 if kind is not None:

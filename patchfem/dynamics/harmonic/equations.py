@@ -239,6 +239,7 @@ class HarmonicBalance:
             drive = abs(level) * float(np.linalg.norm(equations.by_level))
             return float(np.linalg.norm(residual)) <= MAX_RESIDUAL * (size + drive)
 
+        # A step also vanishes at a least-squares minimum that is no solution, which `is_solved` refuses
         solution = solve_damped(lambda v: self.evaluate(v, omega, level), x, is_solved, max_steps)
         if solution is None:
             count = (x.size // len(self.rows) - 1) // 2

@@ -54,7 +54,7 @@ def _make_layout(panel: Panel) -> Figure:
 
 
 def _make_axis_layout(axis) -> Figure:
-    """Return the layout of an axis."""
+    """Return the title and the scale of an `Axis` as plotly.js takes them."""
     return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
 
 
@@ -85,7 +85,10 @@ def _make_traces(panel: Panel) -> list[Figure]:
 
 
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
-    """Return the trace of a curve, and that of its error band if it is drawn as a line."""
+    """Return the trace of a curve, and that of its error band if it is drawn as a line.
+
+    curve, style: data in display units, and style of the panel; colour: of line, symbols and band.
+    """
     trace = {
         "x": curve.x,
         "y": curve.y,

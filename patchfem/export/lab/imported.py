@@ -95,7 +95,10 @@ def convert_file(
 
 
 def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
-    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use."""
+    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use.
+
+    out, settings: file to write, and options of the estimates; zero: whether --zero is given.
+    """
     endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
     form = endings.get(out.suffix.lower())
     if form is None:
@@ -183,7 +186,10 @@ def _write_decay(
 def _write_modes(
     modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
 ) -> dict[str, object]:
-    """Write identified modes as tables of a scene."""
+    """Write identified modes as tables of a scene; return what the command prints.
+
+    modes, out: identified modes, and file to write; source: name of the file of records; notes: on these records.
+    """
     write_text(out, format_structure(modes, source))
     columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
     entries = [
@@ -255,7 +261,10 @@ def _refuse_modal_data(file: Path) -> None:
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Convert the text of an option to SI; None if it is ""."""
+    """Convert the text of an option to SI; None if it is "".
+
+    text, kind: number with a unit, and kind of quantity, such as "time"; option: its name, for an error message.
+    """
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:

@@ -40,7 +40,11 @@ TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
 
 
 class Mean(NamedTuple):
-    """Mean of a parameter over several files, and the standard deviation of the files about it."""
+    """Mean of a parameter over several files.
+
+    - mean: with its interval
+    - scatter: standard deviation of the files about it, in the unit of the mean
+    """
 
     mean: Quantity
     scatter: float
@@ -150,7 +154,10 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
 
 
 def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> JsonObject:
-    """Return the means of one kind of files as an object of profile.json."""
+    """Return the means of one kind of files as an object of profile.json.
+
+    kind, count: kind and number of the files; means: by name of the parameter; notes: on what the means are worth.
+    """
     measures = {}
     for name, mean in means.items():
         measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
