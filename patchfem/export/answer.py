@@ -157,13 +157,13 @@ def to_plain(content):
     elif isinstance(content, Quantity):
         content = content.as_json()
     elif is_dataclass(content):
-        content = {one.name: getattr(content, one.name) for one in fields(content)}
+        content = {entry.name: getattr(content, entry.name) for entry in fields(content)}
     elif hasattr(content, "_asdict"):
         content = content._asdict()
     if isinstance(content, dict):
-        return {key: to_plain(one) for key, one in content.items()}
+        return {key: to_plain(entry) for key, entry in content.items()}
     if isinstance(content, list | tuple):
-        return [to_plain(one) for one in content]
+        return [to_plain(entry) for entry in content]
     return _finite_or_none(content) if isinstance(content, float) else content
 
 

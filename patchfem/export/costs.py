@@ -84,11 +84,11 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     details = {}
     for one, curve in curves.items():
         names = find_measures_with_error(curve)
-        own = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
-        rows += own
+        knob_rows = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
+        rows += knob_rows
         # the runs of a curve of tolerances have no tolerance in common
         sentence = None if one == TOLERANCE else describe_best_setting(curve, tolerance)
-        details[one] = {"runs": [describe_run(row) for row in own], "sentence": sentence}
+        details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names

@@ -308,8 +308,8 @@ class _Shooting:
 
         # Of the memories only the reversal points count, if their number is the same.
         counts = before.memory[:, Memory.COUNT, None]
-        place = np.arange(before.memory.shape[1]) - Memory.STACK
-        is_used = (place >= 0) & (place < 2 * counts)
+        stack_index = np.arange(before.memory.shape[1]) - Memory.STACK
+        is_used = (stack_index >= 0) & (stack_index < 2 * counts)
         is_used &= counts == self.state.memory[:, Memory.COUNT, None]
         changed[self.n :] &= is_used.ravel()
         return np.flatnonzero(changed)
@@ -347,10 +347,10 @@ class _Shooting:
 
         Regimes are those at the end of the period, where the motion has brought them.
         """
-        found, change = self._differentiate(before)
+        period_map, change = self._differentiate(before)
         packed = _pack(self.state, self.n)
-        step = _solve_newton(found, change, SINGULAR_TOL) * found.scale
-        packed[found.columns] = _pack(before, self.n)[found.columns] + step
+        step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
+        packed[period_map.columns] = _pack(before, self.n)[period_map.columns] + step
         self.state = _unpack(self.state, packed)
 
 

@@ -260,7 +260,8 @@ def make_system(
     # Rows of the ports; heave and pitch of a normal contact are two more.
     n = 0 if modes is None else modes.omega.size
     rows = [
-        np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets
+        np.zeros(n) if modes is None else np.asarray(point_set.row, float)
+        for point_set in contact.point_sets
     ]
     press = np.zeros(11)
     press[:2] = -1.0
@@ -269,7 +270,11 @@ def make_system(
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows, float).reshape(len(rows), n)
 
-    laws = {float(law) for one in contact.point_sets for law in np.unique(one.law.numbers[0])}
+    laws = {
+        float(law)
+        for point_set in contact.point_sets
+        for law in np.unique(point_set.law.numbers[0])
+    }
     has_events = bool(laws & {Law.COULOMB, Law.TANH})
     levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
@@ -347,7 +352,7 @@ def make_system(
 def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
     # Numbers, memory and loads of the laws of all points.
-    laws = [one.law for one in contact.point_sets]
+    laws = [point_set.law for point_set in contact.point_sets]
     counts = [law.numbers[0].size for law in laws]
     numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
     memory = _join_columns(N_MEMORY, [law.memory for law in laws])
@@ -363,21 +368,21 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 
     # Nodes, shares of the load and shear shapes of each set of points.
     nodes = np.full(loads.size, RESULTANT, np.int64)
-    place = np.zeros(loads.size)
+    position = np.zeros(loads.size)
     shapes = np.zeros((0, loads.size))
     stiffness = np.zeros(0)
     first = 0
-    for one, count in zip(contact.point_sets, counts):
-        own = slice(first, first + count)
-        if one.nodes is not None:
-            nodes[own] = one.nodes
-        if one.shares is not None:
-            share[own] = one.shares
-            place[own] = one.places
-        if one.shear is not None:
-            shapes = np.zeros((len(one.shear.stiffness), loads.size))
-            shapes[:, own] = np.asarray(one.shear.shape).T
-            stiffness = np.array(one.shear.stiffness, float)
+    for point_set, count in zip(contact.point_sets, counts):
+        set_rows = slice(first, first + count)
+        if point_set.nodes is not None:
+            nodes[set_rows] = point_set.nodes
+        if point_set.shares is not None:
+            share[set_rows] = point_set.shares
+            position[set_rows] = point_set.places
+        if point_set.shear is not None:
+            shapes = np.zeros((len(point_set.shear.stiffness), loads.size))
+            shapes[:, set_rows] = np.asarray(point_set.shear.shape).T
+            stiffness = np.array(point_set.shear.stiffness, float)
         first = first + count
 
     shear = np.zeros((len(Shear), stiffness.size))
@@ -396,8 +401,8 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         shapes,
         stiffness,
         shear,
-        np.repeat([one.is_spring for one in contact.point_sets], counts).astype(bool),
-        place,
+        np.repeat([point_set.is_spring for point_set in contact.point_sets], counts).astype(bool),
+        position,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
 
@@ -685,13 +690,13 @@ class March:
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
         sampled = np.zeros(works.size)
-        for k, one in enumerate(self.contact.point_sets):
-            if one.is_spring:
+        for k, point_set in enumerate(self.contact.point_sets):
+            if point_set.is_spring:
                 continue
             columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
-            is_rigid = (one.law.numbers[0] == Law.COULOMB).all()
+            is_rigid = (point_set.law.numbers[0] == Law.COULOMB).all()
             mean = columns[:-1, 2] if is_rigid else None
-            slide = samples[:, : n // 2] @ np.asarray(one.row, float)
+            slide = samples[:, : n // 2] @ np.asarray(point_set.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
         self.work_sums += float(sampled.sum()), float(np.abs(works).sum())
 
@@ -699,11 +704,11 @@ class March:
         """Return the state of the interface at the end of the last step, whose sample is given."""
         n = self.modes.omega.size
         row = self.system.ports.rows[0]
-        rest = sample[2 * n :]
+        remainder = sample[2 * n :]
         time = (self.done + self.shift) * self.step
-        motion = (time, float(row @ sample[:n]), *rest[Sample.PORTS : Sample.PORTS + 2])
+        motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
         return make_snapshot(
-            self.kernels, self.system, (*motion, rest[Sample.HEAVE], rest[Sample.PITCH])
+            self.kernels, self.system, (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
         )
 
     def find_ledger(self, sample) -> dict[str, float]:
@@ -1187,7 +1192,7 @@ def make_histories(run: March, rows) -> Response:
     sets = contact.point_sets
     columns = rows[:, first : first + N_PORT_COLUMNS * len(sets)]
     columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
-    port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
+    port_rows = np.array([point_set.row for point_set in sets], float).reshape(len(sets), n)
 
     push = run.drive.values(time)
     forces = columns[..., 0]
@@ -1205,7 +1210,7 @@ def make_histories(run: March, rows) -> Response:
 
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
-    is_interface = np.array([not one.is_spring for one in sets], bool)
+    is_interface = np.array([not point_set.is_spring for point_set in sets], bool)
     if len(sets) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
         if is_interface.any():
@@ -1219,9 +1224,9 @@ def make_histories(run: March, rows) -> Response:
         extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
 
     if is_interface.any():
-        own = int(np.flatnonzero(is_interface)[0])
-        interface = slides[:, own], rates[:, own], forces[:, own], columns[:, own, 1]
+        face = int(np.flatnonzero(is_interface)[0])
+        interface = slides[:, face], rates[:, face], forces[:, face], columns[:, face, 1]
     else:
-        still = np.zeros(len(rows))
-        interface = z @ modes.slide, rate @ modes.slide, still, z @ modes.slide
+        zeros = np.zeros(len(rows))
+        interface = z @ modes.slide, rate @ modes.slide, zeros, z @ modes.slide
     return make_response(modes, run.drive, push, (time, z, rate), pull, interface, extra)

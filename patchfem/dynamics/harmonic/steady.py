@@ -98,12 +98,12 @@ def _choose_counts(drive, group: LawGroup, harmonics: int | None, start) -> list
     if harmonics is not None:
         return [harmonics, harmonics]
     if isinstance(start, SteadyMotion):
-        least = start.harmonics / 2
+        min_count = start.harmonics / 2
     else:
         # Inertia dominates the contact stiffness in higher harmonics.
         stiffness = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1)))
-        least = min(np.sqrt(stiffness / group.modes.mass) / drive.omega, MAX_FIRST_COUNT)
-    return [h for h in HARMONIC_COUNTS if h >= int(least)]
+        min_count = min(np.sqrt(stiffness / group.modes.mass) / drive.omega, MAX_FIRST_COUNT)
+    return [h for h in HARMONIC_COUNTS if h >= int(min_count)]
 
 
 def find_amplitudes(slides) -> np.ndarray:

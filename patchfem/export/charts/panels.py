@@ -72,13 +72,13 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
 
     curves = []
     for label, data in selected.items():
-        own = []
+        panel_curves = []
         for names in (chart.y, chart.lines):
             for name, own_x in _split_names(names):
                 drawn = _make_curves(data, chart, name, own_x, axes)
-                own += [replace(curve, is_line=names is chart.lines) for curve in drawn]
-        for curve in own:
-            name = join_names(label, curve.name if len(own) > 1 else "")
+                panel_curves += [replace(curve, is_line=names is chart.lines) for curve in drawn]
+        for curve in panel_curves:
+            name = join_names(label, curve.name if len(panel_curves) > 1 else "")
             curves.append(replace(curve, name=name))
     marks = [_as_floats(first[name]).ravel() for name in chart.marks.split() if name in first]
     marks = np.concatenate([*marks, np.zeros(0)]) * axes[0].scale
@@ -168,9 +168,11 @@ def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
     data: variables by name; dimension, indices: name of a dimension, and positions along it.
     """
     taken = {
-        name: replace(one, values=np.take(one.values, indices, axis=one.dims.index(dimension)))
-        for name, one in data.items()
-        if dimension in one.dims
+        name: replace(
+            variable, values=np.take(variable.values, indices, axis=variable.dims.index(dimension))
+        )
+        for name, variable in data.items()
+        if dimension in variable.dims
     }
     return data | taken
 
@@ -216,8 +218,11 @@ def _name_elements(data: Variables, dimension: str) -> list[str]:
     """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers."""
     coordinate = data.get(dimension)
     if coordinate is None:
-        sizes = (dict(zip(one.dims, one.values.shape, strict=True)) for one in data.values())
-        size = next(one[dimension] for one in sizes if dimension in one)
+        sizes = (
+            dict(zip(variable.dims, variable.values.shape, strict=True))
+            for variable in data.values()
+        )
+        size = next(variable[dimension] for variable in sizes if dimension in variable)
         return [f"{dimension} {number}" for number in range(1, size + 1)]
     # the last part of a key, such as "load 4 kN"
     title = coordinate.text.rpartition(".")[2].replace("_", " ") or dimension.replace("_", " ")

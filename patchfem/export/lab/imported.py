@@ -139,13 +139,13 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     dict
         Number of rows, units, notes, and a text on what was written.
     """
-    found = laboratory.read_records(file, records.parse_requests(requests))
-    values = records.shift_to_zero(found.values) if zero else found.values
+    file_records = laboratory.read_records(file, records.parse_requests(requests))
+    values = records.shift_to_zero(file_records.values) if zero else file_records.values
     units = {name: SI_UNITS[name] for name in values}
     write_text(out, format_csv({f"{name} [{units[name]}]": one for name, one in values.items()}))
     rows = next(iter(values.values())).size
     told = f"{rows} rows of {', '.join(values)}"
-    return {"rows": rows, "units": units, "notes": found.notes, "told": told}
+    return {"rows": rows, "units": units, "notes": file_records.notes, "told": told}
 
 
 def _write_decay(
@@ -234,14 +234,14 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
 
 def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
     """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
-    found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
+    file_records = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS
-    if found.channel_list and not found.values.keys() & responses.keys():
+    if file_records.channel_list and not file_records.values.keys() & responses.keys():
         raise PatchfemError(
             f"{file}: no channel is known as a response ({', '.join(responses)}); choose one with --map "
-            f"{next(iter(responses))}=CHANNEL among {found.channel_list}"
+            f"{next(iter(responses))}=CHANNEL among {file_records.channel_list}"
         )
-    return found.values, found.notes
+    return file_records.values, file_records.notes
 
 
 def _refuse_modal_data(file: Path) -> None:
