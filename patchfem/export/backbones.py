@@ -26,6 +26,7 @@ from .charts import axes
 from .netcdf import from_dataset
 from .runs import make_origin
 
+# Columns of a curve and of its band, their units, and words for them in a sentence
 COLUMNS = (
     "amplitude",
     *(name + end for name in VALUES for end in ("", "_error")),

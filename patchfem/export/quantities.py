@@ -26,7 +26,7 @@ LADDERS = UNIT_LADDERS | {
     "m2 N-1": (("m^2/N", 1.0),),
     "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
 }
-DEGREES = ("deg", 57.29577951308232)
+DEGREES = ("deg", 57.29577951308232)  # display unit of angles, and degrees in a radian
 
 KEY = tuple(
     """

@@ -71,7 +71,7 @@ HEADLINES = {
         ("approach", "approach {}"),
     ),
 }
-MAX_PARTS = 3
+MAX_PARTS = 3  # largest number of measures in a headline
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:

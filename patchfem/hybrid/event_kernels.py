@@ -54,7 +54,7 @@ VERTEX_FRACTION = (
     0.2  # a vertex is evaluated if it lies below this fraction of the margins beside it
 )
 ROOT_TOL = 1e-14  # error of the time of an event, relative to the length of its step
-MAX_ROOT_STEPS = 60
+MAX_ROOT_STEPS = 60  # iterations of the search for the time of an event
 FIRST_LOOK = 1e-5  # fraction of an interval, behind a margin that starts at 0
 
 

@@ -54,7 +54,7 @@ REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the mod
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
 MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
-STRIP_BYTES = 8 * N_ROWS
+STRIP_BYTES = 8 * N_ROWS  # memory of a strip
 LONG_LIST_ADVICE = (
     'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 )

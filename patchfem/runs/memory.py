@@ -54,6 +54,7 @@ class HistoryBytes(NamedTuple):
     turn: float
 
 
+# Memory of the histories by engine
 HISTORY_BYTES = {
     "hybrid": HistoryBytes(80.0, 140.0, 16.0),
     "march": HistoryBytes(45.0, 50.0, 18.0),

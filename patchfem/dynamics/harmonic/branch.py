@@ -17,6 +17,7 @@ from .steady import (
     make_motion,
 )
 
+# Steps along a response curve
 PATH = PathSettings(first_step=0.0125, max_step=0.05)
 # Ratio of the harmonics of the first motion, which meet the tolerance alone, to those of the first curve.
 FIRST_REDUCTION = 4

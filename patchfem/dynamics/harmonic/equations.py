@@ -33,7 +33,7 @@ MIN_FRACTION = 0.02  # smallest fraction of a Newton step
 MAX_RESIDUAL = (
     1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
 )
-MAX_DAMPED_STEPS = 40
+MAX_DAMPED_STEPS = 40  # largest number of Newton steps
 
 
 class Motion(NamedTuple):

@@ -13,7 +13,7 @@ COLOURS = (
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
-BAND_OPACITY = 0.18
+BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]

@@ -15,7 +15,8 @@ from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import add_yielding_notes, compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 
-NAME = "fields.vtkhdf"
+NAME = "fields.vtkhdf"  # name of the file in a results folder
+# Version of the format VTKHDF
 VERSION = np.array([2, 2])
 # Fields that every file has, by part.
 REQUIRED_FIELDS = {

@@ -58,11 +58,12 @@ from .solution import (
 LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
-EARLY_SAMPLES_PER_CYCLE = 40
+EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 # Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
 STRIP_GROUPS = ("curve", "run", "error")
+# Outcomes of motions that the engine ends early, by its status
 EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
