@@ -189,6 +189,7 @@ class _Relay:
         speeds = self.find_reversal_speeds(half_periods)
 
         def find_speed(half_period: float) -> float:
+            """Return the velocity of the slide at the reversal for a half period [s], as `find_reversal_speeds`."""
             return float(self.find_reversal_speeds(np.array([half_period]))[0])
 
         cycles = []
@@ -208,8 +209,8 @@ class _Relay:
         n = row.size
         output = self.modes.output
         times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
-        away = self.find_reversals([half_period])[:, 0] - self.rest
-        path = (away * np.exp(np.outer(times, self.rates)) + self.rest) @ self.vectors.T
+        deviation = self.find_reversals([half_period])[:, 0] - self.rest
+        path = (deviation * np.exp(np.outer(times, self.rates)) + self.rest) @ self.vectors.T
         path = path.real
 
         # The slide is falling, and at its start the interface needs a force -m a to stay at rest.
@@ -226,7 +227,7 @@ class _Relay:
 
         # A time shift of the reversal absorbs part of a perturbation, so the map is from reversal to reversal.
         growth = np.exp(half_period * self.rates)
-        speed = (self.vectors @ (self.rates * growth * away)).real
+        speed = (self.vectors @ (self.rates * growth * deviation)).real
         step = ((self.vectors * growth) @ np.linalg.inv(self.vectors)).real
         face = np.append(np.zeros(n), row)
         reversal_map = step - np.outer(speed, face @ step) / (face @ speed)
@@ -423,13 +424,13 @@ def _find_undamped_motions(
     amplitudes, start = path
     samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])
     equations = FreeBalance(HarmonicBalance(modes, group, samples), mode, harmonics)
-    found = find_free_motions(equations, amplitudes, mode=start)
-    if None in found:
+    motions = find_free_motions(equations, amplitudes, mode=start)
+    if None in motions:
         return None
 
     # Where the damping changes its sign, a motion without damping lies between two others.
     cycles = []
-    for low, high in pairwise(found):
+    for low, high in pairwise(motions):
         if np.sign(low.motion.zeta) * np.sign(high.motion.zeta) < 0:
             share = low.motion.zeta / (low.motion.zeta - high.motion.zeta)
             guess = low.unknowns + share * (high.unknowns - low.unknowns)

@@ -12,7 +12,12 @@ import numpy as np
 
 
 class Definition(NamedTuple):
-    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
+    """Definition of a quantity.
+
+    - unit: SI unit; "1" for a ratio
+    - text: meaning
+    - digits: number of digits that are displayed of a value without an error
+    """
 
     unit: str
     text: str
@@ -152,19 +157,23 @@ def to_plain(content):
     elif isinstance(content, Quantity):
         content = content.as_json()
     elif is_dataclass(content):
-        content = {one.name: getattr(content, one.name) for one in fields(content)}
+        content = {entry.name: getattr(content, entry.name) for entry in fields(content)}
     elif hasattr(content, "_asdict"):
         content = content._asdict()
     if isinstance(content, dict):
-        return {key: to_plain(one) for key, one in content.items()}
+        return {key: to_plain(entry) for key, entry in content.items()}
     if isinstance(content, list | tuple):
-        return [to_plain(one) for one in content]
+        return [to_plain(entry) for entry in content]
     return _finite_or_none(content) if isinstance(content, float) else content
 
 
 @dataclass(frozen=True, slots=True)
 class Remarks:
-    """Warnings about numerical trust, and notes about what the model leaves out."""
+    """Sentences beside the verdict of an answer.
+
+    - warnings: about numerical trust
+    - notes: about what the model leaves out
+    """
 
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -187,6 +196,7 @@ class Answer:
     data : dict of str to Variable
         Arrays by name. NAME_error is the error band of NAME, NAME_low and NAME_high are the ends of its interval.
     remarks : Remarks
+        Warnings and notes for the page and the screen.
     details : dict
         JSON keys of the verb: further keys of summary.json for a run; the content of NAME.json for another verb. Records and
         arrays become objects and lists, as in `to_plain`.

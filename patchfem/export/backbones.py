@@ -26,6 +26,7 @@ from .charts import axes
 from .netcdf import from_dataset
 from .runs import make_origin
 
+# Columns of a curve and of its band, their units, and words for them in a sentence
 COLUMNS = (
     "amplitude",
     *(name + end for name in VALUES for end in ("", "_error")),
@@ -136,7 +137,10 @@ def _make_quantities(backbone: Backbone) -> Quantities:
 
 
 def _take(curve: Curve, name: str, k: int) -> Quantity:
-    """Return a value of point k of a curve with its error."""
+    """Return a value of point k of a curve with its error.
+
+    curve, name: a backbone curve, and one of its columns, such as "frequency" or "damping".
+    """
     return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
 
 
@@ -208,16 +212,19 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
     for method in METHODS:
-        bands = [one.band if one.band and one.band.method == method else None for one in backbones]
-        curves = [one.curves.get(method) for one in backbones]
+        bands = [
+            backbone.band if backbone.band and backbone.band.method == method else None
+            for backbone in backbones
+        ]
+        curves = [backbone.curves.get(method) for backbone in backbones]
         if axis is not None:
             curves = [curve if band else None for curve, band in zip(curves, bands, strict=True)]
-        known = [curve.amplitude for curve in curves if curve is not None]
-        if not known:
+        known_amplitudes = [curve.amplitude for curve in curves if curve is not None]
+        if not known_amplitudes:
             continue
 
         # a row for each backbone
-        amplitude = np.unique(np.concatenate(known))
+        amplitude = np.unique(np.concatenate(known_amplitudes))
         prefix = method.replace("-", "_")
         columns = {f"{prefix}_amplitude": (amplitude, "m")}
         for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
@@ -250,6 +257,8 @@ def _make_details(backbone: Backbone) -> JsonObject:
     curves = {}
     for method, curve in backbone.curves.items():
         curves[method] = {name: getattr(curve, name) for name in COLUMNS}
+
+    # A backbone without a band has None in place of its method and columns
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
@@ -271,6 +280,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
     """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
     axis = cases.axis
     verdict, measures = _compare_ends(cases)
+    # The page compares the ends of the values; the file has measures and curves of each value
     return Answer(
         kind="backbone",
         title=cases.source.title,
@@ -294,13 +304,13 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
 def _list_notes(cases: BackboneCases) -> list[str]:
     """Return the notes of all backbones, those that they do not share with the value of the key."""
     axis = cases.axis
-    known = [one.notes for one in cases.backbones]
-    shared = [note for note in known[0] if all(note in notes for notes in known)]
+    notes_by_case = [case_backbone.notes for case_backbone in cases.backbones]
+    shared = [note for note in notes_by_case[0] if all(note in notes for notes in notes_by_case)]
     notes = [*map(_make_sentence, shared)]
     for text, backbone in zip(axis.texts, cases.backbones):
-        own = [note for note in backbone.notes if note not in shared]
-        own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
-        notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
+        case_notes = [note for note in backbone.notes if note not in shared]
+        case_notes += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
+        notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in case_notes]
     return notes
 
 
@@ -325,16 +335,16 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     for name in VALUES:
         error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
         changes[name] = getattr(end, name) - getattr(start, name), error
-    place = _find_largest_change([changes[name] for name in NAMES])
-    if place is None:
+    point = _find_largest_change([changes[name] for name in NAMES])
+    if point is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
-    amplitude = start.amplitude[place]
+    amplitude = start.amplitude[point]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
-        measures[f"{name}_change"] = Quantity(step[place], UNITS[name], error[place])
+        measures[f"{name}_change"] = Quantity(step[point], UNITS[name], error[point])
 
-    ends = {name: [_take(curve, name, place).value for curve in (start, end)] for name in VALUES}
+    ends = {name: [_take(curve, name, point).value for curve in (start, end)] for name in VALUES}
     parts = [_describe_step(name, measures[f"{name}_change"], ends[name]) for name in NAMES]
     sentences = [f"{subject}, at {format_quantity(amplitude, 'm', 3)}, {parts[0]} and {parts[1]}."]
     if None not in ends["force"]:
@@ -357,7 +367,10 @@ def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | 
 
 
 def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
-    """Return the change of the frequency or of the damping ratio between two values as a clause."""
+    """Return the change of the frequency or of the damping ratio between two values as a clause.
+
+    name: "frequency" or "damping"; step: the change with its error; ends: first and last value [SI].
+    """
     texts = [format_quantity(value, UNITS[name], DIGITS[name]) for value in ends]
     if abs(step.value) <= step.error:
         return f"keeps the {NAMES[name]} at {texts[0]}"

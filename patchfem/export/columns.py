@@ -109,16 +109,16 @@ def format_curves(answer: Answer) -> dict[str, str]:
 def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
     """Return the columns of a CSV file that at least one row has."""
     lists = {}
-    known = dict.fromkeys(name for row in rows for name in row)
-    columns = [Column(name, name, "bare") for name in known]
+    used_names = dict.fromkeys(name for row in rows for name in row)
+    columns = [Column(name, name, "bare") for name in used_names]
     for column in parse_columns(file.columns) if file.columns else columns:
         if column.name == "labels":  # a column for each label
             labels = [row["labels"] for row in rows]
             names = dict.fromkeys(name for one in labels for name in one)
             lists |= {name: [one.get(name, "") for one in labels] for name in names}
-        elif column.name in known:
+        elif column.name in used_names:
             lists |= _list_column(rows, column)
-    for name in known if file.has_intervals else ():
+    for name in used_names if file.has_intervals else ():
         if any(isinstance(row.get(name), Quantity) for row in rows):
             for part in ("value", "low", "high"):
                 heading = name if part == "value" else f"{name}_{part}"
@@ -129,11 +129,12 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
 def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
     """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
 
+    rows, column: cells by name of all rows, and the column with its heading and style.
     part: of the quantities: "value", "low" or "high".
     """
     heading = column.heading
     cells = [row.get(column.name) for row in rows]
-    sized = [one for one in cells if isinstance(one, Quantity)]
+    sized = [cell for cell in cells if isinstance(cell, Quantity)]
     if not sized:
         return {heading: cells}
 
@@ -141,9 +142,9 @@ def _list_column(rows: list[Cells], column: Column, part: str = "value") -> List
     unit = heading.partition("[")[2].rstrip("]")
     if not unit and column.style != "bare" and sized[0].unit not in ("", "1"):
         heading = f"{heading} [{sized[0].unit}]"
-    numbers = [getattr(one, part, None) for one in cells]
+    numbers = [getattr(cell, part, None) for cell in cells]
     scale = CSV_UNITS.get(unit, 1.0)
-    return {heading: [None if one is None else one * scale for one in numbers]}
+    return {heading: [None if cell is None else cell * scale for cell in numbers]}
 
 
 def format_csv(lists: Lists) -> str:

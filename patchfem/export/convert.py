@@ -65,7 +65,10 @@ def export_results(
 
 
 def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> None:
-    """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options."""
+    """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options.
+
+    out, frame: file to write, and number of the only frame, None for the default; histories: whether --histories is given.
+    """
     if histories:
         raise PatchfemError(
             f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
@@ -144,7 +147,10 @@ def view_results(
 
 
 def _open_window(frames: Frames, number: int, title: str) -> None:
-    """Open a window with the von Mises stress in both pieces; Missing if there is no screen."""
+    """Open a window with the von Mises stress in both pieces; Missing if there is no screen.
+
+    frames, number: fields of all frames, and index of the one to show; title: of the window.
+    """
     has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not has_screen:
         raise Missing(

@@ -84,11 +84,11 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     details = {}
     for one, curve in curves.items():
         names = find_measures_with_error(curve)
-        own = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
-        rows += own
+        knob_rows = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
+        rows += knob_rows
         # the runs of a curve of tolerances have no tolerance in common
         sentence = None if one == TOLERANCE else describe_best_setting(curve, tolerance)
-        details[one] = {"runs": [describe_run(row) for row in own], "sentence": sentence}
+        details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -169,7 +169,10 @@ def _find_main_measure(runs: list[Cost]) -> str:
 
 
 def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
-    """Return CPU time and error of a run, the tolerance of the scene, and the main measure."""
+    """Return CPU time and error of a run, the tolerance of the scene, and the main measure.
+
+    row: the run with its judgement; main: name of the measure; tolerance: relative one of the scene.
+    """
     run = row.run
     out = {
         "cpu_time": Quantity(run.seconds, "s"),
@@ -184,7 +187,10 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
 
 
 def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
-    """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too."""
+    """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too.
+
+    rows: runs with their judgements; main: name of the main measure; tolerance: relative one of the scene.
+    """
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}
     for attribute, (name, unit) in RUN_COLUMNS.items():

@@ -248,9 +248,9 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     }
     if loop.time is not None:
         columns["time"] = (loop.time, "s")
-    held = None
+    held_out = None
     if fit.held_out_rms is not None:  # these rows are drawn and scored apart
-        held = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
+        held_out = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
         columns["held_out"] = (np.where(fit.held_out, loop.reading, np.nan), unit)
 
@@ -261,7 +261,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         "rows": n_rows,
         "effective_rows": fit.keys.fit.intervals.rows,
         "rms": fit.rms,
-        "held": held,
+        "held": held_out,
         "peak": peak,
         "step_error": fit.step_error,
         "steps_between_rows": fit.steps_per_row,
@@ -378,18 +378,18 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
         places = cells.row[is_kind]
         computed = np.full(len(entries), np.nan)
         computed[places] = fit.computed[part, cells.condition[is_kind]]
-        held = np.full(len(entries), None)
-        held[places] = fit.held_out[is_kind]
+        held_out = np.full(len(entries), None)
+        held_out[places] = fit.held_out[is_kind]
         measured = np.array([row[name] for row in entries], float)
-        for row, number, is_held_out in zip(entries, computed, held, strict=True):
+        for row, number, is_held_out in zip(entries, computed, held_out, strict=True):
             row[name] = {"measured": row[name], "computed": number, "held": is_held_out}
 
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {name: (measured, unit), f"computed_{name}": (computed, unit)}
         columns[f"{name}_ratio"] = (ratio, "1")
         # ends of the line on which both are equal
-        known = np.concatenate([measured[measured > 0], computed[computed > 0]])
-        ends = [known.min(), known.max()] if known.size else []
+        positive = np.concatenate([measured[measured > 0], computed[computed > 0]])
+        ends = [positive.min(), positive.max()] if positive.size else []
         data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
 
     # codes by which the charts colour the rows

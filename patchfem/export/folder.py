@@ -106,6 +106,10 @@ class Folder:
             raise
 
     def __exit__(self, kind, value, trace) -> None:
+        """Put the results in place, or give the partial folder up after an error; the lock is released in any case.
+
+        kind, value, trace: type of the error, the error and its traceback; None without an error.
+        """
         with defer_signals():
             try:
                 if kind is not None:
@@ -187,15 +191,15 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
         raise PatchfemError(
             f"{user_path}: {folder.name} is a file, but a folder is needed; choose another -o"
         )
-    others = sorted(
+    other_files = sorted(
         path.name
         for path in folder.iterdir()
         if path.name not in allowed
         and not (is_partial_name(path.name) or is_state(path.name))
         and not (dots and path.name.startswith("."))
     )
-    if others:
+    if other_files:
         raise PatchfemError(
             f"{user_path}: {folder.name} contains files that are not {kind} "
-            f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
+            f"({', '.join(other_files[:3])}{', ...' if len(other_files) > 3 else ''}); choose another -o"
         )

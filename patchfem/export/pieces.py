@@ -21,7 +21,7 @@ from .fields.vtkhdf import Frames
 PICTURES = (".png", ".svg", ".pdf")
 FILMS = (".gif", ".mp4", ".html")
 FIGURE_SIZE = (12.0, 5.2)  # [inch]; with DPI an even number of pixels, which video formats need
-DPI = 100
+DPI = 100  # pixels per inch
 FILM_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
 FRAME_RATE_LIMITS = (3.0, 25.0)  # [1/s]
 DRAWN_MOTION_FRACTION = 0.05  # largest motion as drawn, over the height of the contact window

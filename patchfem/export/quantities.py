@@ -26,7 +26,7 @@ LADDERS = UNIT_LADDERS | {
     "m2 N-1": (("m^2/N", 1.0),),
     "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
 }
-DEGREES = ("deg", 57.29577951308232)
+DEGREES = ("deg", 57.29577951308232)  # display unit of angles, and degrees in a radian
 
 KEY = tuple(
     """
@@ -254,7 +254,10 @@ def format_value(value: float | str, unit: str, digits: int = 4, name: str = "")
 
 
 def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) -> str:
-    """Return a value, in its display unit, with the ends of its interval in brackets."""
+    """Return a value, in its display unit, with the ends of its interval in brackets.
+
+    value, unit: in display units; quantity: has the ends in SI units; scale: display units in one SI unit.
+    """
     ends = [None if end is None else end * scale for end in (quantity.low, quantity.high)]
     if None in ends:
         limit = f"at least {ends[0]:.3g}" if ends[1] is None else f"at most {ends[1]:.3g}"

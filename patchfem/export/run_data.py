@@ -241,7 +241,10 @@ def collect_data(result: Result) -> Variables:
 
 
 def _read_row(result: Result, name: str, row: Row) -> Variables:
-    """Return the variable of a row; codes become small integers, names become strings. {} without values."""
+    """Return the variable of a row; codes become small integers, names become strings. {} without values.
+
+    result, name: the run, and name of the variable; row: places of the values in the run, with dimensions and unit.
+    """
     found = (_look_up(result, place) for place in row.places.split())
     values = next((one for one in found if one is not None), None)
     if values is None or not np.size(values):
@@ -367,7 +370,10 @@ def _collect_patch(result: Result) -> Variables:
 
 
 def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame") -> Variables:
-    """Return positions and areas of the nodes, and the fields along x in all frames."""
+    """Return positions and areas of the nodes, and the fields along x in all frames.
+
+    fields: by name in all frames; surface: nodes of the interface; frame: name of the dimension of the frames.
+    """
     area = "area of the interface that belongs to a node, summed over all pairs of pieces"
     nodes = {
         "x": (surface.x, "m", "position along the sliding direction"),
@@ -382,7 +388,10 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
-    """Return a field along x over frames, and over strips if it has three dimensions."""
+    """Return a field along x over frames, and over strips if it has three dimensions.
+
+    name, values: of the field in `FIELDS`, in SI units; frame: name of the dimension of the frames.
+    """
     unit, text = FIELDS[name]
     dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
     return Variable(dims, np.asarray(values), unit, text, MEANINGS.get(name, ()))

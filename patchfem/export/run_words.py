@@ -71,7 +71,7 @@ HEADLINES = {
         ("approach", "approach {}"),
     ),
 }
-MAX_PARTS = 3
+MAX_PARTS = 3  # largest number of measures in a headline
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
@@ -99,7 +99,11 @@ def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> t
 
 
 def _make_headline(result: Result, measures: Quantities, details: JsonObject) -> str:
-    """Return the sentence with the key numbers of a run; "" if it has none."""
+    """Return the sentence with the key numbers of a run; "" if it has none.
+
+    result, measures: the run, and its measures; details: further keys of summary.json, of which `contact` and `cycles`
+    count.
+    """
     kind = _choose_headline(result, measures)
     parts = []
     for name, text in HEADLINES[kind]:
@@ -137,7 +141,10 @@ def _is_shown(measures: Quantities, name: str) -> bool:
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
-    """Return the dissipated energy of the interface, or of the first of several interfaces."""
+    """Return the dissipated energy of the interface, or of the first of several interfaces, as a clause; [] without it.
+
+    result, measures: the run, and its measures; text: words with a place for the energy.
+    """
     names = [
         name
         for name in measures
@@ -158,6 +165,15 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
     """Return the sentence on how a run ended.
 
     `stuck` refers to the interface as a whole: if its last cycles dissipate or slip more than their error, a part slips.
+
+    Parameters
+    ----------
+    result : Result
+        Finished run.
+    measures : dict of str to Quantity
+        Its measures.
+    details : dict
+        Further keys of summary.json, such as `run_away`, as far as they exist.
     """
     outcome = result.outcome
     if outcome is Outcome.NOT_CONVERGED and (unknown := find_unknown_measures(result.measures)):

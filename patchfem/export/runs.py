@@ -53,11 +53,11 @@ def _format_changed_keys(sets: tuple[str, ...]) -> str:
 def make_quantities(measures: dict[str, Measure]) -> Quantities:
     """Return the measures of a run as quantities."""
     quantities = {}
-    for name, one in measures.items():
-        is_unknown = one.value is not None and one.error is None
-        reason = "error unknown" if is_unknown else one.reason
+    for name, measure in measures.items():
+        is_unknown = measure.value is not None and measure.error is None
+        reason = "error unknown" if is_unknown else measure.reason
         quantities[name] = Quantity(
-            one.value, one.unit, one.error, floor=float(one.floor), reason=reason
+            measure.value, measure.unit, measure.error, floor=float(measure.floor), reason=reason
         )
     return quantities
 
@@ -153,16 +153,16 @@ def _list_effects(result: Result) -> list[JsonObject]:
     """
     patch_seconds = {} if result.patch is None else result.patch.seconds
     loop_seconds = result.seconds.get("march", result.seconds.get("bench", 0.0))
-    known = {f"contact.{name}": seconds for name, seconds in patch_seconds.items()}
-    known["contact"] = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
-    known["contact.shear"] = result.seconds.get("reduce", 0.0)
+    effect_seconds = {f"contact.{name}": seconds for name, seconds in patch_seconds.items()}
+    effect_seconds["contact"] = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
+    effect_seconds["contact.shear"] = result.seconds.get("reduce", 0.0)
     if result.plan.kind == "linear":
-        known["structure"] = loop_seconds
+        effect_seconds["structure"] = loop_seconds
 
     entries = []
     for name in result.plan.effects:
         is_law = name.startswith("friction.law=")
-        seconds = round(float(loop_seconds if is_law else known.get(name, 0.0)), 6)
+        seconds = round(float(loop_seconds if is_law else effect_seconds.get(name, 0.0)), 6)
         entries.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": seconds})
     return entries
 
@@ -184,8 +184,8 @@ def _find_run_away(result: Result) -> JsonObject:
     """Return the drive of an unsettled motion and the largest one that friction can limit [m s-2], if it is larger."""
     if result.outcome not in (Outcome.TRANSIENT, Outcome.GROWS):
         return {}
-    found = rig_plan.find_drive_and_knee(result.plan.model)
-    return found if found and found["drive"] > found["knee"] else {}
+    levels = rig_plan.find_drive_and_knee(result.plan.model)
+    return levels if levels and levels["drive"] > levels["knee"] else {}
 
 
 def _find_loss_factor(result: Result) -> JsonObject:

@@ -18,7 +18,12 @@ class RelaxedStretch(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Force of a friction law [N], and its derivatives by the stretch [N/m] and the velocity [N s/m]."""
+    """Force of a friction law at a stretch and a velocity.
+
+    - force: [N]
+    - force_by_stretch: its derivative by the stretch [N/m]
+    - force_by_velocity: its derivative by the velocity [N s/m]
+    """
 
     force: float
     force_by_stretch: float

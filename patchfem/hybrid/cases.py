@@ -61,7 +61,12 @@ class Load(NamedTuple):
 
 
 class Interface(NamedTuple):
-    """Law and load of an interface with its slide (n,) per unit of the modes."""
+    """Law and load of an interface.
+
+    - law: friction law with its numbers and initial states
+    - load: normal load, constant or varying
+    - slide: (n,) relative displacement per unit of the modes
+    """
 
     law: LawNumbers
     load: Load

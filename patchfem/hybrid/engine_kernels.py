@@ -61,7 +61,7 @@ MIN_PARTICIPATION = (
     1e-150  # of a mode in a slide or in the output, so that a mode without any has no error
 )
 MIN_CONTRACTION = 1e-3  # smallest ratio of two changes over a cycle that is assumed
-MAX_CONTRACTION = 0.9999
+MAX_CONTRACTION = 0.9999  # largest ratio of two changes over a cycle that is assumed
 SAME_PHASE_TOL = 1e-6  # difference of two phases that count as equal [cycles]
 MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
 REPEAT_TOL = (

@@ -26,7 +26,12 @@ from .table_kernels import switch_law, write_law_margins
 
 
 class StepEvent(NamedTuple):
-    """Fraction of a step at an event, its interface (-1: there is no event) and its margin."""
+    """First event of a step.
+
+    - fraction: of the step, 0 to 1, at the event
+    - face: number of its interface; -1 without an event
+    - which: `Margin` that vanishes there
+    """
 
     fraction: float
     face: int
@@ -49,7 +54,7 @@ VERTEX_FRACTION = (
     0.2  # a vertex is evaluated if it lies below this fraction of the margins beside it
 )
 ROOT_TOL = 1e-14  # error of the time of an event, relative to the length of its step
-MAX_ROOT_STEPS = 60
+MAX_ROOT_STEPS = 60  # iterations of the search for the time of an event
 FIRST_LOOK = 1e-5  # fraction of an interval, behind a margin that starts at 0
 
 

@@ -171,7 +171,7 @@ def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, flo
     damping = np.nan
     if case.first_stiffness > 0:
         damping = loop_area / (2 * np.pi * case.first_stiffness * half_range**2)
-    found = {
+    values = {
         "equivalent_stiffness": (force / slide).real,
         "harmonic_force_ratio": abs(force / slide),
         "secant_stiffness": slopes.mean() if slopes.size else np.nan,
@@ -179,5 +179,5 @@ def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, flo
     }
     if len(cycles) > 1:
         means = cycles[:, Cycle.SLIDE] / case.rig.settings[Setting.PERIOD]
-        found["drift_per_cycle"] = (means[-1] - means[0]) / (len(cycles) - 1)
-    return found
+        values["drift_per_cycle"] = (means[-1] - means[0]) / (len(cycles) - 1)
+    return values

@@ -308,8 +308,8 @@ class _Shooting:
 
         # Of the memories only the reversal points count, if their number is the same.
         counts = before.memory[:, Memory.COUNT, None]
-        place = np.arange(before.memory.shape[1]) - Memory.STACK
-        is_used = (place >= 0) & (place < 2 * counts)
+        stack_index = np.arange(before.memory.shape[1]) - Memory.STACK
+        is_used = (stack_index >= 0) & (stack_index < 2 * counts)
         is_used &= counts == self.state.memory[:, Memory.COUNT, None]
         changed[self.n :] &= is_used.ravel()
         return np.flatnonzero(changed)
@@ -347,15 +347,20 @@ class _Shooting:
 
         Regimes are those at the end of the period, where the motion has brought them.
         """
-        found, change = self._differentiate(before)
+        period_map, change = self._differentiate(before)
         packed = _pack(self.state, self.n)
-        step = _solve_newton(found, change, SINGULAR_TOL) * found.scale
-        packed[found.columns] = _pack(before, self.n)[found.columns] + step
+        step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
+        packed[period_map.columns] = _pack(before, self.n)[period_map.columns] + step
         self.state = _unpack(self.state, packed)
 
 
 class _Map(NamedTuple):
-    """Linear map of a period: indices (k,) and scales (k,) of the unknowns, and derivatives (k, k) in scaled unknowns."""
+    """Linear map of a period in k scaled unknowns.
+
+    - columns: (k,) indices of the unknowns in the packed state and memory
+    - slopes: (k, k) derivatives of the end of the period by its start
+    - scale: (k,) sizes of the unknowns, by which they are divided
+    """
 
     columns: np.ndarray
     slopes: np.ndarray
@@ -365,7 +370,8 @@ class _Map(NamedTuple):
 def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).
 
-    The matrix is singular where a state does not matter, such as bonds that have long been forgotten.
+    linear: map of the period; rcond: singular values below this fraction of the largest one count as 0. The matrix is
+    singular where a state does not matter, such as bonds that have long been forgotten.
     """
     return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 

@@ -415,7 +415,12 @@ class Point(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """Friction force [N], irreversible part of the velocity [m/s] and dissipated power [W]."""
+    """Friction force of a law, and what it dissipates.
+
+    - force: [N]
+    - slip_rate: irreversible part of the velocity [m/s]
+    - loss: dissipated power [W]
+    """
 
     force: float
     slip_rate: float

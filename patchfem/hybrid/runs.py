@@ -129,8 +129,8 @@ class Motion:
                 "slips": slips,
             }
 
-        still = np.zeros(time.size)
-        interface = (z @ modes.slide, rate @ modes.slide, still, still)
+        zeros = np.zeros(time.size)
+        interface = (z @ modes.slide, rate @ modes.slide, zeros, zeros)
         if m:
             interface = (slides[:, 0], slide_rates[:, 0], forces[:, 0], slips[:, 0])
         pull = forces @ rig.rows[0]

@@ -15,8 +15,9 @@ from ..compiled.jit import njit
 from .motion_kernels import copy_values, find_rates
 from .records import Clock
 
-N_STAGES = 12
-N_ALL_STAGES = 16
+N_STAGES = 12  # stages of a step
+N_ALL_STAGES = 16  # these, the rate at its end, and the three further stages of the dense output
+# Coefficients: weights A and times C of the stages, E3 and E5 of both error estimates, D of the dense output
 A = np.zeros((N_ALL_STAGES, N_ALL_STAGES))
 A[:12, :12] = DOP853.A
 A[12, :12] = DOP853.B
@@ -25,6 +26,7 @@ C = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
 E3 = DOP853.E3
 E5 = DOP853.E5
 D = DOP853.D
+# First row of each block of `State.rows`
 CURVE = 16
 END = 23
 POINT = 24
@@ -32,9 +34,9 @@ SPARE = 25
 RATES = 26
 CYCLE = 27
 SCALE = 29
-SAFETY = 0.9
+SAFETY = 0.9  # ratio of the next step to the one that would just meet the tolerance
 MAX_FACTOR = 4.0  # largest ratio of successive steps
-MIN_FACTOR = 0.2
+MIN_FACTOR = 0.2  # smallest ratio of successive steps
 
 
 @njit(**NJIT_KERNEL)

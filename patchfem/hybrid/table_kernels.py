@@ -10,16 +10,28 @@ from .records import Friction
 
 @njit(**NJIT_KERNEL)
 def _no_force(law, p, memory, point, s, rates):
+    """Return no force: the end of the chain of laws, for a number that none of them has.
+
+    law: number of a law in `LAWS`; p, memory, point, s, rates: arguments of the `force_and_rates` of a law.
+    """
     return Friction(0.0, 0.0, 0.0)
 
 
 @njit(**NJIT_KERNEL)
 def _no_margins(law, p, memory, point, s, margins):
+    """Write no margins, at the end of the chain of laws; the arguments are those of the `write_margins` of a law.
+
+    law: number of a law in `LAWS`; p, memory, point, s, margins: its numbers, memory, motion, states and output.
+    """
     pass
 
 
 @njit(**NJIT_KERNEL)
 def _no_switch(law, p, memory, point, s, which):
+    """Return False, at the end of the chain of laws: the regime does not change.
+
+    law: number of a law in `LAWS`; p, memory, point, s, which: its numbers, memory, motion, states, and a `Margin`.
+    """
     return False
 
 
@@ -28,6 +40,23 @@ def _choose(number: int, function, other):
 
     @njit(**NJIT_KERNEL)
     def choose(law, p, memory, point, s, last):
+        """Call the function of the law with this number, else the rest of the chain.
+
+        Parameters
+        ----------
+        law : int
+            Number of a law in `LAWS`.
+        p : (k,) array
+            Numbers of the law.
+        memory : (l,) array
+            Row of `records.State.memory`.
+        point : Point
+            Load and motion of the interface.
+        s : (j,) array
+            States of the law.
+        last : array or int
+            Rates or margins that are written, or the `Margin` at which the regime changes.
+        """
         if law == number:
             return function(p, memory, point, s, last)
         return other(law, p, memory, point, s, last)

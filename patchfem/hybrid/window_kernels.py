@@ -31,6 +31,7 @@ from .records import (
 )
 from .step_kernels import POINT, RATES, read_curve
 
+# Gauss-Lobatto rule of five points on an interval of length 1
 N_NODES = 5
 NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0])
 WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180

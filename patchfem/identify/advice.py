@@ -29,20 +29,20 @@ def advise_test(
         Words for the m tests, such as "at 143 Hz".
     """
     correlation = fit.intervals.correlation
-    known = np.flatnonzero(np.isfinite(np.diag(correlation)))
-    if not known.size or not len(places):
+    determined = np.flatnonzero(np.isfinite(np.diag(correlation)))
+    if not determined.size or not len(places):
         return ""
     # in standard deviations of the parameters, the covariance is their correlation
-    block = np.ix_(known, known)
+    block = np.ix_(determined, determined)
     before = np.linalg.pinv(correlation[block])
-    after = np.linalg.pinv(before + np.nan_to_num(information)[:, known][:, :, known])
+    after = np.linalg.pinv(before + np.nan_to_num(information)[:, determined][:, :, determined])
     sizes = np.ptp(fit.intervals.ends, axis=1) / np.maximum(np.abs(fit.values), 1e-300)
-    widest = int(np.argmax(sizes[known]))
+    widest = int(np.argmax(sizes[determined]))
     ratio = np.sqrt(after[:, widest, widest])
     best = int(np.argmin(ratio))
     if ratio[best] > 1 - MIN_INTERVAL_GAIN:
         return ""
     return (
-        f"a further measurement {places[best]} would narrow the interval of {names[known[widest]]} most, by about "
+        f"a further measurement {places[best]} would narrow the interval of {names[determined[widest]]} most, by about "
         f"{100 * (1 - ratio[best]):.0f} %"
     )

@@ -124,6 +124,8 @@ def _describe_missing_samples(time: np.ndarray, middle: float, length: float) ->
     """Return a sentence if a half cycle within the record has too few samples, else "".
 
     middle, length: midpoint and half period [s].
+
+    time: (n,) times of the samples [s], increasing.
     """
     low, high = middle - length / 2, middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])

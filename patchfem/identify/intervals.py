@@ -232,6 +232,9 @@ def _list_unknown_directions(model: UnitCubeResidual, u, free, changes) -> np.nd
 
     The directions (d, n) are relative changes with a maximum of 1. If a value at the point u is 0, they are
     changes relative to the range. changes: of the free coordinates (d, f).
+
+    model: residual with the space of the parameters; u: (n,) point in the unit cube; free: (f,) indices of its
+    coordinates inside the bounds that have an effect.
     """
     values = model.space.to_values(u)
     scale = values if values[free].all() else model.space.high - model.space.low

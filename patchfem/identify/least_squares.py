@@ -176,17 +176,17 @@ class Problem:
     def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
         """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
         n = len(self.low)
-        given = []
+        given_points = []
         if self.start is not None:
-            given = [model.space.to_unit_cube(self.start)]
-            if not np.isfinite(model.sum_of_squares(given[0])):
-                given = []
+            given_points = [model.space.to_unit_cube(self.start)]
+            if not np.isfinite(model.sum_of_squares(given_points[0])):
+                given_points = []
         trials = []
-        if max_points > 1 or not given:
+        if max_points > 1 or not given_points:
             trials = list(make_space_filling_points(N_TRIALS_PER_VALUE * n, n))
         costs = np.array([model.sum_of_squares(point) for point in trials])
         order = np.argsort(costs, kind="stable")
-        points = given + [trials[k] for k in order if np.isfinite(costs[k])]
+        points = given_points + [trials[k] for k in order if np.isfinite(costs[k])]
         if not points:
             raise NotConverged(
                 f"the model failed at all {model.counts.evaluations} starting points of the search: {model.counts.reason}"
@@ -202,7 +202,12 @@ def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
 def _assemble_fit(
     model: UnitCubeResidual, best: Descent, descent_rms: np.ndarray, kind: str
 ) -> Fit:
-    """Return the result of a fit from its best descent; `kind` is a value of `IntervalKind`."""
+    """Return the result of a fit from its best descent.
+
+    model, best: the residual, and the descent with the smallest sum of squares.
+    descent_rms: root mean square of the residual after each descent.
+    kind: value of `IntervalKind`.
+    """
     u = best.u
     cost = best.cost
     intervals = None
@@ -228,6 +233,8 @@ def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarr
 
     A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are
     fitted again. Returns the point u (n,) and the sum of squares.
+
+    model: the residual; u, cost: (n,) point in the unit cube, and its sum of squares.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
     belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)

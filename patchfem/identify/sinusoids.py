@@ -51,7 +51,7 @@ class SinusoidFit(NamedTuple):
 
     @property
     def mean_square(self) -> float:
-        """Mean square of the residual."""
+        """Mean square of the residual, by which fits are compared."""
         return np.mean(self.residual**2)
 
     @property

@@ -179,17 +179,17 @@ class UnitCubeResidual:
         """
         columns = np.zeros((len(free), self.rows))
         for column, coordinate in zip(columns, free):
-            known = []
+            evaluated = []
             for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP, 0.0):
                 point = np.array(u, float)
                 point[coordinate] += step
-                is_wanted = len(known) < 2 and not (self.is_expensive and known and step)
+                is_wanted = len(evaluated) < 2 and not (self.is_expensive and evaluated and step)
                 if is_wanted and 0 <= point[coordinate] <= 1:
                     residual = self(point)
                     if residual is not None:
-                        known.append((point[coordinate], residual))
-            if len(known) == 2:
-                (place, residual), (other_place, other) = known
+                        evaluated.append((point[coordinate], residual))
+            if len(evaluated) == 2:
+                (place, residual), (other_place, other) = evaluated
                 column[:] = (residual - other) / (place - other_place)
         return columns.T
 

@@ -407,7 +407,12 @@ def find_force(wave, case, now, numbers, memory, j):
 
 
 class Middle(NamedTuple):
-    """Slide [m], velocity [m/s] and force [N] in the middle of a step."""
+    """State of a case in the middle of a step.
+
+    - slide: relative displacement [m]
+    - velocity: relative velocity [m/s]
+    - force: friction force [N]
+    """
 
     slide: float
     velocity: float
@@ -652,9 +657,12 @@ def observe_harmonics(time, h, omega, start, now, seen):
     seen : (29,) array
         What was observed, in the order of `case_rows.Seen`; changed in place.
     """
+    # Force: parabola through both ends with the mean of the step
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
     bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
+
+    # Gauss points: the slide is the cubic Hermite polynomial of the step; cos 3x = 4 cos^3 x - 3 cos x
     for k in range(3):
         s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
         weight = h * (4 / 9 if k == 1 else 5 / 18)

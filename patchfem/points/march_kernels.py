@@ -523,6 +523,7 @@ def find_step(system, level):
     ports = system.ports
     points = system.points
     n = ports.vector.size
+    # Newton's step; a second attempt replaces the slopes of forces that fall with the slide by 0
     for attempt in range(2):
         write_matrix(system, level)
         for i in range(n):

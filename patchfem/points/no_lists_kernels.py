@@ -7,21 +7,33 @@ from .return_maps_kernels import PointState
 
 @njit(**NJIT_CALL)
 def press_list(lists, j, load):
-    """Press nothing."""
+    """Leave the load of a point as it is, because a march without lists has no bonds that form under it.
+
+    lists, j, load: arrays of the lists, number of the point and normal load [N], all unused.
+    """
 
 
 @njit(**NJIT_CALL)
 def write_list_mean(numbers, values, lists, j, dt):
-    """Write nothing."""
+    """Leave the mean force of a point as it is, because no point of the march has a list.
+
+    numbers, values, lists, j, dt: as `lists_kernels.write_list_mean` takes them; all unused.
+    """
 
 
 @njit(**NJIT_CALL)
 def advance_list(numbers, values, lists, j, v0, v1, dt):
-    """Advance nothing; there is room."""
+    """Report room (True) for a list that does not exist, so that the march goes on.
+
+    numbers, values, lists, j, v0, v1, dt: as `lists_kernels.advance_list` takes them; all unused.
+    """
     return True
 
 
 @njit(**NJIT_CALL)
 def read_list(numbers, lists, j, load):
-    """Return a state at rest."""
+    """Return a `PointState` of zeros: without a list there is no force, energy or stretch.
+
+    numbers, lists, j, load: as `lists_kernels.read_list` takes them; all unused.
+    """
     return PointState(0.0, 0.0, 0.0)

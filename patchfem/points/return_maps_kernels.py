@@ -90,7 +90,11 @@ class PointState(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """Value after a path, and its mean over the path."""
+    """A state after a path, and its mean over the path.
+
+    - end: value at the end of the path
+    - mean: mean over the path, in the unit of the value
+    """
 
     end: float
     mean: float
@@ -159,13 +163,18 @@ def mean_force(numbers, memory, j, load, step):
 
 @njit(**NJIT_KERNEL)
 def _end_path(force, slope, dq):
-    """Return the `MeanForce` of a law of the path alone, as d(mean dq)/d(dq) is the force at the end."""
+    """Return the `MeanForce` of a law of the path alone, as d(mean dq)/d(dq) is the force at the end.
+
+    force, slope: mean force [N], and its derivative by the increment [N/m]; dq: increment [m].
+    """
     return MeanForce(force, slope, 0.0, force + slope * dq, 0.0)
 
 
 @njit(**NJIT_KERNEL)
 def _stretch(start, move, limit):
     """Stretch a spring by an increment; it slips at +-limit.
+
+    start, move, limit: stretch before the increment, increment and limit, all in the same unit.
 
     Returns a `Relaxed` with the elastic fraction of the increment in place of the end.
     """
@@ -264,14 +273,20 @@ def _mean_lugre(numbers, stretch, j, load, step):
 
 @njit(**NJIT_CALL)
 def _lugre_force(numbers, j, load, stretch, velocity):
-    """Return the force of the LuGre law at a stretch and a velocity."""
+    """Return the force [N] of the LuGre law of point j at a stretch [m] and a velocity [m/s].
+
+    numbers: (k, m) of the laws of m points; load: normal load [N].
+    """
     direction = 1.0 if velocity > 0 else -1.0
     return load * rate_equation(numbers[:, j], stretch, velocity, direction).force
 
 
 @njit(**NJIT_CALL)
 def _mean_spring(numbers, slide, j, dq):
-    """Return the mean force over dq and its slope of a cubic or interlocking spring."""
+    """Return the mean force [N] over dq and its slope [N/m] of a cubic or interlocking spring.
+
+    numbers: (k, m) of the laws of m points, of which j is the spring; slide, dq: start and increment [m].
+    """
     end = slide + dq
     if numbers[0, j] == Law.CUBIC:
         k = 0.25 * numbers[1, j]

@@ -54,7 +54,7 @@ REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the mod
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
 MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
-STRIP_BYTES = 8 * N_ROWS
+STRIP_BYTES = 8 * N_ROWS  # memory of a strip
 LONG_LIST_ADVICE = (
     'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 )
@@ -142,13 +142,14 @@ def load_kernels(contact: Contact, say=None):
 
 
 class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths (`levels`), from the longest one.
+    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`.
 
-    The N = 3 n + 3 states at the start of a step are those of `make_responses`.
+    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
+    mass.
 
-    - motion (levels, 2 n, N): coordinates [m] and velocities [m/s] at its end for each state
-    - loss (levels, N, N): quadratic form of the energy that the dampers dissipate [J]
-    - work (levels, 3, N): bilinear form of the work of the drive [J]
+    - motion: (levels, 2 n, N) motion at the end of a step per input
+    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
+    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
     """
 
     motion: np.ndarray
@@ -262,7 +263,8 @@ def make_system(
     # Rows of the ports; heave and pitch of a normal contact are two more.
     n = 0 if modes is None else modes.omega.size
     rows = [
-        np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets
+        np.zeros(n) if modes is None else np.asarray(point_set.row, float)
+        for point_set in contact.point_sets
     ]
     press = np.zeros(11)
     press[:2] = -1.0
@@ -271,7 +273,11 @@ def make_system(
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows, float).reshape(len(rows), n)
 
-    laws = {float(law) for one in contact.point_sets for law in np.unique(one.law.numbers[0])}
+    laws = {
+        float(law)
+        for point_set in contact.point_sets
+        for law in np.unique(point_set.law.numbers[0])
+    }
     has_events = bool(laws & {Law.COULOMB, Law.TANH})
     levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
@@ -349,7 +355,7 @@ def make_system(
 def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
     # Numbers, memory and loads of the laws of all points.
-    laws = [one.law for one in contact.point_sets]
+    laws = [point_set.law for point_set in contact.point_sets]
     counts = [law.numbers[0].size for law in laws]
     numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
     memory = _join_columns(N_MEMORY, [law.memory for law in laws])
@@ -365,21 +371,21 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 
     # Nodes, shares of the load and shear shapes of each set of points.
     nodes = np.full(loads.size, RESULTANT, np.int64)
-    place = np.zeros(loads.size)
+    position = np.zeros(loads.size)
     shapes = np.zeros((0, loads.size))
     stiffness = np.zeros(0)
     first = 0
-    for one, count in zip(contact.point_sets, counts):
-        own = slice(first, first + count)
-        if one.nodes is not None:
-            nodes[own] = one.nodes
-        if one.shares is not None:
-            share[own] = one.shares
-            place[own] = one.places
-        if one.shear is not None:
-            shapes = np.zeros((len(one.shear.stiffness), loads.size))
-            shapes[:, own] = np.asarray(one.shear.shape).T
-            stiffness = np.array(one.shear.stiffness, float)
+    for point_set, count in zip(contact.point_sets, counts):
+        set_rows = slice(first, first + count)
+        if point_set.nodes is not None:
+            nodes[set_rows] = point_set.nodes
+        if point_set.shares is not None:
+            share[set_rows] = point_set.shares
+            position[set_rows] = point_set.places
+        if point_set.shear is not None:
+            shapes = np.zeros((len(point_set.shear.stiffness), loads.size))
+            shapes[:, set_rows] = np.asarray(point_set.shear.shape).T
+            stiffness = np.array(point_set.shear.stiffness, float)
         first = first + count
 
     shear = np.zeros((len(Shear), stiffness.size))
@@ -398,8 +404,8 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         shapes,
         stiffness,
         shear,
-        np.repeat([one.is_spring for one in contact.point_sets], counts).astype(bool),
-        place,
+        np.repeat([point_set.is_spring for point_set in contact.point_sets], counts).astype(bool),
+        position,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
 
@@ -410,7 +416,12 @@ def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
-    """Return the arrays of the lists of bonds; empty ones without lists."""
+    """Return the arrays of the lists of bonds; empty ones without lists.
+
+    contact: law, and the numbers of the sum over bonds.
+    points: arrays of the contact points, with their ports, laws and loads.
+    is_prescribed: whether the slide of the points is given, and does not follow from forces.
+    """
     count = points.port.size
     if contact.bond_sum is None:
         empty = np.zeros(0)
@@ -682,13 +693,13 @@ class March:
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
         sampled = np.zeros(works.size)
-        for k, one in enumerate(self.contact.point_sets):
-            if one.is_spring:
+        for k, point_set in enumerate(self.contact.point_sets):
+            if point_set.is_spring:
                 continue
             columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
-            is_rigid = (one.law.numbers[0] == Law.COULOMB).all()
+            is_rigid = (point_set.law.numbers[0] == Law.COULOMB).all()
             mean = columns[:-1, 2] if is_rigid else None
-            slide = samples[:, : n // 2] @ np.asarray(one.row, float)
+            slide = samples[:, : n // 2] @ np.asarray(point_set.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
         self.work_sums += float(sampled.sum()), float(np.abs(works).sum())
 
@@ -696,11 +707,11 @@ class March:
         """Return the state of the interface at the end of the last step, whose sample is given."""
         n = self.modes.omega.size
         row = self.system.ports.rows[0]
-        rest = sample[2 * n :]
+        remainder = sample[2 * n :]
         time = (self.done + self.shift) * self.step
-        motion = (time, float(row @ sample[:n]), *rest[Sample.PORTS : Sample.PORTS + 2])
+        motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
         return make_snapshot(
-            self.kernels, self.system, (*motion, rest[Sample.HEAVE], rest[Sample.PITCH])
+            self.kernels, self.system, (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
         )
 
     def find_ledger(self, sample) -> dict[str, float]:
@@ -736,7 +747,12 @@ class March:
 
 
 class MarchedSteps(NamedTuple):
-    """Arrays of a march at its end, number of steps done, and status (`march_rows`)."""
+    """Arrays of a march at its end.
+
+    - system: arrays of the march, which is a copy if lists of bonds were made longer
+    - n_done: number of steps done
+    - status: why the march ended, a status of `march_rows`
+    """
 
     system: System
     n_done: int
@@ -1106,6 +1122,7 @@ class Record:
         if not self.keeps_samples:
             rows = rows[rows[:, NUMBER] >= run.done - self.n_window]
 
+        # The last n_window steps are the window of the measures
         in_window = rows[:, NUMBER] >= run.done - self.n_window
         response = make_histories(run, rows)
         n = 2 * run.modes.omega.size
@@ -1178,7 +1195,7 @@ def make_histories(run: March, rows) -> Response:
     sets = contact.point_sets
     columns = rows[:, first : first + N_PORT_COLUMNS * len(sets)]
     columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
-    port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
+    port_rows = np.array([point_set.row for point_set in sets], float).reshape(len(sets), n)
 
     push = run.drive.values(time)
     forces = columns[..., 0]
@@ -1196,7 +1213,7 @@ def make_histories(run: March, rows) -> Response:
 
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
-    is_interface = np.array([not one.is_spring for one in sets], bool)
+    is_interface = np.array([not point_set.is_spring for point_set in sets], bool)
     if len(sets) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
         if is_interface.any():
@@ -1210,9 +1227,9 @@ def make_histories(run: March, rows) -> Response:
         extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
 
     if is_interface.any():
-        own = int(np.flatnonzero(is_interface)[0])
-        interface = slides[:, own], rates[:, own], forces[:, own], columns[:, own, 1]
+        face = int(np.flatnonzero(is_interface)[0])
+        interface = slides[:, face], rates[:, face], forces[:, face], columns[:, face, 1]
     else:
-        still = np.zeros(len(rows))
-        interface = z @ modes.slide, rate @ modes.slide, still, z @ modes.slide
+        zeros = np.zeros(len(rows))
+        interface = z @ modes.slide, rate @ modes.slide, zeros, z @ modes.slide
     return make_response(modes, run.drive, push, (time, z, rate), pull, interface, extra)

@@ -231,7 +231,10 @@ def _select_overlapping_spans(span) -> np.ndarray:
 
 
 def _smooth_values(values, indices, span) -> np.ndarray:
-    """Return the midpoint values of least-squares parabolas that are fitted over spans around each index."""
+    """Return the midpoint values of least-squares parabolas that are fitted over spans around each index.
+
+    values: (n,) samples; indices, span: (k,) midpoints, and numbers of samples on either side of them.
+    """
     smoothed = np.empty(indices.size)
     for m in np.unique(span):
         has_span = span == m
@@ -245,6 +248,10 @@ class Slopes(NamedTuple):
     """Slopes of a quantity per half cycle, with half-widths of 95 % intervals and with spans.
 
     All arrays are (k,). A span is the number of half cycles on either side of a point.
+
+    - slope: change per half cycle
+    - error: half-width of its 95 % interval
+    - span: of each point
     """
 
     slope: np.ndarray

@@ -17,7 +17,7 @@ REVERSAL_UP = 3
 REVERSAL_DOWN = 4
 SEGMENT_BORDER = 5
 EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
-MAX_EVENTS = 100_000
+MAX_EVENTS = 100_000  # largest number of events of a run that are kept, the last ones
 
 
 class Events(NamedTuple):

@@ -23,9 +23,10 @@ MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
-    """Relative displacement [m] and friction force [N] at a reversal.
+    """A reversal of the relative displacement.
 
-    The force is None if it is unknown, e.g. if the interface is at rest at an end of the window.
+    - slide: relative displacement [m]
+    - force: friction force [N]; None if it is unknown, e.g. if the interface is at rest at an end of the window
     """
 
     slide: float
@@ -79,6 +80,7 @@ def find_reversals(
     for begin, end in cycle_spans(time, period):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         pair = []
+        # The smallest displacement is the largest one of the reversed motion
         for sign in (-1, 1):
             sample, value, fraction = _find_largest(
                 time[cycle], sign * slide[cycle], sign * rate[cycle], time_tolerance
@@ -128,6 +130,8 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
 
     The zero is sought in the step before the sample if `first`, else in the step after it. Returns the index
     of the preceding sample and the position as a fraction of the step; (None, 0) without a zero.
+
+    v: (k,) velocity [m/s]; sample: index beside which the zero is sought.
     """
     k = sample - 1 if first else sample
     if abs(v[sample]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
@@ -144,6 +148,8 @@ def _force_at_reversal(
 
     The largest displacement `value` lies in the step after a sample, at the fraction `fraction` of
     the step; the rule is as in `find_reversals`.
+
+    slide, force: (k,) samples of displacement [m] and force [N].
     """
     if rule == "rate":
         return float(

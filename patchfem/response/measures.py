@@ -276,6 +276,8 @@ def _extrapolate_to_kink(before: float, top: float, after: float, last: float) -
 
     The lines through the first two and through the last two samples cross at the kink. The result is 0 if they do not
     cross in this step.
+
+    before, top, after, last: four successive samples, of which `top` is the largest.
     """
     rise = top - before
     fall = after - last

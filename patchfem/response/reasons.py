@@ -132,6 +132,8 @@ def _list_open_loops(measures: Measures, window, drive) -> list[str]:
     release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no
     meaning. For several interfaces, only the sum of the energies is known: a loop does not close if its
     interface returns more energy than it takes although no energy is created.
+
+    measures, window: measures by name, and histories of the last cycles with the sums of energy; drive: with its period.
     """
     ledger = window.extra.get("ledger")
     loop = measures.get("loop_area")

@@ -54,6 +54,7 @@ class HistoryBytes(NamedTuple):
     turn: float
 
 
+# Memory of the histories by engine
 HISTORY_BYTES = {
     "hybrid": HistoryBytes(80.0, 140.0, 16.0),
     "march": HistoryBytes(45.0, 50.0, 18.0),
@@ -194,7 +195,10 @@ def _read_allowed(group: Path) -> float:
 
 
 def _read_number(path: Path, name: str = "", place: int = 0) -> float:
-    """Return the word of a file after a name, or at a place, as a number; nan if there is none."""
+    """Return the word of a file after a name, or at a place, as a number; nan if there is none.
+
+    path: file of the operating system; name: word before the number; place: index of the number if there is no name.
+    """
     try:
         words = path.read_text("ascii").split()
         return float(words[words.index(name) + 1 if name else place])

@@ -74,7 +74,7 @@ class Plan:
 
     @property
     def kind(self) -> str:
-        """Kind of the run."""
+        """Kind of the run: "patch", "bench", "rig" or "linear"."""
         return self.model.kind
 
     @property

@@ -58,7 +58,10 @@ def run_probe(plan: Plan) -> Probe:
 
 
 def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:
-    """Describe what each setting multiplies."""
+    """Describe what each setting multiplies: clauses such as "twice drive.cycles takes up to twice the time of the motion".
+
+    plan: the run; has_motion, has_contact: whether its motion and its contact took measurable time.
+    """
     factors = []
     if has_motion:
         key = "slide.cycles" if plan.kind == "bench" else "drive.cycles"

@@ -19,7 +19,11 @@ STAGE_COEFFICIENT = 1 - np.sqrt(0.5)
 
 
 class JumpEnd(NamedTuple):
-    """Worn depth (m,) [m] and contact forces (m,) [N] at the end of a jump."""
+    """State at the end of a jump over cycles.
+
+    - depth: (m,) worn depth [m]
+    - force: (m,) contact forces [N]
+    """
 
     depth: np.ndarray
     force: np.ndarray

@@ -217,7 +217,11 @@ def _correct_path(
 def _take_halves(
     problem: WearProblem, state: WearState, path, length: float, tolerance: float
 ) -> tuple[WearState, float]:
-    """Take a jump in two halves with a constant slip path; return the state and error / tolerance."""
+    """Take a jump in two halves with a constant slip path; return the state and error / tolerance.
+
+    problem, state: contact with its coefficient, and worn state before the jump.
+    path: slip path per cycle at the nodes [m]; length: cycles of the jump; tolerance: relative error of depth and force.
+    """
     rate = wear_rates(problem.coefficient, path, problem.area)
     coarse, coarse_force = solve_jump(problem.press, state.depth, rate, length)
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)

@@ -161,6 +161,7 @@ class FittedDepths(NamedTuple):
 class PredictedWear:
     """Computed worn depth, fitted to the measured one.
 
+    - history: computed depth in the course of the run.
     - coefficient, centre: wear coefficient [m2/N], and middle of the patch in x of the second trace [m].
     - is_mirrored: whether x of the patch runs against x of the trace; None where both fit.
     - depths: both depths along the patch.
@@ -263,7 +264,11 @@ def _suspect_units(ratio: float, axis: str) -> str:
 
 
 def _require_similar(width: float | None, bins: Bins, history: WearHistory, best: Place) -> None:
-    """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run."""
+    """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run.
+
+    width: of the measured track; None without one. bins: measured depth. history, best: computed depth, and its fitted
+    place.
+    """
     if not history.work[1] <= best.ratio <= MAX_COEFFICIENT_RATIO:
         raise PatchfemError(
             f"compare --predicted: the measured wear needs {best.ratio:.3g} times the wear coefficient of {history.source}, "
@@ -318,7 +323,10 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
 
 
 def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = False) -> Place:
-    """Fit coefficient and position by least squares from a start; with `is_fixed` the position stays."""
+    """Fit coefficient and position by least squares from a start; with `is_fixed` the position stays.
+
+    bins: measured depth; history: computed depth over the cycles.
+    """
     from scipy.optimize import least_squares
 
     scale = float(np.abs(bins.depth).max())
@@ -405,7 +413,10 @@ def _make_result(
 
 
 def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
-    """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences."""
+    """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences.
+
+    bins: measured depth; history, best: computed depth over the cycles, and its fitted place.
+    """
     columns = []
     for name, step in (("ratio", 0.01 * best.ratio), ("centre", bins.width / 2)):
         value = getattr(best, name)
@@ -423,6 +434,9 @@ def _measure_spread(
     The measured wear scatters about the computed one with a correlation along x. The number of blocks is that of
     correlation lengths of the differences in the worn part; the fit takes up two of them, so that the variance is divided
     by the remainder, and Student's t replaces the normal quantile.
+
+    bins: measured depth with its noise; residual, computed: (b,) differences of both depths, and computed depth [m].
+    jacobian: (b, 2) derivatives of the computed depth by ratio and centre.
     """
     from scipy.special import stdtrit
 

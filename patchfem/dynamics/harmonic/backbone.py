@@ -54,7 +54,12 @@ class FreeMotion(NamedTuple):
 
 
 class FreeEquations(NamedTuple):
-    """Residual (N,) of a free motion [m], its derivatives (N, N), and the motion."""
+    """Equations of a free motion.
+
+    - residual: (N,) [m]
+    - jacobian: (N, N) derivatives by the unknowns
+    - motion: the motion that the unknowns describe; None if omega is not positive
+    """
 
     residual: np.ndarray
     jacobian: np.ndarray
@@ -170,6 +175,8 @@ class FreeBalance:
     ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
+        x: unknowns (N,), which end with omega, zeta and the amplitude of the coordinate.
+        amplitude: of the output [m]; None selects a motion without damping, zeta a = 0.
         modal, slopes: harmonics (H + 1, n) of the coordinates [m] and their derivatives (H + 1, n, N).
         """
         gradient = np.zeros(x.size)
@@ -204,15 +211,28 @@ class FreeBalance:
         NotConverged
             If there is no motion near x.
         """
+        # Slides and residuals in units of the amplitude; frequency and damping ratio have the size 1
         size = abs(x[-1])
         unit = np.full(x.size, size)
         unit[-3:-1] = 1.0
 
         def evaluate(scaled) -> FreeEquations:
+            """Return the equations (`FreeEquations`) for scaled unknowns (N,), in units of the motion."""
             residual, jacobian, motion = self.evaluate(scaled * unit, amplitude)
             return FreeEquations(residual / size, jacobian * unit / size, motion)
 
         def is_solved(equations, residual, size) -> bool:
+            """Return whether the scaled residual is small after the last step.
+
+            Parameters
+            ----------
+            equations : FreeEquations
+                Scaled equations before the step; unused.
+            residual : (N,) array
+                Their linearised residual after it [1].
+            size : float
+                Norm of the unknowns; unused, because the residual is scaled.
+            """
             return float(np.linalg.norm(residual)) < MAX_RESIDUAL
 
         solution = solve_damped(evaluate, x / unit, is_solved, max_steps)

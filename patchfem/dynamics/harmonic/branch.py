@@ -17,6 +17,7 @@ from .steady import (
     make_motion,
 )
 
+# Steps along a response curve
 PATH = PathSettings(first_step=0.0125, max_step=0.05)
 # Ratio of the harmonics of the first motion, which meet the tolerance alone, to those of the first curve.
 FIRST_REDUCTION = 4
@@ -118,6 +119,7 @@ def _differentiate(balance: HarmonicBalance, drive: SineDrive):
     """Return a function of unknowns and frequency [rad/s] that gives the equations of a curve."""
 
     def evaluate(x, omega):
+        """Return the `PathEquations` at packed slides x (N,) and a frequency omega [rad/s]."""
         equations = balance.evaluate(x, omega, drive.acceleration)
         return PathEquations(equations.residual, equations.jacobian, equations.by_omega)
 
@@ -127,7 +129,10 @@ def _differentiate(balance: HarmonicBalance, drive: SineDrive):
 def _pack_points(
     first: SteadyMotion, second: SteadyMotion, width: float
 ) -> tuple[HarmonicBalance, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each."""
+    """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each.
+
+    first, second: motions with equal numbers of harmonics; width: unit of omega [rad/s], such as the width of a sweep.
+    """
     balance = HarmonicBalance(first.group.modes, first.group, first.samples)
     packed = [pack_harmonics(motion.slides) for motion in (first, second)]
     size = max(float(np.linalg.norm(x)) for x in packed) or 1.0

@@ -37,7 +37,12 @@ class CurvePath:
 
 
 class PathEquations(NamedTuple):
-    """Residual (N,) of a curve, its derivatives (N, N) by the unknowns, and (N,) by the parameter."""
+    """Equations r(x, p) = 0 of a curve at one point.
+
+    - residual: (N,) r
+    - jacobian: (N, N) derivatives of r by the unknowns x
+    - by_parameter: (N,) derivatives of r by the parameter p
+    """
 
     residual: np.ndarray
     jacobian: np.ndarray
@@ -155,7 +160,12 @@ def _step_factor(n_newton: int) -> float:
 
 
 def _make_border(evaluate, w, row, unit) -> tuple[np.ndarray, np.ndarray]:
-    """Return the scaled residual (N,), and the scaled Jacobian with a further row, (N + 1, N + 1)."""
+    """Return the scaled residual (N,), and the scaled Jacobian with a further row, (N + 1, N + 1).
+
+    evaluate: function of x and p that returns `PathEquations`.
+    w, unit: point (x, p) of the curve, and the sizes by which its entries are scaled, (N + 1,) each.
+    row: (N + 1,) last row, which selects a point or a direction.
+    """
     residual, jacobian, by_p = evaluate(w[:-1], w[-1])
     matrix = np.empty((w.size, w.size))
     matrix[:-1, :-1] = jacobian
@@ -204,7 +214,13 @@ def correct_point(evaluate, w, tangent, unit, tolerance: float, *, is_fixed: boo
 
 
 def _take_step(evaluate, point: _PathPoint, step: float, unit, tolerance: float):
-    """Return the point after a step along the curve as `correct_point` does; None if it fails or jumps."""
+    """Return the point after a step along the curve as `correct_point` does; None if it fails or jumps.
+
+    evaluate: function of x and p that returns `PathEquations`.
+    point, step: point with its tangent, and arc length of the step in scaled units.
+    unit: (N + 1,) sizes by which unknowns and parameter are scaled.
+    tolerance: relative change of the motion at which Newton's method ends.
+    """
     corrected = correct_point(
         evaluate, point.w + step * unit * point.tangent, point.tangent, unit, tolerance
     )
@@ -216,14 +232,20 @@ def _take_step(evaluate, point: _PathPoint, step: float, unit, tolerance: float)
 
 
 def _make_point(evaluate, w, direction, unit) -> _PathPoint:
-    """Return a point of the curve with its tangent, which points in a direction (N + 1,)."""
+    """Return a point of the curve with its tangent, which points in a direction (N + 1,).
+
+    evaluate: function of x and p that returns `PathEquations`.
+    w, unit: point (x, p), and the sizes by which its entries are scaled, (N + 1,) each.
+    """
     _, matrix = _make_border(evaluate, w, direction, unit)
     tangent = factor(matrix)(np.append(np.zeros(w.size - 1), 1.0))
     return _PathPoint(w, tangent / np.linalg.norm(tangent))
 
 
 def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list[float]:
-    """Return the parameter at a fold between two points at a distance along the first tangent.
+    """Return the parameter at a fold between two points at a distance along the first tangent, [] without a fold.
+
+    first, second: successive points; length: arc length between them in scaled units; width: unit of the parameter.
 
     The parameter is a cubic of the distance along the first tangent; a fold is its extreme.
     """

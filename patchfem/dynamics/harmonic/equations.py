@@ -33,7 +33,7 @@ MIN_FRACTION = 0.02  # smallest fraction of a Newton step
 MAX_RESIDUAL = (
     1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
 )
-MAX_DAMPED_STEPS = 40
+MAX_DAMPED_STEPS = 40  # largest number of Newton steps
 
 
 class Motion(NamedTuple):
@@ -198,12 +198,25 @@ class HarmonicBalance:
     ) -> tuple[np.ndarray, Equations, int]:
         """Solve the balance from unknowns x (N,).
 
+        Parameters
+        ----------
+        x : (N,) array
+            First guess of the packed slides [m].
+        omega : float
+            Circular frequency [rad/s].
+        level : float
+            Amplitude of the acceleration of the drive [m s-2].
+        max_steps : int
+            Largest number of Newton steps.
+
         Returns
         -------
         x : (N,) array
+            Packed slides of the solution [m].
         equations : Equations
             Those before the last step.
         n_steps : int
+            Number of Newton steps.
 
         Raises
         ------
@@ -212,9 +225,21 @@ class HarmonicBalance:
         """
 
         def is_solved(equations, residual, size) -> bool:
+            """Return whether the residual is small beside the slides and the drive after the last step.
+
+            Parameters
+            ----------
+            equations : Equations
+                Equations before the step, with their derivatives by the drive level.
+            residual : (N,) array
+                Their linearised residual after it [m].
+            size : float
+                Norm of the packed slides [m].
+            """
             drive = abs(level) * float(np.linalg.norm(equations.by_level))
             return float(np.linalg.norm(residual)) <= MAX_RESIDUAL * (size + drive)
 
+        # A step also vanishes at a least-squares minimum that is no solution, which `is_solved` refuses
         solution = solve_damped(lambda v: self.evaluate(v, omega, level), x, is_solved, max_steps)
         if solution is None:
             count = (x.size // len(self.rows) - 1) // 2

@@ -147,6 +147,8 @@ class LawGroup:
 
         A local stiffness K(theta) enters by its harmonics up to 2 H, a reversal by the harmonics of its stiffness and the
         waves at its angle.
+
+        slides: sampled motion of all interfaces; i: the row; forces: forces of the laws of this row, in their order.
         """
         h = slides.harmonics.shape[1] - 1
         force, slope, holds = (

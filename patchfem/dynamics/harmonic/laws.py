@@ -166,6 +166,8 @@ class FlowLaw(Law):
     """Friction law whose only memory is its elastic stretch, from an Element of form "flow" or "points".
 
     A law that is a function of the velocity, of form "speed", has no stretch and no stiffness at rest.
+
+    - element: law of the whole contact, with its compiled functions and numbers
     """
 
     element: Element

@@ -105,6 +105,7 @@ def find_regime(motion: SteadyMotion) -> str:
     velocity always slides.
     """
     slides = motion.sample()
+    # Sums of the friction limits [N] of all laws, and of those that slip
     slipping = 0.0
     total = 0.0
     for i, laws in enumerate(motion.group.laws):

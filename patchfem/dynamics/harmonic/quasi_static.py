@@ -129,6 +129,17 @@ def find_static_motions(
         unit = np.maximum(stuck, 1e-300)
 
         def find_residual(x, amplitude=amplitude, unit=unit) -> np.ndarray:
+            """Return the residual (i,) of the slides: those of the mode with the secants at x, less x.
+
+            Parameters
+            ----------
+            x : (i,) array
+                Slides relative to those of the stuck mode.
+            amplitude : float
+                Amplitude of the displacement row [m].
+            unit : (i,) array
+                Slides of the stuck mode [m].
+            """
             return np.abs(group.rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
 
         solution = root(find_residual, stuck / unit, tol=SLIDE_ROOT_TOL)
@@ -165,7 +176,10 @@ def find_static_motions_from_loops(
 
 
 def _make_motion(modes, omega: float, z, loss: float) -> StaticMotion:
-    """Return the motion of an equilibrium z (n,) [m] with a frequency [rad/s] and a loss per cycle [J]."""
+    """Return the motion of an equilibrium z (n,) [m] with a frequency [rad/s] and a loss per cycle [J].
+
+    modes: modes of the structure, whose dampers add to the loss; omega: the frequency; z: modal coordinates.
+    """
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
     work = 2 * np.pi * omega**2 * modes.mass * float(z @ z)
     return StaticMotion(omega, (loss + viscous) / work, z, float(loss))

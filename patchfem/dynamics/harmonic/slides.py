@@ -100,22 +100,22 @@ def find_reversals(x, rate) -> np.ndarray:
     low = before * width
     high = after * width
     first = rate[before]
-    at = low + (high - low) * first / (first - rate[after % rate.size])
+    angles = low + (high - low) * first / (first - rate[after % rate.size])
 
     # Newton's method on the velocity, or bisection where it leaves the interval.
     k = np.arange(x.size)
     for _ in range(MAX_REVERSAL_STEPS):
-        waves = np.exp(1j * np.outer(at, k)) * x
+        waves = np.exp(1j * np.outer(angles, k)) * x
         speed = (waves @ (1j * k)).real
         bend = -(waves @ (k * k)).real
         is_before = speed * first > 0
-        low = np.where(is_before, at, low)
-        high = np.where(is_before, high, at)
-        step = np.divide(speed, bend, out=np.full(at.size, np.inf), where=bend != 0)
-        new = at - step
+        low = np.where(is_before, angles, low)
+        high = np.where(is_before, high, angles)
+        step = np.divide(speed, bend, out=np.full(angles.size, np.inf), where=bend != 0)
+        new = angles - step
         new = np.where((low <= new) & (new <= high), new, (low + high) / 2)
-        change = np.abs(new - at).max(initial=0.0)
-        at = new
+        change = np.abs(new - angles).max(initial=0.0)
+        angles = new
         if change <= ANGLE_TOL:
             break
-    return at % (2 * np.pi)
+    return angles % (2 * np.pi)

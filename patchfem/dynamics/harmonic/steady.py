@@ -88,16 +88,22 @@ def find_steady_motion(
 
 
 def _choose_counts(drive, group: LawGroup, harmonics: int | None, start) -> list[int]:
-    """Return the numbers of harmonics that are tried in turn; a given number twice, because the samples change."""
+    """Return the numbers of harmonics that are tried in turn; a given number twice, because the samples change.
+
+    drive: sine drive with its frequency.
+    group: friction laws and the modes on which they act.
+    harmonics: number that the user asks for, else None.
+    start: motion from which the search begins, whose number of harmonics is a hint; None without one.
+    """
     if harmonics is not None:
         return [harmonics, harmonics]
     if isinstance(start, SteadyMotion):
-        least = start.harmonics / 2
+        min_count = start.harmonics / 2
     else:
         # Inertia dominates the contact stiffness in higher harmonics.
         stiffness = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1)))
-        least = min(np.sqrt(stiffness / group.modes.mass) / drive.omega, MAX_FIRST_COUNT)
-    return [h for h in HARMONIC_COUNTS if h >= int(least)]
+        min_count = min(np.sqrt(stiffness / group.modes.mass) / drive.omega, MAX_FIRST_COUNT)
+    return [h for h in HARMONIC_COUNTS if h >= int(min_count)]
 
 
 def find_amplitudes(slides) -> np.ndarray:
@@ -248,9 +254,17 @@ def _follow_levels(
     ratio: float = 1.0,
     settings: PathSettings = LEVEL_PATH,
 ) -> CurvePath:
-    """Follow the motions with h harmonics over the drive level, from WEAK_DRIVE up to a ratio of a level [m s-2]."""
+    """Follow the motions with h harmonics over the drive level, from WEAK_DRIVE up to a ratio of a level [m s-2].
+
+    balance: equations for the laws with a number of samples.
+    omega, level: frequency [rad/s] and amplitude of the acceleration of the drive [m s-2].
+    h: number of harmonics.
+    ratio: last level divided by `level`.
+    settings: steps along the curve.
+    """
 
     def evaluate(x, level):
+        """Return the `PathEquations` at packed slides x (N,) and a drive level [m s-2]."""
         equations = balance.evaluate(x, omega, level)
         return PathEquations(equations.residual, equations.jacobian, equations.by_level)
 

@@ -58,7 +58,10 @@ def draw(panel: Panel, axes):
 
 
 def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
-    """Draw points with error bars, or a line with its band."""
+    """Draw points with error bars, or a line with its band, into matplotlib axes.
+
+    curve, style: data in display units, and style of the panel; colour: of line, symbols and band; axes: changed.
+    """
     if style in ("points", "dots") and not curve.is_line:
         if style == "dots":
             axes.plot(curve.x, curve.y, color=colour, lw=1)
@@ -119,7 +122,10 @@ def make_figure(panels: list[Panel]):
 
 
 def _save(figure, target, ending: str) -> None:
-    """Write a figure into a file or a stream; equal figures give equal files."""
+    """Write a figure into a file or a stream; equal figures give equal files.
+
+    figure, target: matplotlib figure, and path or stream; ending: format without a dot, such as "svg".
+    """
     from matplotlib import rc_context
 
     with rc_context(STYLE):

@@ -11,7 +11,17 @@ MAX_CURVE_POINTS = 3000  # largest number of intervals of which a curve keeps th
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Axis of a chart: label with unit, number of units in one SI unit, and whether it is logarithmic."""
+    """Axis of a chart.
+
+    Attributes
+    ----------
+    label : str
+        Name with the unit in brackets.
+    scale : float
+        Number of units of the label in one SI unit.
+    is_log : bool
+        Whether the axis is logarithmic.
+    """
 
     label: str
     scale: float = 1.0
@@ -62,9 +72,16 @@ class Panel:
 
     Attributes
     ----------
-    title, style, caption : str
+    title : str
+        Heading of the chart.
+    style : str
+        "line", "points", "dots", "area", "overlay", "map" or "film": how curves are drawn.
     x, y : Axis
+        Horizontal and vertical axis.
     curves : list of Curve
+        Data in the units of the axes.
+    caption : str
+        Sentence below the chart.
     marks : list of float
         Positions of vertical lines.
     choices : list of Panel

@@ -72,13 +72,13 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
 
     curves = []
     for label, data in selected.items():
-        own = []
+        panel_curves = []
         for names in (chart.y, chart.lines):
             for name, own_x in _split_names(names):
                 drawn = _make_curves(data, chart, name, own_x, axes)
-                own += [replace(curve, is_line=names is chart.lines) for curve in drawn]
-        for curve in own:
-            name = join_names(label, curve.name if len(own) > 1 else "")
+                panel_curves += [replace(curve, is_line=names is chart.lines) for curve in drawn]
+        for curve in panel_curves:
+            name = join_names(label, curve.name if len(panel_curves) > 1 else "")
             curves.append(replace(curve, name=name))
     marks = [_as_floats(first[name]).ravel() for name in chart.marks.split() if name in first]
     marks = np.concatenate([*marks, np.zeros(0)]) * axes[0].scale
@@ -140,7 +140,10 @@ def _select(data: Variables, chart: Chart) -> Variables:
 
 
 def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
-    """Return the indices of the span of a chart along `time` or `x`; None for the whole."""
+    """Return the indices of the span of a chart along `time` or `x`; None for the whole.
+
+    data, x_name: variables of an answer, and name of the horizontal one; span: as in `table.Chart`.
+    """
     period = float(data["period"].values) if "period" in data else np.inf
     if span == "cycles" and np.isfinite(period):
         time = data["time"].values
@@ -160,11 +163,16 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
 
 
 def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
-    """Return the variables at some indices of a dimension; those without this dimension are unchanged."""
+    """Return the variables at some indices of a dimension; those without this dimension are unchanged.
+
+    data: variables by name; dimension, indices: name of a dimension, and positions along it.
+    """
     taken = {
-        name: replace(one, values=np.take(one.values, indices, axis=one.dims.index(dimension)))
-        for name, one in data.items()
-        if dimension in one.dims
+        name: replace(
+            variable, values=np.take(variable.values, indices, axis=variable.dims.index(dimension))
+        )
+        for name, variable in data.items()
+        if dimension in variable.dims
     }
     return data | taken
 
@@ -172,7 +180,12 @@ def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
 def _make_curves(
     data: Variables, chart: Chart, name: str, own_x: str, axes: tuple[Axis, Axis]
 ) -> list[Curve]:
-    """Return the curves of a variable: one for each interface, case, code, or element of an overlay."""
+    """Return the curves of a variable: one for each interface, case, code, or element of an overlay.
+
+    data, chart: variables by name, and what the chart shows.
+    name, own_x: the variable, and that against which it is drawn; "" for the horizontal variable of the chart.
+    axes: horizontal and vertical axis, whose scales apply.
+    """
     own_x = own_x or _find_x(data, chart)
     if not {name, own_x} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
         return []
@@ -205,8 +218,11 @@ def _name_elements(data: Variables, dimension: str) -> list[str]:
     """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers."""
     coordinate = data.get(dimension)
     if coordinate is None:
-        sizes = (dict(zip(one.dims, one.values.shape, strict=True)) for one in data.values())
-        size = next(one[dimension] for one in sizes if dimension in one)
+        sizes = (
+            dict(zip(variable.dims, variable.values.shape, strict=True))
+            for variable in data.values()
+        )
+        size = next(variable[dimension] for variable in sizes if dimension in variable)
         return [f"{dimension} {number}" for number in range(1, size + 1)]
     # the last part of a key, such as "load 4 kN"
     title = coordinate.text.rpartition(".")[2].replace("_", " ") or dimension.replace("_", " ")
@@ -231,7 +247,11 @@ def _find_band(data: Variables, name: str) -> list[np.ndarray]:
 
 
 def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
-    """Return a curve for each code; points of other codes are missing in it, so that its line is interrupted."""
+    """Return a curve for each code; points of other codes are missing in it, so that its line is interrupted.
+
+    curve: all shown points; codes: variable with the code of each point; keep: indices of the shown points in it.
+    is_joined: whether points are joined by a line.
+    """
     numbers = np.asarray(codes.values)[keep]
     curves = []
     for code in np.unique(numbers):
@@ -247,7 +267,11 @@ def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: b
 
 
 def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Panel | None:
-    """Return the panel of a variable over x and its first dimension."""
+    """Return the panel of a variable over x and its first dimension.
+
+    data, chart: variables by name, and the chart, whose `y` is the variable.
+    x_axis, colours: horizontal axis, and scale and label of the colours.
+    """
     variable = data[chart.y]
     values = np.atleast_2d(_as_floats(variable))
     if not np.isfinite(values).any():

@@ -13,7 +13,7 @@ COLOURS = (
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
-BAND_OPACITY = 0.18
+BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
@@ -54,7 +54,7 @@ def _make_layout(panel: Panel) -> Figure:
 
 
 def _make_axis_layout(axis) -> Figure:
-    """Return the layout of an axis."""
+    """Return the title and the scale of an `Axis` as plotly.js takes them."""
     return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
 
 
@@ -85,7 +85,10 @@ def _make_traces(panel: Panel) -> list[Figure]:
 
 
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
-    """Return the trace of a curve, and that of its error band if it is drawn as a line."""
+    """Return the trace of a curve, and that of its error band if it is drawn as a line.
+
+    curve, style: data in display units, and style of the panel; colour: of line, symbols and band.
+    """
     trace = {
         "x": curve.x,
         "y": curve.y,

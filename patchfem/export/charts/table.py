@@ -15,6 +15,7 @@ class Chart:
     Attributes
     ----------
     title : str
+        Heading of the chart.
     x : str
         Variable of the horizontal axis. Several names: the first one that the answer has.
     y : str
@@ -36,6 +37,7 @@ class Chart:
     x_label, y_label : str
         Names of the axes; "" for the name of the variable, "*" for its description.
     caption : str
+        Sentence below the chart; "" for none.
     """
 
     title: str

@@ -7,7 +7,7 @@ import numpy as np
 from .vtkhdf import Frames, read_frames
 
 GRID_POINTS = (61, 60)  # columns and rows of the grid
-MAX_FILM_FRAMES = 30
+MAX_FILM_FRAMES = 30  # largest number of frames of a film
 WINDOW_HEIGHT = 0.6  # height of the window around the contact over its width
 # Largest contact, over the length of the pieces, that the window shows as a whole.
 MAX_CONTACT_FRACTION = 0.25

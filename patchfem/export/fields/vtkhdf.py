@@ -15,7 +15,8 @@ from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import add_yielding_notes, compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 
-NAME = "fields.vtkhdf"
+NAME = "fields.vtkhdf"  # name of the file in a results folder
+# Version of the format VTKHDF
 VERSION = np.array([2, 2])
 # Fields that every file has, by part.
 REQUIRED_FIELDS = {
@@ -92,7 +93,10 @@ def _create_group(parent, name: str) -> h5py.Group:
 
 
 def _write_block(group, block: Block, times) -> None:
-    """Write the mesh of a block, its fields, and where each frame begins in them."""
+    """Write the mesh of a block, its fields, and where each frame begins in them.
+
+    group, block: HDF5 group to fill, and mesh with fields; times: of the frames [s].
+    """
     connectivity, starts, types = block.vtk_cells()
     group.attrs["Version"] = VERSION
     group.attrs["Type"] = np.bytes_("UnstructuredGrid")
@@ -124,13 +128,18 @@ def _write_block(group, block: Block, times) -> None:
 
 
 def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Dataset:
-    """Write an array, compressed unless it is empty."""
+    """Write an array into an HDF5 group, compressed unless it is empty.
+
+    name, values: of the dataset; chunks: shape of a chunk, True to let h5py choose it.
+    """
     packing = {"chunks": chunks, "shuffle": True, "compression": "gzip", "compression_opts": 1}
     return group.create_dataset(name, data=values, **(packing if values.size else {}))
 
 
 def _write_field(group, name: str, values: np.ndarray) -> None:
     """Write a field (f, n, ...) with its unit and the meaning of its codes.
+
+    group, name: HDF5 group, and name of the field in `FIELDS`; values: in SI units.
 
     A chunk is one component in one frame: neighbours in it are neighbours in space, which compresses
     well.
@@ -201,7 +210,10 @@ def _read_block(group, count: int) -> Block:
 
 
 def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
-    """Read a field (f, size, ...), where f is `count`, or 1 if it does not change."""
+    """Read a field (f, size, ...), where f is `count`, or 1 if it does not change.
+
+    rows, name: HDF5 dataset of all frames below each other, and name of the field; size: points or cells in a frame.
+    """
     values = rows[:].reshape(-1, size, *FIELDS[name].shape)
     if len(values) not in (1, count):
         raise ValueError(f"{name} has {len(values)} frames")

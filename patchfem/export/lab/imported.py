@@ -95,7 +95,10 @@ def convert_file(
 
 
 def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
-    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use."""
+    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use.
+
+    out, settings: file to write, and options of the estimates; zero: whether --zero is given.
+    """
     endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
     form = endings.get(out.suffix.lower())
     if form is None:
@@ -136,13 +139,13 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     dict
         Number of rows, units, notes, and a text on what was written.
     """
-    found = laboratory.read_records(file, records.parse_requests(requests))
-    values = records.shift_to_zero(found.values) if zero else found.values
+    file_records = laboratory.read_records(file, records.parse_requests(requests))
+    values = records.shift_to_zero(file_records.values) if zero else file_records.values
     units = {name: SI_UNITS[name] for name in values}
     write_text(out, format_csv({f"{name} [{units[name]}]": one for name, one in values.items()}))
     rows = next(iter(values.values())).size
     told = f"{rows} rows of {', '.join(values)}"
-    return {"rows": rows, "units": units, "notes": found.notes, "told": told}
+    return {"rows": rows, "units": units, "notes": file_records.notes, "told": told}
 
 
 def _write_decay(
@@ -183,7 +186,10 @@ def _write_decay(
 def _write_modes(
     modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
 ) -> dict[str, object]:
-    """Write identified modes as tables of a scene."""
+    """Write identified modes as tables of a scene; return what the command prints.
+
+    modes, out: identified modes, and file to write; source: name of the file of records; notes: on these records.
+    """
     write_text(out, format_structure(modes, source))
     columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
     entries = [
@@ -228,14 +234,14 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
 
 def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
     """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
-    found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
+    file_records = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS
-    if found.channel_list and not found.values.keys() & responses.keys():
+    if file_records.channel_list and not file_records.values.keys() & responses.keys():
         raise PatchfemError(
             f"{file}: no channel is known as a response ({', '.join(responses)}); choose one with --map "
-            f"{next(iter(responses))}=CHANNEL among {found.channel_list}"
+            f"{next(iter(responses))}=CHANNEL among {file_records.channel_list}"
         )
-    return found.values, found.notes
+    return file_records.values, file_records.notes
 
 
 def _refuse_modal_data(file: Path) -> None:
@@ -255,7 +261,10 @@ def _refuse_modal_data(file: Path) -> None:
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Convert the text of an option to SI; None if it is ""."""
+    """Convert the text of an option to SI; None if it is "".
+
+    text, kind: number with a unit, and kind of quantity, such as "time"; option: its name, for an error message.
+    """
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:

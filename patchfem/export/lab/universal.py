@@ -150,7 +150,10 @@ def write_datasets(path: Path, datasets: list[dict]) -> None:
 
 
 def _correct_byte_count(path: Path, start: int, size: int) -> None:
-    """Write the number of bytes of values into the header of the dataset 58 that begins at a position of the file."""
+    """Write the number of bytes of values into the header of the dataset 58 that begins at a position of the file.
+
+    path, start: file, and position of the dataset [bytes]; size: of its values [bytes].
+    """
     with open(path, "r+b") as file:
         file.seek(start)
         head = file.read(200)

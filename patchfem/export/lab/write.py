@@ -101,9 +101,13 @@ def write_matlab(path: Path, answer: Answer) -> None:
     """Write all arrays of numbers as variables of a MATLAB file of version 5; `units.NAME` is the unit of NAME."""
     from scipy.io import savemat
 
-    arrays = {name: one for name, one in answer.data.items() if one.values.dtype.kind in "fiu"}
-    content = {name: one.values for name, one in arrays.items()}
-    units = {name: one.unit for name, one in arrays.items()}
+    arrays = {
+        name: variable
+        for name, variable in answer.data.items()
+        if variable.values.dtype.kind in "fiu"
+    }
+    content = {name: variable.values for name, variable in arrays.items()}
+    units = {name: variable.unit for name, variable in arrays.items()}
     content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
     with write_atomically(path) as partial, open(partial, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)
@@ -111,4 +115,6 @@ def write_matlab(path: Path, answer: Answer) -> None:
 
 def format_columns(columns: list[Column]) -> str:
     """Return columns of equal length as CSV with units in the header and all digits."""
-    return format_csv({f"{one.label} [{one.unit}]": one.values.tolist() for one in columns})
+    return format_csv(
+        {f"{column.label} [{column.unit}]": column.values.tolist() for column in columns}
+    )

@@ -40,7 +40,11 @@ TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
 
 
 class Mean(NamedTuple):
-    """Mean of a parameter over several files, and the standard deviation of the files about it."""
+    """Mean of a parameter over several files.
+
+    - mean: with its interval
+    - scatter: standard deviation of the files about it, in the unit of the mean
+    """
 
     mean: Quantity
     scatter: float
@@ -74,7 +78,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     """Return the answer of the reports of one or several surfaces."""
     quantities, means, headlines, cautions = {}, [], [], []
     for kind, name in KINDS.items():
-        members = [each for each in reports if each.kind == kind]
+        members = [report for report in reports if report.kind == kind]
         if not members:
             continue
         values = {value.name: value for value in members[0].values}
@@ -90,14 +94,14 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         headlines.append(f"{state}{_state_main(values, members)}.")
         quantities |= sentences.to_answers(values)
 
-    notes = [text for each in reports for text in each.notes]
-    if any(value.low is not None for each in reports for value in each.values):
+    notes = [text for report in reports for text in report.notes]
+    if any(value.low is not None for report in reports for value in report.values):
         notes.append(INTERVAL_NOTE)
-    profiles = [report_to_dict(each) for each in reports]
-    treatments = dict.fromkeys(describe_treatment(each) for each in reports)
+    profiles = [report_to_dict(report) for report in reports]
+    treatments = dict.fromkeys(describe_treatment(report) for report in reports)
     return Answer(
         kind="profile",
-        title="Roughness of " + ", ".join(Path(each.source).name for each in reports),
+        title="Roughness of " + ", ".join(Path(report.source).name for report in reports),
         verdict=(*headlines, *treatments)[: sentences.MAX_SENTENCES],
         quantities=quantities,
         data=_make_data(reports),
@@ -143,14 +147,17 @@ def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
 
 def _find_caution(members: list[RoughnessReport]) -> list[str]:
     """Return the sentence on why the means of these files are of limited use; [] if they are not."""
-    if len({each.source for each in members}) < len(members):
+    if len({report.source for report in members}) < len(members):
         return [TWICE_NOTE]
-    sizes = np.array([(each.sampling.length, each.sampling.step) for each in members])
+    sizes = np.array([(report.sampling.length, report.sampling.step) for report in members])
     return [SIZES_NOTE] if (sizes.max(axis=0) > MAX_SIZE_RATIO * sizes.min(axis=0)).any() else []
 
 
 def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> JsonObject:
-    """Return the means of one kind of files as an object of profile.json."""
+    """Return the means of one kind of files as an object of profile.json.
+
+    kind, count: kind and number of the files; means: by name of the parameter; notes: on what the means are worth.
+    """
     measures = {}
     for name, mean in means.items():
         measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
@@ -167,8 +174,8 @@ def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> 
             continue
         text = f"{name} {sentences.format_value(name, values[name])}"
         if values[name].reason == "few_files":
-            found = [each[name].value for each in members]
-            ends = [format_value(end, "m", 3) for end in (min(found), max(found))]
+            mean_values = [each[name].value for each in members]
+            ends = [format_value(end, "m", 3) for end in (min(mean_values), max(mean_values))]
             text += f" ({ends[0]} to {ends[1]} in the files)"
         parts.append(text)
     return ", ".join(parts)
@@ -233,8 +240,8 @@ def _find_moments(each: RoughnessReport) -> dict | None:
 
 def _make_data(reports: list[RoughnessReport]) -> Variables:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
-    data = make_variables("file", file=(np.array([each.source for each in reports]), ""))
-    curves = [abbott_curve(each.heights) for each in reports]
+    data = make_variables("file", file=(np.array([report.source for report in reports]), ""))
+    curves = [abbott_curve(report.heights) for report in reports]
     data |= make_variables("material_ratio", material_ratio=(curves[0][0], "1"))
     heights = np.array([height for _, height in curves])
     data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")

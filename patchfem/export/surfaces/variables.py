@@ -42,7 +42,22 @@ def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
 
 
 def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
-    """Return lengths (n,) [m] with the ends of their band as the variables NAME, NAME_low and NAME_high."""
+    """Return lengths with the ends of their band as the variables NAME, NAME_low and NAME_high.
+
+    Parameters
+    ----------
+    dimension : str
+        Name of the dimension.
+    name : str
+        Name of the variable.
+    values, half : (n,) array
+        Lengths, and half-widths of their band [m].
+
+    Returns
+    -------
+    dict of str to Variable
+        The three variables.
+    """
     ends = {f"{name}_low": values - half, f"{name}_high": values + half}
     return make_variables(dimension, **{name: values}, **ends)
 

@@ -180,11 +180,11 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
 
     # Pressure of the last frame, and the loop of a patch without strips.
     for side, run in zip(SIDES, runs, strict=True):
-        own, x = run.answer.data, f"x_pressed_{side}"
-        pressure = (own["normal_stress"].values[-1], "Pa")
+        variables, x = run.answer.data, f"x_pressed_{side}"
+        pressure = (variables["normal_stress"].values[-1], "Pa")
         data |= make_variables(x, **{x: run.state.x, f"pressure_{side}": pressure})
-        if "loop_slide" in own and own["loop_slide"].values.ndim == 1:
-            force = (own["loop_friction_force"].values, "N")
-            loop = {f"slide_{side}": own["loop_slide"].values, f"force_{side}": force}
+        if "loop_slide" in variables and variables["loop_slide"].values.ndim == 1:
+            force = (variables["loop_friction_force"].values, "N")
+            loop = {f"slide_{side}": variables["loop_slide"].values, f"force_{side}": force}
             data |= make_variables(f"sample_{side}", **loop)
     return data

@@ -139,5 +139,5 @@ class Chunks:
 
 
 def case_folder_name(name: int) -> str:
-    """Return the name of the folder of a case in cases/."""
+    """Return the 64-bit name of a case as 16 hexadecimal digits, as its folder in cases/ is called."""
     return f"{int(name):016x}"

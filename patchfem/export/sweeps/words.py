@@ -70,7 +70,10 @@ def _label(name: str) -> str:
 
 
 def _format_measure(name: str, unit: str, value: float) -> str:
-    """Return a value of a measure with its unit."""
+    """Return a value of a measure with its unit; 0 has none.
+
+    name, unit, value: of the measure, in SI units.
+    """
     return format_value(value, unit, name=name) if value else "0"
 
 

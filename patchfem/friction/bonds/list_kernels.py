@@ -87,7 +87,11 @@ class Division(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [1] of an increment, and its derivative with respect to the increment [1/m]."""
+    """Friction force / mu_s of a bond list over an increment, in the unit of its pressures (or loads).
+
+    - mean: mean over the path of the increment
+    - slope: its derivative by the increment [per m]
+    """
 
     mean: float
     slope: float
@@ -194,7 +198,10 @@ def total(row, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_new(path, after, bonds):
-    """Return force and stored energy of the bonds that form on a path [m], for unit pressure."""
+    """Return force and stored energy of the bonds that form on a path [m], for unit pressure.
+
+    after: path state at the end of the path; bonds: list of bonds before it, with the law.
+    """
     if path == 0:
         return BondSum(0.0, 0.0)
     form = bonds.law[LAW.form]
@@ -207,7 +214,10 @@ def _sum_new(path, after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _formed_growing_force(path, after, bonds):
-    """Return the force [1] of the growing bonds that form on an increment at full pressure."""
+    """Return the force [1] of the growing bonds that form on an increment at full pressure.
+
+    path, after: length of the increment [m], and the path state at its end; bonds: list before it, with the law.
+    """
     law = bonds.law
     before = bonds.now
     growth = after.growth - before[PATH.growth]

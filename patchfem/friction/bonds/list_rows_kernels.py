@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Forms of the sum over bonds, as numbers of `LawNumbers.form`
 FORM_STRETCH = 0.0
 FORM_REPORT = 1.0
 FORM_GROWING = 2.0

@@ -134,7 +134,10 @@ def _move_reference(bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _append_strips(increment, before, after, bonds):
-    """Append the strips of bonds that an increment forms; return False if the list is full."""
+    """Append the strips of bonds that an increment forms; return False if the list is full.
+
+    increment: signed displacement [m]; before, after: path states at its ends; bonds: the list, changed.
+    """
     strips = bonds.bondlist
     status = bonds.status
     law = bonds.law
@@ -302,7 +305,10 @@ def _join_last_strips(bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_strips(bonds, older, younger):
-    """Add a strip to an older one if it continues it in the same direction; return whether it does."""
+    """Add a strip to an older one if it continues it in the same direction; return whether it does.
+
+    bonds: the list, changed; older, younger: columns of both strips.
+    """
     strips = bonds.bondlist
     form = bonds.law[LAW.form]
     older_width = strips[STRIP.end, older] - strips[STRIP.start, older]
@@ -347,7 +353,10 @@ def _join_strips(bonds, older, younger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_similar_lengths(bonds, older, younger):
-    """Return whether the growing bonds of two strips have similar lengths or are fully grown."""
+    """Return whether the growing bonds of two strips have similar lengths or are fully grown.
+
+    bonds: the list; older, younger: columns of both strips.
+    """
     strips = bonds.bondlist
     mature = bonds.now[PATH.length]
     scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.growth])

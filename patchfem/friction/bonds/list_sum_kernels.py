@@ -270,7 +270,12 @@ def interpolate_value(fraction, value_1, value_2):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_strip(after, scale, bonds, column):
-    """Integrate a strip on each side of u = 0, in pieces of linear density."""
+    """Integrate a strip on each side of u = 0, in pieces of linear density.
+
+    after: path state at which it is summed.
+    scale: factor that undoes the scale of the values of the strips (`_value_scale`).
+    bonds, column: the list, and the column of the strip.
+    """
     strips = bonds.bondlist
     start = strips[STRIP.start, column]
     end = strips[STRIP.end, column]

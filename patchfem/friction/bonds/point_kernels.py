@@ -49,7 +49,11 @@ class ShapeFunctions(NamedTuple):
 
 
 class MeanStretch(NamedTuple):
-    """Path mean of z over an increment [Pa m], and its derivative with respect to the increment [Pa]."""
+    """Mean of the stretch z of a point, weighted by pressure, over an increment.
+
+    - mean: path mean of z [Pa m]
+    - slope: its derivative by the increment [Pa]
+    """
 
     mean: float
     slope: float

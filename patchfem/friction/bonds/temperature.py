@@ -20,7 +20,11 @@ MAX_EXP_ARGUMENT = 600.0
 
 
 class GrowthRates(NamedTuple):
-    """Growth parameters a_s [m s-2] and l_k [m] in eq. 2.10, as floats or arrays (m,)."""
+    """Growth parameters of bonds in eq. 2.10, as floats or arrays (m,).
+
+    - rest_growth: a_s [m s-2], growth at rest
+    - slip_growth: l_k [m], growth by slip
+    """
 
     rest_growth: float | np.ndarray
     slip_growth: float | np.ndarray
@@ -72,7 +76,12 @@ def growth_at_temperature(
 
 
 def _scale_rate(name: str, value: float, exponent, key: str):
-    """Return a rate times exp(exponent); error messages cite the scene keys `name` and `key`."""
+    """Return a rate times exp(exponent); error messages cite the scene keys `name` and `key`.
+
+    name, value: the rate at the reference temperature, in SI units.
+    exponent: logarithm of the change by the temperature, a float or (m,).
+    key: key of the activation temperature in [temperature].
+    """
     total = np.log(value) + exponent
     limits = np.finfo(float)
     if not ((total < np.log(limits.max)) & (total > np.log(limits.tiny))).all():

@@ -27,7 +27,8 @@ TIP_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's met
 class _HalfLoop(NamedTuple):
     """Half of a steady Bouc-Wen loop, between the states -y and y.
 
-    - displacement: displacement [eps] of the stroke, and its derivative with respect to w
+    - displacement: of the stroke [eps]
+    - displacement_by_w: its derivative with respect to w
     - area: area [mu N eps] between loading and unloading
     """
 

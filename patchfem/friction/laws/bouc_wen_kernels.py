@@ -37,7 +37,11 @@ class BoucWenNumber(IntEnum):
 
 
 class FollowedPath(NamedTuple):
-    """Value of y after a path, and its mean over the path."""
+    """Reduced force y after a path, or its distance from 1.
+
+    - end: value at the end of the path
+    - mean: mean over the path
+    """
 
     end: float
     mean: float
@@ -45,7 +49,10 @@ class FollowedPath(NamedTuple):
 
 @njit(**NJIT_KERNEL)
 def _find_rate(y, power, unloading):
-    """Return dy/dx at y; `unloading` is 1 - 2 s."""
+    """Return dy/dx at y; `unloading` is 1 - 2 s.
+
+    y: reduced force, positive along the motion; power: exponent n.
+    """
     size = y * y if power == 2.0 else abs(y) ** power
     return 1 - size if y > 0 else 1 - unloading * size
 
@@ -55,6 +62,8 @@ def _saturate(distance, power, path):
     """Return the distance e of y from 1 after a path in lengths, and its mean over the path.
 
     To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2.
+
+    distance: e at the start, >= 0; power: exponent n; path: x in lengths eps.
     """
     bend = 0.5 * (power - 1)
     if distance < SATURATED:
@@ -120,6 +129,9 @@ def follow_path(y, path, power, shape):
 def rate_equation(numbers, stretch, velocity, direction):
     """Return the force at the stretch eps z.
 
+    numbers, stretch: parameters of the law (`BoucWenNumber`), and the stretch [m].
+    velocity, direction: of the slip [m/s], and its sign; the force does not depend on them.
+
     Returns
     -------
     Rates
@@ -131,6 +143,9 @@ def rate_equation(numbers, stretch, velocity, direction):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relax_stretch(numbers, stretch, increment, dt):
     """Return the stretch eps z after an increment, for harmonic balance; it does not depend on time.
+
+    numbers, stretch: parameters of the law (`BoucWenNumber`), and the stretch before the increment [m].
+    increment, dt: displacement [m], and its duration [s], which is unused.
 
     Returns
     -------

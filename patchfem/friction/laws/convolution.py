@@ -26,7 +26,11 @@ CUTOFF_WEIGHT = 1e-20
 
 
 class SlidingLimits(NamedTuple):
-    """Friction force / mu_s [N] in rigid sliding towards +x and towards -x, both >= 0."""
+    """Friction force / mu_s [N] in rigid sliding, >= 0.
+
+    - forward: towards +x
+    - backward: towards -x
+    """
 
     forward: float
     backward: float
@@ -52,6 +56,9 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     """Return the weights (n, m) of the nodes in the averages at positions (n,), for sliding towards +x.
 
     is_bare (m - 1,): whether a segment between two nodes has no pressure; nothing is averaged beyond it.
+
+    nodes: (m,) positions of the nodes [m], increasing.
+    length, order: bond length eps [m] and order p of the kernel phi.
     """
     # The average is over the path behind a position: distances s >= 0 to the nodes below it
     distance = positions[:, None] - nodes

@@ -28,7 +28,11 @@ LOG_CELL_FRACTION = 0.25
 
 
 class Sliders(NamedTuple):
-    """Stiffness [N/m] and yield displacement [m] of parallel sliders, (t,) each."""
+    """Parallel sliders.
+
+    - stiffness: (t,) [N/m]
+    - yield_displacement: (t,) displacements at which they slip [m]
+    """
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray

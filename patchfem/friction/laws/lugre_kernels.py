@@ -71,6 +71,9 @@ def rate_equation(numbers, stretch, velocity, direction):
 
     x increases along the slip.
 
+    numbers: parameters of the law (`LuGreNumber`).
+    stretch, velocity: z [m] and slip velocity [m/s]; direction: sign of the slip.
+
     Returns
     -------
     Rates
@@ -93,6 +96,9 @@ def relax_stretch(numbers, stretch, increment, dt):
     """Return z after an increment at constant velocity, for harmonic balance.
 
     z relaxes towards +-g/stiffness. If the step takes no time, the limit is the kinetic force.
+
+    numbers, stretch: parameters of the law (`LuGreNumber`), and z before the increment [m].
+    increment, dt: displacement [m] and its duration [s], 0 or more.
 
     Returns
     -------

@@ -28,6 +28,9 @@ def relax_stretch(numbers, stretch, increment, dt):
 
     It relaxes over the bond length.
 
+    numbers, stretch: parameters of the law (`StretchNumber`), and the stretch before the increment [m].
+    increment, dt: displacement [m], and its duration [s], which is unused.
+
     Returns
     -------
     RelaxedStretch
@@ -43,6 +46,9 @@ def relax_stretch(numbers, stretch, increment, dt):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
     """Return the force of mature bonds of constant length at a stretch.
+
+    numbers, stretch: parameters of the law (`StretchNumber`), and the stretch [m].
+    velocity, direction: of the slip [m/s], and its sign; the force does not depend on them.
 
     Returns
     -------

@@ -16,7 +16,12 @@ HELPERS = ("find_flank",)
 
 
 class Flank(NamedTuple):
-    """Slope of a flank, and the forces on it: tangential to vertical force, and vertical force [N]."""
+    """Slope of a flank, and the forces on it.
+
+    - slope: dz/dq [1]
+    - ratio: tangential force / vertical force [1]
+    - vertical: force that carries the load and the lifted mass [N]
+    """
 
     slope: float
     ratio: float

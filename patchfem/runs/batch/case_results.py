@@ -149,7 +149,11 @@ class CaseResults:
 
 
 def _replace_texts(texts, part_texts, new_indices) -> None:
-    """Replace texts by case by those of a part of the cases, given the new index of each of them."""
+    """Replace texts by case by those of a part of the cases, given the new index of each of them.
+
+    texts: by case of the study, changed; part_texts: by case of the part; new_indices: case of the part -> case of the
+    study.
+    """
     for case in new_indices.values():
         texts.pop(case, None)
     texts.update(_renumber(part_texts, new_indices))

@@ -245,14 +245,14 @@ def refine(cases: Cases, scales: Scales) -> Refined:
 
     The errors follow from the march before, with fewer steps.
     """
-    left = np.arange(len(cases.parameters))
+    remaining = np.arange(len(cases.parameters))
     coarse = march_cases(cases, STEPS[0])
     refined = None
     for fewer, count in pairwise(STEPS):
-        fine = march_cases(cases.select(left), count)
-        part = _select(scales, left)
+        fine = march_cases(cases.select(remaining), count)
+        part = _select(scales, remaining)
         errors = estimate_errors(fine.values, coarse.values, count, fewer)
-        is_met = np.ones(left.size, bool)
+        is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
             allowed = part.tolerance * np.abs(value) + find_floor(name, fine.values, part)
@@ -261,10 +261,10 @@ def refine(cases: Cases, scales: Scales) -> Refined:
             is_met &= (errors[name] <= allowed) | is_absent
 
         # Only cases beyond their tolerance are marched again.
-        done = Refined(fine, errors, np.full(left.size, count), is_met)
-        refined = done if refined is None else _insert(refined, left, done)
-        left = left[~is_met]
-        if not left.size:
+        done = Refined(fine, errors, np.full(remaining.size, count), is_met)
+        refined = done if refined is None else _insert(refined, remaining, done)
+        remaining = remaining[~is_met]
+        if not remaining.size:
             break
         coarse = _select(fine, ~is_met)
     return refined
@@ -292,7 +292,17 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
 
 
 def find_floor(name: str, values: dict, scales: Scales) -> np.ndarray:
-    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms."""
+    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure.
+    values : dict of str to (n,) array
+        All measures of the cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    """
     floor = error_floor(name, scales.displacement)
     return np.fmax(floor, scales.tolerance * larger_term(name, values))
 
@@ -307,14 +317,17 @@ def _select(record, rows):
 
 
 def _insert(record, rows, part):
-    """Replace rows of all arrays of a record or dict; return the record."""
+    """Replace rows of all arrays of a record or dict, nested ones too; return the record.
+
+    record: changed in place; rows: indices or mask; part: record of the same kind with only these rows.
+    """
     pairs = record.items() if isinstance(record, dict) else zip(record._fields, record)
-    for name, one in pairs:
+    for name, value in pairs:
         new = part[name] if isinstance(record, dict) else getattr(part, name)
-        if isinstance(one, np.ndarray):
-            one[rows] = new
+        if isinstance(value, np.ndarray):
+            value[rows] = new
         else:
-            _insert(one, rows, new)
+            _insert(value, rows, new)
     return record
 
 
@@ -390,7 +403,10 @@ def make_results(
 
 
 def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
-    """Replace values of a measure by a reason."""
+    """Replace values of a measure by the reason why they are missing.
+
+    results: changed; name: of the measure; cases: indices of the cases.
+    """
     if not cases.size:
         return
     results.add_measure(name, TABLE[name].unit)

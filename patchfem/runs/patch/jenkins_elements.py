@@ -80,8 +80,8 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
         """Return the Jenkins elements of a strip under nodal normal forces (m,) [N]."""
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / slip_compliance.mean()]), np.zeros(1))
-        found = shear_modes.jenkins_set(slip_compliance, static * force, length)
-        return StripElements(found.stiffness, found.yield_displacement)
+        sliders = shear_modes.jenkins_set(slip_compliance, static * force, length)
+        return StripElements(sliders.stiffness, sliders.yield_displacement)
 
     return store.get_or_compute(
         ("strip elements", patch, static, length),

@@ -559,7 +559,12 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
 
 
 def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
-    """Format the changes of the measures from the assumed plane state to the opposite one."""
+    """Format the changes of the measures from the assumed plane state to the opposite one.
+
+    patch_model: patch with its loading; a given approach makes the load a measure that changes.
+    values, other_values: static measures in the assumed and in the opposite state, by name. Changes of up to 0.1 % are left
+    out.
+    """
     changes = []
     names = MEASURES_WITH_BAND
     if patch_model.loading.approach is not None:

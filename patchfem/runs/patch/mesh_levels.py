@@ -195,7 +195,10 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
 
 
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
-    """Return whether the measures that control the mesh meet the tolerance with given points."""
+    """Return whether the measures that control the mesh meet the tolerance with given points.
+
+    patches: solved patch on successive meshes; points: solution on equally spaced points, or None.
+    """
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
 

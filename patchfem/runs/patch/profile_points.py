@@ -148,6 +148,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     solution = None
     with use_one_blas_thread():
         try:
+            # Finer compliances of the free ends on the coarsest points; then the last of them on more and more points
             ends = [_compute_free_end_compliance(patch_model, level) for level in range(MIN_LEVELS)]
             end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
             point_levels = end_levels[-1:]
@@ -375,6 +376,8 @@ def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) 
     """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool.
 
     An interval ends at a contact edge between two points, or at an end of the interface.
+
+    active: (n,) the contact set; contact_edges: edges between points, in order of x; length: of the interface [m].
     """
     is_active = np.concatenate([[False], active, [False]])
     edges = iter(contact_edges)

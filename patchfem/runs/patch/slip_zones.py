@@ -54,7 +54,11 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
 
 
 def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
-    """Return the intervals of x [m] in which the yield displacement is below an amplitude."""
+    """Return the intervals of x [m] in which the yield displacement is below an amplitude.
+
+    x, yield_displacement: positions of neighbouring nodes, and displacement at which each of them slips, both [m].
+    amplitude: of the prescribed displacement [m].
+    """
     is_yielding = np.concatenate([[False], yield_displacement < amplitude, [False]])
     ends = []
     for node in np.flatnonzero(is_yielding[1:] != is_yielding[:-1]):

@@ -38,12 +38,12 @@ def yield_strength(material) -> Strength | None:
         return None
     if material.yield_ is not None:
         return Strength(material.name or "material", material.yield_, "given in the scene")
-    known = MATERIALS.get(material.name)
-    if known is None or known.strength is None:
+    listed = MATERIALS.get(material.name)
+    if listed is None or listed.strength is None:
         return None
-    if (material.young, material.poisson) != (known.young, known.poisson):
-        return None  # A known name with other elastic constants denotes another material.
-    return Strength(material.name, known.strength.strength, known.strength.source[:-1])
+    if (material.young, material.poisson) != (listed.young, listed.poisson):
+        return None  # A listed name with other elastic constants denotes another material.
+    return Strength(material.name, listed.strength.strength, listed.strength.source[:-1])
 
 
 def min_von_mises_ratio(poisson: float, plane: str) -> float:
@@ -76,13 +76,13 @@ def note_on_yielding_faces(patch_model, peak: float) -> dict[Strength, str]:
     notes = {}
     for side, piece in (("lower", patch_model.pieces.lower), ("upper", patch_model.pieces.upper)):
         face = piece.face_material
-        known = yield_strength(face)
-        if known is None or known in notes:
+        strength = yield_strength(face)
+        if strength is None or strength in notes:
             continue
         stress = min_von_mises_ratio(face.poisson, patch_model.pieces.plane) * peak
-        if stress > known.pressure:
-            notes[known] = (
+        if stress > strength.pressure:
+            notes[strength] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "
-                f"the {side} piece ({known.material}); {known.words}; {YIELDING_NEGLECTED}"
+                f"the {side} piece ({strength.material}); {strength.words}; {YIELDING_NEGLECTED}"
             )
     return notes

@@ -238,7 +238,10 @@ def _refine_until_tolerance_is_met(
 
 
 def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) -> bool:
-    """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them."""
+    """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them.
+
+    patch_model: patch of one case; pairs: condensed pieces from fine to coarse; tolerance: relative error.
+    """
     try:
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
     except PatchfemError:  # The error is reported when this case is run alone.

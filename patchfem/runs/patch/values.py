@@ -70,6 +70,8 @@ def _vertex_height(x, sigma, node: int) -> float:
     """Return by how much the parabola through a node and its neighbours rises above the pressure of the node [Pa].
 
     If the neighbouring parabolas have a much smaller curvature, as beside a jump, the height is reduced.
+
+    x, sigma: positions [m] and pressures [Pa] of the nodes; node: index of an inner node, that with the largest pressure.
     """
     if not (sigma[node - 1] > 0 and sigma[node + 1] > 0):
         return 0.0
@@ -252,7 +254,10 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
 
 
 def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
-    """Return the contact edges of one strip; `pressed` is the factor of its nodes in contact."""
+    """Return the contact edges of one strip, with their fractions between two nodes.
+
+    patch: solved patch; strip: number of the strip, 0 without strips; pressed: factor of its nodes in contact.
+    """
     x = patch.x
     state = patch.state
 
@@ -288,6 +293,10 @@ def _full_stick_stiffness(
 
     Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear
     and normal displacement. ends: contact edges.
+
+    normal, tangential: (m, m) normal and shear compliance [m/N] of the interface nodes.
+    coupling: (m, m) compliance [m/N] of the normal closing under shear forces.
+    active: (m,) whether a node is in contact.
     """
     if not coupling.any():
         sheared = edges.SetFactor(tangential, active)

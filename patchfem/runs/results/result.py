@@ -69,7 +69,7 @@ class Finding(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Sentence of the warning."""
+        """Finding in words, with its advice after a semicolon."""
         return self.words if self.advice is None else f"{self.words}; {self.advice.text}"
 
 

@@ -101,7 +101,11 @@ def find_interface_load(model: Model, interface) -> float:
 
 
 class ElementSizes(NamedTuple):
-    """Number of friction elements of a rig, and the largest stiffness of one in stick [N/m]; 0 for rigid elements."""
+    """Friction elements of a rig.
+
+    - count: number of elements of all interfaces
+    - max_stiffness: largest stiffness of one in stick [N/m]; rigid elements count as 0
+    """
 
     count: int
     max_stiffness: float
@@ -112,6 +116,7 @@ def estimate_elements(model: Model) -> ElementSizes:
     """Estimate the number of friction elements and the largest stiffness in stick."""
     count = 0
     max_stiffness = 0.0
+    # One element per interface, or one per node of a patch that slips part by part, in series with its pieces
     for interface in model.rig.friction.interfaces:
         load = find_interface_load(model, interface)
         keys = interface.numbers
@@ -170,7 +175,11 @@ def estimate_hybrid_steps(model: Model) -> float:
 
 
 def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
-    """Estimate the fastest rate [1/s] at which a law forgets, on a mass of the given inverse [1/kg]."""
+    """Estimate the fastest rate [1/s] at which a law forgets its state.
+
+    model, interface: the rig, and one of its interfaces with the numbers of its law.
+    mobility: inverse of the mass on which the law acts [1/kg].
+    """
     rig = model.rig
     keys = interface.numbers
     limit = keys.static * find_interface_load(model, interface)

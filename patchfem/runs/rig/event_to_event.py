@@ -58,11 +58,12 @@ from .solution import (
 LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
-EARLY_SAMPLES_PER_CYCLE = 40
+EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 # Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
 STRIP_GROUPS = ("curve", "run", "error")
+# Outcomes of motions that the engine ends early, by its status
 EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
@@ -264,7 +265,10 @@ class LumpedEvaluator(RunEvaluator):
         return engine.run_case(case, start=state)
 
     def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
-        """Choose the times of the samples and of `frames` snapshots."""
+        """Choose the times of the samples and of `frames` snapshots.
+
+        drive, cycles: drive with its period, and number of its cycles in the run.
+        """
         period = drive.period
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
@@ -291,7 +295,13 @@ class LumpedEvaluator(RunEvaluator):
     def _make_run(
         self, motion, drive, cycles: float, times: SampleTimes, start: State | None
     ) -> LumpedRun:
-        """Return the histories, energies and events of a motion."""
+        """Return the histories, energies and events of a motion.
+
+        motion: what the engine returned, with a row for each sample.
+        drive, cycles: drive, and number of its cycles in the run.
+        times: times at which samples and snapshots were asked for.
+        start: state from which the motion went on; None from rest.
+        """
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
             # Spectra need samples of equal distances.
@@ -366,6 +376,8 @@ class LumpedEvaluator(RunEvaluator):
         """Return the stretches of the elements of patches at given times, from the whole motion before.
 
         What happened before its start is in the memory of its `State`, if it does not start from rest.
+
+        response: histories of the whole motion; times: of the snapshots [s]; start: `State` from which it went on, or None.
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
@@ -500,7 +512,10 @@ def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
-    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period."""
+    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period.
+
+    begin, end, period: [s]; minimum: smallest number of times.
+    """
     count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
 

@@ -47,13 +47,17 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     if not solution.snapshots:
         n_samples = len(window.time)
         first = max(0, n_samples - 1 - n_samples // numerics.window)
-        at = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
-        tau = np.outer(window.force[at] / patch.pressure.load, sigma)
+        sample_indices = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
+        tau = np.outer(window.force[sample_indices] / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            force = window.force[at]
-            tau = averaged_law.distribute_slip_force(model, patch, force, np.zeros(at.size))
-        slip = np.repeat(window.slip[at][:, None], sigma.size, axis=1)
-        return make_interface_frames(patch, window.time[at], tau, slip, window.slide[at])
+            force = window.force[sample_indices]
+            tau = averaged_law.distribute_slip_force(
+                model, patch, force, np.zeros(sample_indices.size)
+            )
+        slip = np.repeat(window.slip[sample_indices][:, None], sigma.size, axis=1)
+        return make_interface_frames(
+            patch, window.time[sample_indices], tau, slip, window.slide[sample_indices]
+        )
 
     snapshots = solution.snapshots
     reduction = getattr(solution.contact, "reduction", None)
@@ -68,15 +72,15 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif model.partial_slip:
         length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
-        states = [(one.slide, one.stretch) for one in snapshots]
+        states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = fields.element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
-        tau = np.array([one.force / patch.pressure.load * sigma for one in snapshots])
-        local = np.array([np.full(sigma.size, one.slip) for one in snapshots])
+        tau = np.array([snapshot.force / patch.pressure.load * sigma for snapshot in snapshots])
+        local = np.array([np.full(sigma.size, snapshot.slip) for snapshot in snapshots])
 
-    time = np.array([one.time for one in snapshots])
-    slide = np.array([one.slide for one in snapshots])
+    time = np.array([snapshot.time for snapshot in snapshots])
+    slide = np.array([snapshot.slide for snapshot in snapshots])
     return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
@@ -88,11 +92,11 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
     snapshots = solution.snapshots
-    time = np.array([0.0, *(one.time for one in snapshots)])
-    slide = np.array([0.0, *(one.slide for one in snapshots)])
-    nodal = np.stack([patch.pressure.sigma_n * weight, *(one.nodal for one in snapshots)])
-    lift = np.array([0.0, *(one.heave for one in snapshots)])[:, None]
-    turn = np.array([0.0, *(one.pitch for one in snapshots)])[:, None]
+    time = np.array([0.0, *(snapshot.time for snapshot in snapshots)])
+    slide = np.array([0.0, *(snapshot.slide for snapshot in snapshots)])
+    nodal = np.stack([patch.pressure.sigma_n * weight, *(snapshot.nodal for snapshot in snapshots)])
+    lift = np.array([0.0, *(snapshot.heave for snapshot in snapshots)])[:, None]
+    turn = np.array([0.0, *(snapshot.pitch for snapshot in snapshots)])[:, None]
 
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
@@ -100,13 +104,13 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
 
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
-    for k, one in enumerate(snapshots, 1):
-        tau[k] = one.forces
-        local[k] = slide[k] - one.stretch - one.bend
-        if one.forces.size == 1:
+    for k, snapshot in enumerate(snapshots, 1):
+        tau[k] = snapshot.forces
+        local[k] = slide[k] - snapshot.stretch - snapshot.bend
+        if snapshot.forces.size == 1:
             # The law acts on the resultant.
             total = nodal[k].sum()
-            tau[k] = one.force / total * nodal[k] if total > 0 else 0.0
+            tau[k] = snapshot.force / total * nodal[k] if total > 0 else 0.0
             local[k] = slide[k]
 
     return {

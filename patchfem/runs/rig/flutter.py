@@ -44,7 +44,11 @@ RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the r
 
 
 class Flutter(NamedTuple):
-    """Amplitude of the largest unstable limit cycle by the name of its measure, or the reason of its absence; and notes."""
+    """Largest unstable limit cycle of a rig.
+
+    - measures: its amplitude by the name of the measure, or the reason of its absence
+    - notes: sentences on what was found
+    """
 
     measures: Measures
     notes: list[str]
@@ -115,7 +119,10 @@ class LimitCycles(NamedTuple):
 
 
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
-    """Compute the limit cycles of a self-excited rig with one interface."""
+    """Compute the limit cycles of a self-excited rig with one interface.
+
+    model, numerics: the rig, and its settings; patch: pressed patch of its interface, or None.
+    """
     rig = model.rig
     f = model.friction
     if len(rig.friction.interfaces) != 1 or f is None:

@@ -64,7 +64,11 @@ def add_level_errors(
 
 
 class Onset(NamedTuple):
-    """Drive level of the onset, and half the width of its bracket [m s-2]."""
+    """Drive level of an onset, from a bracket of two levels [m s-2].
+
+    - level: middle of the bracket
+    - error: half its width
+    """
 
     level: float
     error: float
@@ -216,7 +220,10 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 
 
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
-    """Report the completed fraction of all levels to the progress callback."""
+    """Report the completed fraction of all levels to the progress callback.
+
+    level, n_levels: number of the present level from 0, and number of levels; fraction: completed part of this level.
+    """
     progress((level + fraction) / n_levels)
 
 

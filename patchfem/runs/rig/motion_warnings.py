@@ -35,7 +35,11 @@ SINGLE_POINT_WARNING = (
 
 
 class Remarks(NamedTuple):
-    """Warnings and notes of a run."""
+    """What a user should know about a run.
+
+    - warnings: sentences on numbers that may be wrong
+    - notes: sentences on what the model leaves out or assumes
+    """
 
     warnings: list[str]
     notes: list[str]

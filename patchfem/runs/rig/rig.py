@@ -70,7 +70,7 @@ class CoupledRun:
 
     @property
     def model(self):
-        """Model of the run."""
+        """Model of the plan, which names rig, friction and accuracy."""
         return self.inputs.plan.model
 
     @property
@@ -160,7 +160,9 @@ def _make_result(run: CoupledRun) -> Result:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
     moved = ()
     if model.has_interface_patches:
-        snapshots = [one for one in solution.snapshots if isinstance(one, ElementSnapshot)]
+        snapshots = [
+            snapshot for snapshot in solution.snapshots if isinstance(snapshot, ElementSnapshot)
+        ]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(
@@ -268,6 +270,8 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
 
     Such a motion has its own period, because the drive is not periodic. The result is 0 if there is
     no period, or if the run is shorter than two windows.
+
+    model, numerics: the rig, and its settings with the cycles of the run; solution: its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
@@ -402,20 +406,20 @@ def _add_decay_curve(run: CoupledRun) -> CoupledRun:
     # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
     decay = run.decay
     coarse = run.inputs.coarse[0]
-    found = decays.estimate_stuck_mode_mesh_errors(
+    mesh_errors = decays.estimate_stuck_mode_mesh_errors(
         decay.amplitude, decay.frequency[-1], model, run.patch, coarse, run.inputs.stiffer
     )
-    frequency_error, damping_error = found.errors
+    frequency_error, damping_error = mesh_errors.errors
     decay = decay._replace(
         frequency_error=np.fmax(decay.frequency_error, frequency_error),
         damping_error=np.fmax(decay.damping_error, damping_error),
     )
-    if not found.reason:
+    if not mesh_errors.reason:
         return replace(run, decay=decay)
     coarser = ENGINES[run.numerics.engine].list_space_runs(
         model, run.numerics, run.patch, coarse, solution
     )
-    note = decays.describe_unknown_mesh_error(found.reason, coarser)
+    note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
     return replace(run, decay=decay, notes=(note,))
 
 

@@ -297,7 +297,12 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 class WornPiece(NamedTuple):
-    """Piece of a patch, its name "upper" or "lower", and the largest depth [m] that is worn off it."""
+    """Part of the wear that one piece of a patch has.
+
+    - piece: the piece
+    - name: "upper" or "lower"
+    - depth: largest depth that is worn off it [m]
+    """
 
     piece: PatchPiece
     name: str
@@ -316,7 +321,10 @@ def list_worn_pieces(model, depth) -> list[WornPiece]:
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the state after the next jump; the jump ends early if a coating is worn through."""
+    """Compute the state after the next jump; the jump ends early if a coating is worn through.
+
+    model: wear and accuracy; problem: contact and coefficient; state: worn depth and cycle before the jump.
+    """
 
     def jump_to(cycle: float) -> WearState:
         """Compute the state after a jump that ends at a given cycle or earlier."""
@@ -402,7 +410,10 @@ def _add_earlier_wear(model, patch):
 
 
 def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
-    """Return contact, slip path and measures of a worn patch as a WearMoment."""
+    """Return contact, slip path and measures of a worn patch as a WearMoment.
+
+    patch: solved with the worn depth of `state`; motion: function that computed the last slip path, with its measures.
+    """
     model = motion.model
     worn = make_worn_model(model, patch, state.depth)
     measures = compute_static_values(patch) | motion.last.values
@@ -472,6 +483,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
         columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
         return np.array(columns).T.reshape(area.shape)
 
+    # Cycles of each jump, and the slip path with which the run wore the patch
     jumps = []
     for before, after in pairwise(moments):
         jumps.append((after.cycle - before.cycle, interpolate_path(after.used)))

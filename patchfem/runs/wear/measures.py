@@ -93,6 +93,8 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
     error: error of the largest worn depth [m].
+
+    model, evolved: model with its wear, and the result of the jumps with their moments.
     """
     if find_worn_through_coating(model, evolved.state.depth) is None:
         return {}
@@ -304,6 +306,8 @@ def _warn_of_friction_table(model, evolved) -> list[str]:
             f"{format_length(table.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
             f"wear.friction to a depth of at least {format_length(depths[-1], 3)}"
         )
+
+    # Largest number of rows of the table that one jump passes; of more than one, some have no effect
     n_passed = 0
     for before, after in pairwise(depths):
         n_passed = max(n_passed, sum(before < row < after for row in table.depth))

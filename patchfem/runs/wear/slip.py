@@ -221,7 +221,10 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
 
 
 def _follow_slide(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a bench, with a number of frames in each of its cycles."""
+    """Compute the motion of a bench.
+
+    model, patch: model, and its solved patch; frames: number of frames in each cycle, 0 for histories only.
+    """
     cycles = max(1, round(model.slide.cycles or 1))
     run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
     if not frames:
@@ -244,7 +247,10 @@ def _follow_slide(model, patch, frames: int) -> _Motion:
 
 
 def _follow_rig(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a rig, with a number of frames in its last cycle."""
+    """Compute the motion of a rig.
+
+    model, patch: model, and its solved patch; frames: number of frames in the last cycle, 0 for histories only.
+    """
     settings = numerics.choose_numerics(model)
     solution = solve.solve_rig(model, settings, patch, frames)
     response = solution.response
@@ -288,6 +294,7 @@ def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
 def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
     """Return the histories of the last cycle of a bench or a rig.
 
+    model, window: model, and histories of the last cycles.
     load: constant load [N] of a rig; over grooves the window has the vertical force.
     """
     if model.rig is None:
@@ -341,6 +348,8 @@ def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, f
 
     The samples of the histories contain every reversal. Only the slope of grooves varies between them.
     load: normal load [N] to which the tractions are related.
+
+    model: friction and grooves; cycle: histories of the last cycle.
     """
     slip, force, loads = (row[:, None] for row in (cycle.slip, cycle.force, cycle.load))
     points = _make_point_slip(model, cycle, slip, force, np.array([load]), loads)
@@ -355,6 +364,8 @@ def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
     """Return the paths (s, m) [m] of the strips of a rig with yaw, and their relative error.
 
     The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact.
+
+    model, patch: model of the rig, and its patch in strips; window: histories of the last cycles with those of the strips.
     """
     loads = patch.strips.force.sum(axis=1)
     is_last = _is_in_last_cycle(model, window)

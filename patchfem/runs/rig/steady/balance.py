@@ -218,17 +218,19 @@ class BalanceFinder:
         motions = []
         for slides in list_coexisting_slides(motion, drive):
             try:
-                found = self._solve_balance(drive, slides)
+                candidate = self._solve_balance(drive, slides)
             except NotConverged:
                 continue
-            motions.append(self._add_stability(found, drive))
+            motions.append(self._add_stability(candidate, drive))
         output = self.modes.output
-        motions.sort(key=lambda each: each.amplitude(output))
-        stable_motions = [each for each in motions if each.stable]
+        motions.sort(key=lambda steady_motion: steady_motion.amplitude(output))
+        stable_motions = [steady_motion for steady_motion in motions if steady_motion.stable]
         if not stable_motions:
             return StableMotion(motion, stability)
 
-        sizes = ", ".join(format_length(each.amplitude(output), 3) for each in motions)
+        sizes = ", ".join(
+            format_length(steady_motion.amplitude(output), 3) for steady_motion in motions
+        )
         note = (
             f"at this drive {len(motions)} steady motions exist (amplitudes {sizes}), "
             f"{len(stable_motions)} of them stable"
@@ -285,7 +287,10 @@ class BalanceFinder:
     def _compute_measures(
         self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
     ) -> tuple[Values, CycleRun]:
-        """Compute the measures of a steady motion by name, and its cycle, from samples."""
+        """Compute the measures of a steady motion by name, and its cycle, from samples.
+
+        motion, drive: solution of the balance, and the sinusoidal drive; samples: number per cycle.
+        """
         window = make_cycle_response(motion, self.modes, drive, samples)
         energies = find_cycle_energies(motion, self.modes)
         speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)

@@ -107,13 +107,13 @@ class CurveInProgress:
     def refine_maximum(self, place: float, tolerance: float) -> None:
         """Add points until the maximum next to a position is known within a fraction of its width."""
         heights = self.find_heights()
-        at = np.array(self.positions)
+        positions = np.array(self.positions)
         k = self.positions.index(place)
         width = min(
-            _measure_peak_width(heights[k:], at[k:] - place),
-            _measure_peak_width(heights[k::-1], place - at[k::-1]),
-        ) or np.ptp(at)
-        bounds = at[max(k - 1, 0)], at[min(k + 1, at.size - 1)]
+            _measure_peak_width(heights[k:], positions[k:] - place),
+            _measure_peak_width(heights[k::-1], place - positions[k::-1]),
+        ) or np.ptp(positions)
+        bounds = positions[max(k - 1, 0)], positions[min(k + 1, positions.size - 1)]
         options = {"xatol": tolerance * width, "maxiter": MAX_ADDED_POINTS}
         try:
             minimize_scalar(self._compute_depth, bounds=bounds, method="bounded", options=options)
@@ -209,7 +209,10 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
-    """Return the differences of all measures between a curve point and a Solution."""
+    """Return the differences of all measures between a curve point and a Solution; {} if the point has no steady motion.
+
+    finder: computes steady motions; neighbour: curve point with drive and first guess; solution: motion at the peak.
+    """
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)
     except NotConverged:
