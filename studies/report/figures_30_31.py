@@ -121,12 +121,9 @@ def counts(sets: list) -> tuple:
 
 def count_held(sets: list, row) -> int:
     """Count the comparisons of the sets whose interval contains the ratio of the whole areas."""
+    ratios = [(one.parts[way].values["amplitude_ratio"], way) for one in sets for way in (0, 1)]
     return sum(
-        one.parts[way].values["amplitude_ratio"].low
-        < row.after[way]
-        < one.parts[way].values["amplitude_ratio"].high
-        for one in sets
-        for way in (0, 1)
+        ratio.low < row.after[way] < ratio.high for ratio, way in ratios if ratio.low is not None
     )
 
 

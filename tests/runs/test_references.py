@@ -148,7 +148,7 @@ PATCHES = {
     ),
     "balanced": ("static_7017", {"moment": -6.73948e-5}, 2.1e-5, (1e-3, 1e-4)),
     "stiffness": (
-        7029,
+        "static_7029",
         {"normal_stiffness": 220205694.0, "rotational_stiffness": 1541.8782},
         4e-5,
         (1e-2, 1e-3),
