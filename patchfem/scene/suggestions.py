@@ -173,8 +173,9 @@ def _suggest_name(
     # for a key that the file contains.
     path = f"{table_key}.".lstrip(".")
     is_set = f"{path}{key}" in sets
-    written = {name for name in raw if not is_set or f"{path}{name}" in sets}
     keys = list_keys(model)
+    # Only the known keys are looked up: a table may contain thousands of unknown ones, each of which comes here.
+    written = [name for name in keys if name in raw and (not is_set or f"{path}{name}" in sets)]
     free = [name for name in keys if name not in written and keys[name].accepts_value]
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
@@ -186,7 +187,7 @@ def _suggest_name(
             (name for name in fitting if words & set(name.split("_")) or name.startswith(word)),
             lacking if len(lacking) == 1 or not is_set else (),
             _list_similar(key, free),
-            _list_similar(key, written & keys.keys() if table_key else keys),
+            _list_similar(key, written if table_key else keys),
         ),
         "",
     )

@@ -120,7 +120,7 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
         slip,
         cell,
         column["friction_force"],
-        np.abs(cell).max() / LIMIT,
+        STIFFNESS * found.measures["relative_displacement_amplitude"].value / LIMIT,
         found.measures["loop_area"].value / (4 * LIMIT * STROKE),
         turns // 4,
         np.count_nonzero(np.diff(stuck.astype(int)) == 1) / 2,

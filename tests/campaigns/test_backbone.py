@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import compute_backbone
+from patchfem.campaigns.fits.curve import compute_points
 from patchfem.export import backbones
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
@@ -176,6 +177,12 @@ def test_refuses_scenes_without_a_rig():
     )
     assert "sliding speed" in backbone.missing["quasi-static"] and set(backbone.curves) >= {
         "balance"
+    }
+    grooves = '[normal.grooves]\nwavelength = "80 um"\namplitude = "6.5 um"\n'
+    backbone = compute_backbone(pf.build(make_shaken_block(PLASTIC) + grooves), "", [1e-5])
+    assert backbone.missing == {
+        "balance": "balance cannot be computed on grooves",
+        "quasi-static": "static curve cannot be computed on grooves",
     }
 
 
@@ -376,9 +383,14 @@ def test_quasi_static_curve_ends_at_maximum_force():
     scene = make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :].replace(
         "[[structure.mode]]", bonded, 1
     )
-    backbone = compute_backbone(
-        pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",)
-    )
-    assert backbone.curves["quasi-static"].amplitude.size == 3
+    model = pf.build(scene)
+    amplitudes = np.array([5e-6, 1e-5, 1.5e-5, 5e-5])
+    backbone = compute_backbone(model, "", amplitudes, ("quasi-static",))
+    curve = backbone.curves["quasi-static"]
+    assert curve.amplitude.size == 3
+    # A fit takes the points of the curve at its amplitudes in any order, and knows none beyond the end.
+    points = compute_points(model, amplitudes[::-1], "quasi-static")
+    assert np.isnan(points[:, 0]).all()
+    assert points[:, :0:-1] == pytest.approx(np.array([curve.frequency, curve.damping]), rel=1e-9)
     assert "curve does not reach these" in backbone.notes[0]
     assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))

@@ -3,29 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
-from scene_texts import COATED, COULOMB
 
 from patchfem.export.fields import vtkhdf
 from patchfem.export.fields.blocks import make_blocks
 from patchfem.runs import PieceFields, Pieces
 
-CROWNED = (
-    COATED
-    + """\
-[contact.crown]
-radius = "80 m"
-[contact.shear]
-"""
-    + COULOMB
-    + """\
-[slide]
-kind = "triangle"
-amplitude = "0.4 um"
-speed = "0.2 mm/s"
-[accuracy]
-steps_per_cycle = 40
-"""
-)
 X = np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3])  # columns of nodes [m]
 
 

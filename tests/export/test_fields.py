@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import pyvista
 from command_line import run_cli
-from exported import CROWNED, frame_values, write_small_series
+from exported import frame_values, write_small_series
+from scene_texts import CROWNED_BENCH
 from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -200,7 +201,7 @@ def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code
 @pytest.fixture(scope="module")
 def crowned_run():
     """Return the result of a crowned pair."""
-    return pf.run(CROWNED)
+    return pf.run(CROWNED_BENCH)
 
 
 def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):

@@ -9,8 +9,9 @@ from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
 from scipy.integrate import solve_ivp
 
-from patchfem import plan, run
+from patchfem import build, plan, run
 from patchfem.core import PatchfemError
+from patchfem.runs.run import hash_run
 from patchfem.scene import load
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
@@ -58,6 +59,14 @@ def write_path_scene(tmp_path):
 
 
 HEAD = "time [s],displacement [um]\n"
+
+
+def test_saved_state_belongs_to_the_path_and_not_to_its_name(write_path_scene):
+    """Runs with the same scene resume from one another only if the file of the path has the same rows."""
+    keys = [
+        hash_run(build(write_path_scene(f"{HEAD}0,0\n1,{end}\n")), None, "1") for end in (1, 1, 2)
+    ]
+    assert keys[0] == keys[1] != keys[2]
 
 
 @pytest.mark.parametrize("text, message", [

@@ -73,12 +73,14 @@ SIZES = {
     "stiffness": ["3e6 N/m", "2e7 N/m"],
     "rotational stiffness": ["300 N m/rad"],
 }
-QUICK = 0, 1, 5  # positions in SCENES of scenes that run in seconds
-# keys used only in messages or for errors, and choices that "auto" also makes
+QUICK = 0, 1, 5, 8  # positions in SCENES of scenes that run in seconds
+# keys used only in messages or for errors, a limit of CPU time that short runs do not reach, and choices that "auto" also
+# makes
 NEVER = (
     "title",
     "structure.mode.0.name",
     "accuracy.tolerance",
+    "accuracy.max_seconds",
     "accuracy.quadrature",
     "accuracy.method",
 )

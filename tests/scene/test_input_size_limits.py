@@ -119,12 +119,10 @@ def test_refuses_control_characters():
     ]
 
 
-@pytest.mark.slow
 def test_always_many_mistakes_are_reported_in_linear_time():
-    """20 000 mistakes are reported one by one in less than 5 s of CPU time."""
+    """10 000 mistakes are reported one by one in less than 2.5 s of CPU time."""
     begin = time.process_time()
-    found = list_mistakes(POINT + "".join(f"k{k} = 1\n" for k in range(20_000)))
-    assert sum("unknown key" in one for one in found) == 20_000
-    assert (
-        time.process_time() - begin < 5
-    )  # measured: 1.3 s; comparing every mistake with all others took 40 s
+    found = list_mistakes(POINT + "".join(f"k{k} = 1\n" for k in range(10_000)))
+    assert sum("unknown key" in one for one in found) == 10_000
+    # measured: 0.5 s; reading all keys of the table for each unknown one took 5.2 s
+    assert time.process_time() - begin < 2.5

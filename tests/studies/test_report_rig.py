@@ -32,6 +32,14 @@ def test_figure_8_loop_area_equals_the_friction_work():
     assert loop.work == pytest.approx(1 - figure.LIMIT / figure.STIFFNESS / figure.STROKE, rel=5e-3)
 
 
+def test_figure_8_piece_sticks_on_almost_every_swing():
+    """With static friction above kinetic the last of six cycles has all its events, of more than 1600 in the run."""
+    figure = load_study("report/figure_8.py")
+    kinetic = figure.loop(2.0, 0.33)
+    assert_contains(figure.__doc__, f"the cell shows {kinetic.peak:.2f}")
+    assert kinetic.sticks > 50 > 10 > figure.loop(2.0).sticks
+
+
 @pytest.mark.slow
 def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
     """Peaks, static friction coefficient and length from the loops are those stated in the study."""
@@ -53,9 +61,6 @@ def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
         f"{loops[10].swings} swings a stroke at 10 Hz and {loops[20].swings}",
         f"is {loops[10].work:.2f} of that",
     )
-    kinetic = figure.loop(2.0, 0.33)
-    assert_contains(figure.__doc__, f"the cell shows {kinetic.peak:.2f}")
-    assert kinetic.sticks > 50 > 10 > figure.loop(2.0).sticks
     assert figure.ANSWER in capsys.readouterr().out
     assert "load cell" in (tmp_path / "x.svg").read_text()
 

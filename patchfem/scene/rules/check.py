@@ -37,6 +37,7 @@ def check_scene(draft: SceneDraft) -> str:
         check_together,
         check_quadrature,
         check_settings,
+        _remark_unused_motions,
         _check_sliding,
         check_length,
         check_energy_gain,
@@ -80,6 +81,16 @@ def find_kind(draft: SceneDraft) -> str:
     if "slide" in tables:
         return "bench"
     return "linear" if tables == {"structure", "drive"} else "rig"
+
+
+def _remark_unused_motions(draft: SceneDraft, kind: str) -> None:
+    """Add remarks on motions of modes that have no effect because the scene, of this `kind`, has no friction."""
+    for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
+        for key in filter(mode.__getitem__, ("normal", "pitch", "yaw")):
+            draft.add_remark(
+                f"structure.mode.{index}.{key}",
+                "has no meaning in a linear scene, which has no friction, and is not used",
+            )
 
 
 def _check_sliding(draft: SceneDraft, kind: str) -> None:

@@ -95,6 +95,7 @@ def test_exact_compare_json_has_the_keys_of_the_contract(written):
     if "worn_volume" in data:
         assert place.keys() >= {"shift_x", "shift_y", "rotation", "mirrored"}
         assert place["mirrored"] is True and data["track"] is None
+        assert data["roughness"]["reason"] == sentences.REASONS["scans"]
     else:
         sizes = {"from", "to", "depth_mean", "depth_floor", "area_net", "area_gross", "pile_up"}
         assert sizes <= data["track"].keys()

@@ -17,6 +17,7 @@ from patchfem import build
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.friction.bonds.list_rows_kernels import MAX_STRIP_LENGTH
 from patchfem.points.contacts import make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
@@ -66,7 +67,7 @@ def pad_traction(law, depth, tail):
     return traction[np.argsort(order)[: depth.size]]
 
 
-@pytest.mark.share(0, 5, 7)
+@pytest.mark.share(0, 2, 5, 7)
 @pytest.mark.parametrize(
     "order, reading, tail",
     [(0.0, "report", 0.0), (1.0, "report", 0.0), (1.0, "stretch", 0.0), (1.0, "stretch", None)],
@@ -81,7 +82,12 @@ def test_exact_resultant_of_pad_on_lower_piece(order, reading, tail, width, expe
     depth = width * (1 + y) / 2
     tau = pad_traction(Bonds(1.0, 1.0, order, reading), depth, tail)
     s = order + 1
-    assert tau == pytest.approx(gammainc(s, depth), abs=1e-11)
+
+    # A list of reading "stretch" has two Gauss points per strip of at most h bond lengths. Their error is h^4/4320 times the
+    # change of the third derivative of x exp(-x), which is at most 3.02. The other forms of the sum are exact.
+    is_summed = reading == "stretch" and tail is not None
+    rule_error = 3.02 / 4320 * MAX_STRIP_LENGTH**4 if is_summed else 0.0
+    assert tau == pytest.approx(gammainc(s, depth), abs=1e-11 + rule_error)
     assert w / 2 @ tau == pytest.approx(
         gammainc(s, width) - s / width * gammainc(s + 1, width), abs=1e-8
     )

@@ -77,17 +77,26 @@ def test_exact_lift_off_erases_traction_and_memory(law, tail):
     assert run.mean[5:] == pytest.approx(fresh.mean, abs=1e-14)
 
 
-@pytest.mark.share(0, 3)
+@pytest.mark.share(0, 3, 8)
 @pytest.mark.parametrize("law, tail", LAWS)
 @pytest.mark.parametrize("load_amplitude", [0.1, 0.2])
 def test_exact_alternating_load_causes_no_drift(law, tail, load_amplitude):
-    """A load that alternates at rest leaves the traction at half the friction limit unchanged, so nothing slips."""
+    """A load that alternates at rest leaves the traction at half the friction limit unchanged, so nothing slips.
+
+    Bonds that are known by their moments keep it as long as m >= z^2/s2; the first fall of the load beyond that reduces it.
+    """
     loading = march_under_loads(law, np.linspace(0.0, 2.0, 201), np.ones(201), 0.01, tail)
     count = int(np.argmax(np.abs(loading.traction[:, 0]) > 0.15))
     path = np.append(0.01 * np.arange(count + 1), np.full(18, 0.01 * count))
     cycle = [1 - load_amplitude, 1 + load_amplitude, 1.0]
     run = march_under_loads(law, path, np.append(np.ones(count + 1), 6 * cycle), 0.01, tail)
-    assert run.traction[count:, 0] == pytest.approx(run.traction[count - 1, 0], abs=1e-15)
+    traction = run.traction[count - 1, 0]
+    if tail is None and law is not PLASTIC:
+        # Sums over the bonds after a path q without reversal in bond lengths: z = 1 - exp(-q) and s2.
+        q = path[-1]
+        moment = 2 - 2 * (1 + q) * np.exp(-q)
+        traction *= min(1.0, (1 - load_amplitude) * moment / (1 - np.exp(-q)) ** 2)
+    assert run.traction[count:, 0] == pytest.approx(traction, abs=1e-15)
 
 
 def load_bench(law, motion, normal):
