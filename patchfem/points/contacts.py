@@ -18,7 +18,7 @@ from .laws import (
     make_coulomb,
     make_cubic,
     make_interlocking,
-    make_jenkins,
+    make_jenkins_points,
     make_list,
     make_tanh,
 )
@@ -132,8 +132,8 @@ def convert_element(element: Element) -> list[PointLaw]:
         return [make_coulomb(numbers[1], numbers[2])]
     if element.form == "parallel":
         count = int(numbers[1])
-        pairs = zip(numbers[2 : 2 + count], numbers[2 + count : 2 + 2 * count])
-        return [make_jenkins(stiffness * length, length) for stiffness, length in pairs]
+        stiffness, length = numbers[2 : 2 + 2 * count].reshape(2, count)
+        return make_jenkins_points(stiffness * length, length)
 
     rows = np.zeros(N_NUMBERS)
     memory = np.zeros(N_MEMORY)
@@ -189,7 +189,7 @@ def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact
         Elements of a patch.
     """
     limits = np.multiply(stiffness, yield_slide)
-    laws = [make_jenkins(limit, length) for limit, length in zip(limits, yield_slide)]
+    laws = make_jenkins_points(limits, yield_slide)
     return Contact([PointSet(laws, row)], float(limits.sum()), elements=elements)
 
 
@@ -296,7 +296,7 @@ def make_pressed_contact(
 
     elif name != "bonds":
         length = law.bond_length or 0.0
-        laws = [make_jenkins(law.static, length, load) for load in loads]
+        laws = make_jenkins_points(law.static, length, loads)
     elif bond_sum is None:
         length = law.length
         laws = [make_bonds(law, load) for load in loads]
@@ -334,7 +334,7 @@ def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shar
     if is_bonds:
         laws = [make_bonds(law, normal * share) for share in shares]
     else:
-        laws = [make_jenkins(law.static, length, normal * share) for share in shares]
+        laws = make_jenkins_points(law.static, length, normal * shares)
     points = PointSet(laws, row, None, shear)
     limit = grooves.max_force(load, law.static)
     return Contact([points], limit, length, preload=load, grooves=grooves)

@@ -57,6 +57,12 @@ def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
     return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
 
 
+def make_jenkins_points(static, length, load=1.0) -> list[PointLaw]:
+    """Return one elastic-plastic point per entry of `static`, `length` [m] and `load` [N], which are broadcast to (c,)."""
+    points = make_jenkins(*np.broadcast_arrays(static, length, load))
+    return [PointLaw(*one) for one in zip(points.numbers.T, points.memory.T, points.load)]
+
+
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
     """Return a rigid point with static and kinetic friction.
 

@@ -343,18 +343,19 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     numbers = np.zeros((N_NUMBERS, len(laws)))
     memory = np.zeros((max([N_MEMORY, *(law.memory.size for law in laws)]), len(laws)))
     values = np.zeros((len(Point), max(len(laws), n_nodes)))
+    loads = np.array([law.load for law in laws], float)
+    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : len(laws)] = loads
     for j, law in enumerate(laws):
         numbers[:, j] = law.numbers
         memory[: law.memory.size, j] = law.memory
-        values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
-        if law.numbers[0] == Law.BONDS:
-            memory[4, j] = law.memory[0]  # bond length in the middle of a step
+    has_bonds = numbers[0] == Law.BONDS
+    memory[4, has_bonds] = memory[0, has_bonds]  # bond length in the middle of a step
 
     resultant = contact.preload
     if contact.grooves is not None:
         resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
     # A single point carries a prescribed load that is 0 at the start.
-    share = np.array([law.load / resultant if resultant > 0 else 1.0 for law in laws], float)
+    share = loads / resultant if resultant > 0 else np.ones(len(laws))
 
     # Nodes, shares of the load and shear shapes of each set of points.
     nodes = np.full(len(laws), RESULTANT, np.int64)
