@@ -717,6 +717,7 @@ class March:
             "booked": friction,
             "sampled": float(sampled),
             "passed": float(passed),
+            "points": float(self.system.points.port.size),
         }
         if self.system.options.has_lists:
             names = ("created", "dissipated", "substeps", "strips")
