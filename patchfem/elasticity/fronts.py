@@ -299,10 +299,7 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
 def _unite(parts) -> np.ndarray:
     """Return the different nodes of several arrays of nodes, sorted; `np.unique` takes several times as long for few."""
     nodes = np.sort(np.concatenate(parts, axis=None))
-    is_new = np.empty(nodes.size, bool)
-    is_new[0] = True
-    np.not_equal(nodes[1:], nodes[:-1], out=is_new[1:])
-    return nodes[is_new]
+    return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
 
 
 def _assemble_cells(blocks, order, position) -> np.ndarray:

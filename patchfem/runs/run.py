@@ -136,6 +136,7 @@ class _Passes:
         self.estimate = estimate
         self.next_seconds = 0.0
         self._count = 0
+        self._pressed: tuple[Face, ...] = ()
         self._begin = process_time()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
@@ -143,8 +144,8 @@ class _Passes:
         begin = process_time()
         seconds = {}
         try:
-            before = () if earlier is None else earlier.pressed
-            result, pressed = self._run_model(model, seconds, before)
+            result, pressed = self._run_model(model, seconds)
+            self._pressed = pressed
         except (NotConverged, Missing):
             if earlier is None:
                 raise
@@ -177,13 +178,11 @@ class _Passes:
             self.say(verdict.reason)
         return verdict
 
-    def _run_model(
-        self, model: Model, seconds, before: tuple[Face, ...]
-    ) -> tuple[Result, tuple[Face, ...]]:
+    def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[Face, ...]]:
         """Press the interfaces of a model, wear them, and compute its motion; return the result and the interfaces.
 
-        A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step, and
-        `before` are the interfaces of the pass before, whose meshes are not solved again.
+        A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step. The
+        meshes of the pass before are not solved again.
         """
         start = perf_counter()
         run_plan = replace(self.plan, model=model)
@@ -192,7 +191,7 @@ class _Passes:
         if model.rig is not None:
             warnings += engines.describe_unused_settings(model, run_plan.engine)
 
-        pressed = _press_interfaces(model, before, estimate=self.estimate)
+        pressed = _press_interfaces(model, self._pressed, estimate=self.estimate)
         if pressed:
             seconds["contact"] = perf_counter() - start
         stiffer = None

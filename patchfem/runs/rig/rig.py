@@ -5,7 +5,7 @@ finer settings until its measures meet the tolerance; `run_rig` completes it.
 """
 
 from dataclasses import dataclass, replace
-from math import ceil, floor, log2
+from math import ceil
 
 import numpy as np
 
@@ -302,13 +302,6 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         measures = {AMPLITUDE: measures[AMPLITUDE]}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if run.numerics.local else "steps"
-    if axis == "steps":
-        # A measure whose error the smallest possible steps would not reduce enough does not count.
-        finest = min(MAX_MARCH_STEPS, MAX_RUN_STEPS / run.numerics.cycles)
-        reach = refine.ERROR_RATIO ** floor(log2(finest / run.numerics.steps))
-        measures = {
-            name: one for name, one in measures.items() if one.error_ratio(tolerance) <= reach
-        }
     excess = refine.find_worst_measure(measures, tolerance, [axis]).excess
     has_stalled = len(excesses) > 1 and excess >= excesses[-2]
     return refine.Verdict(excess, None if not excess or has_stalled else run.numerics.finer())
