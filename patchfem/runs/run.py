@@ -136,6 +136,7 @@ class _Passes:
         self.estimate = estimate
         self.next_seconds = 0.0
         self._count = 0
+        self._pressed: tuple[Face, ...] = ()
         self._begin = process_time()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
@@ -144,6 +145,7 @@ class _Passes:
         seconds = {}
         try:
             result, pressed = self._run_model(model, seconds)
+            self._pressed = pressed
         except (NotConverged, Missing):
             if earlier is None:
                 raise
@@ -179,7 +181,8 @@ class _Passes:
     def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[Face, ...]]:
         """Press the interfaces of a model, wear them, and compute its motion; return the result and the interfaces.
 
-        A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step.
+        A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step. The
+        meshes of the pass before are not solved again.
         """
         start = perf_counter()
         run_plan = replace(self.plan, model=model)
@@ -188,7 +191,7 @@ class _Passes:
         if model.rig is not None:
             warnings += engines.describe_unused_settings(model, run_plan.engine)
 
-        pressed = _press_interfaces(model, estimate=self.estimate)
+        pressed = _press_interfaces(model, self._pressed, estimate=self.estimate)
         if pressed:
             seconds["contact"] = perf_counter() - start
         stiffer = None
@@ -296,18 +299,25 @@ class _Passes:
         )
 
 
-def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
-    """Press all interfaces of a model that have a patch, on the meshes of the run and of its error estimate."""
+def _press_interfaces(
+    model: Model, before: tuple[Face, ...], *, estimate: bool
+) -> tuple[Face, ...]:
+    """Press all interfaces of a model that have a patch, on the meshes of the run and of its error estimate.
+
+    `before` are the interfaces of the pass before, () in the first one.
+    """
     if model.patch is None:
         return tuple(faces.solve_interface_patches(model)) if model.has_interface_patches else ()
     if model.has_bolted_patch:
         return (Face(0, "", model, joint.solve_patch(model)),)
     tolerance = model.accuracy.tolerance
-    patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate)
+    solved = (before[0].unworn or before[0].patches) if before else ()
+    patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
     static = ()
     # After wear the static measures are those of the worn patch.
     if model.kind == "bench" and model.wear is None and not _is_open(patches[0]):
-        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate)
+        solved = before[0].static if before else ()
+        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate, solved)
     return (Face(0, "", model, patches, static=static),)
 
 

@@ -25,7 +25,9 @@ SLIP_REFERENCE_TOL = 1e-3
 MAX_COLUMNS_WITHOUT_COARSER = 8
 
 
-def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> Patches:
+def solve_with_coarser(
+    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
+) -> Patches:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
     On each mesh the pieces are condensed to the nodes of the interface, so that a compliance [m/N]
@@ -46,6 +48,8 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         Relative error that the static measures have to meet.
     estimate : bool
         Whether to solve the coarser meshes as well.
+    solved : tuple
+        Patches of an earlier pass, from fine to coarse, whose meshes are refined further.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     """
     mesh = patch_model.mesh
     if mesh.shared is None and mesh.is_automatic:
-        return solve_on_refined_meshes(patch_model, tolerance, estimate)
+        return solve_on_refined_meshes(patch_model, tolerance, estimate, solved)
     levels = (mesh.shared or make_given_meshes(patch_model))[: None if estimate else 1]
     condense_level = condense if mesh.shared is None else condense_once
 
@@ -117,7 +121,9 @@ def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshe
     return levels
 
 
-def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
+def solve_on_refined_meshes(
+    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
+) -> Patches:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
     At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
@@ -135,6 +141,8 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         Relative error that the static measures have to meet.
     estimate : bool
         If False, only the third mesh is solved.
+    solved : tuple
+        Patches of an earlier pass, from fine to coarse, which are not solved again.
 
     Returns
     -------
@@ -142,14 +150,20 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         Patches on all meshes, from fine to coarse. The first has the static measures of the last
         turn of the refinement (`Patch.measures`), by which the refinement ended.
     """
-    grids = make_base_grids(patch_model).bodies
+    solved = tuple(patch for patch in solved if patch is not None)
+    if solved:
+        grids = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
+    else:
+        grids = make_base_grids(patch_model).bodies
     patches = ()
     points = None
     has_tried_points = False
     n_finer = patch_model.mesh.n_finer
     while True:
         patch = None
-        if estimate or len(patches) == MIN_LEVELS - 1:
+        if len(patches) < len(solved):
+            patch = solved[-1 - len(patches)]
+        elif estimate or len(patches) == MIN_LEVELS - 1:
             try:
                 coarse = patches[0] if patches else None
                 pair = condense(patch_model, *grids)
@@ -180,7 +194,8 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             and profile_points.can_use_points(patch_model)
         ):
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
-            points = profile_points.solve_on_points(patch_model, meets_tolerance)
+            points = solved[0].points if solved else None
+            points = points or profile_points.solve_on_points(patch_model, meets_tolerance)
             # points that do not converge do not do so on the next mesh either
             has_tried_points = True
             patches = with_static_measures(patches, tolerance, points)
@@ -189,7 +204,8 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
         is_done = is_done and resolves_slip_work(patch_model, patches, tolerance)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
-            if n_finer == 0:
+            # The static measures of a bench need no finer mesh when its motion does.
+            if n_finer == 0 or (is_done and patch_model.mesh.is_static):
                 return patches
             n_finer -= 1
 
@@ -217,7 +233,9 @@ def max_condensing_seconds(patch_model, tolerance: float) -> float:
     )
 
 
-def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
+def solve_on_static_meshes(
+    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
+) -> Patches:
     """Solve a bench patch with partial slip on the meshes of a static run.
 
     Parameters
@@ -228,6 +246,8 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
         Relative error that the static measures have to meet.
     estimate : bool
         If False, only the third mesh is solved.
+    solved : tuple
+        Patches of an earlier pass, from fine to coarse.
 
     Returns
     -------
@@ -242,7 +262,7 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
     ):
         return ()
     static = patch_model.with_mesh(is_static=True, slip=None)
-    return solve_on_refined_meshes(static, tolerance, estimate)
+    return solve_on_refined_meshes(static, tolerance, estimate, solved)
 
 
 def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:

@@ -206,12 +206,13 @@ def notes_on_neglected_effects(face) -> list[str]:
         )
 
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # An unstructured mesh has no coarser one: its second mesh is finer than its first. Even the
-        # coarsest mesh of a static patch has 20 cells along the contact, which is enough for the change.
+        # An unstructured mesh has no coarser one: its second mesh is finer than its first. The coarsest
+        # mesh of a static patch, and the next one in a motion, have 20 cells along the contact, which are
+        # enough for the change.
         other = patch
         if coarse[-1] is not None:
             mesh = patch_model.mesh
-            other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[0]
+            other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[-2:][0]
         out += store.get_or_compute(
             ("plane band", other), lambda: note_on_plane_state(patch_model, other)
         )

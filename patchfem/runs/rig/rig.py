@@ -42,6 +42,8 @@ MIN_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
 # tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
 MAX_REFINED_WORK = 1e8
+# The same for measures that are not main ones; it takes some 0.1 s of CPU time.
+MAX_OTHER_WORK = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0
 
@@ -285,17 +287,24 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     """Decide whether a run is repeated with smaller steps, after runs with given excesses.
 
     It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
-    depend on the steps. In a run that takes too much time (MAX_REFINED_WORK), the displacement alone counts.
+    depend on the steps. In a run that takes some time (MAX_OTHER_WORK), main measures alone count, and in one that takes
+    too much time (MAX_REFINED_WORK) the displacement.
     """
     if _is_finest(run):
         return refine.Verdict(0.0)
-    nodes = max(1 if run.patch is None else run.patch.x.size, run.solution.book.get("strips", 0.0))
+    counters = run.solution.book
+    nodes = max(
+        1.0 if run.patch is None else run.patch.x.size,
+        *(counters.get(n, 0.0) for n in ("points", "strips")),
+    )
     work = run.numerics.steps * run.numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_WORK
 
     tolerance = run.model.accuracy.tolerance
     measures = set_final_floors(complete_measures(run).measures, tolerance)
+    if work > MAX_OTHER_WORK:
+        measures = {name: one for name, one in measures.items() if refine.is_main(name)}
     if work > MAX_REFINED_WORK:
         measures = {AMPLITUDE: measures[AMPLITUDE]}
     # The engine `hybrid` estimates the error of its steps itself.
