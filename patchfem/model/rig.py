@@ -195,6 +195,8 @@ class BoltedJoint(NamedTuple):
       a patch has to be solved for it.
     - build_rig: function of the stiffness [N/m] of a joint with a patch that returns the rig without this joint;
       None if the stiffness follows from the friction laws alone.
+    - build_stiffer_rig: the same for a joint that is stiffer by the error of its stiffness, if this stiffness determines
+      the slide of the modes; else None.
     - model: Model of the scene with this joint; None if it is the model of the rig itself.
     - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick; None without one.
     """
@@ -202,6 +204,7 @@ class BoltedJoint(NamedTuple):
     scene: str
     stiffness: tuple[float, ...] = ()
     build_rig: "Callable[[float], Rig] | None" = None
+    build_stiffer_rig: "Callable[[float], Rig] | None" = None
     model: JointModel | None = None
     stuck_stiffness: float | None = None
 

@@ -113,17 +113,18 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     with locate_errors(model.source):
         written_patches = patches if bolted.model is None else solve_patch(written)
         own = _find_stick_stiffness(model, patches)
-        taken_off = _find_stick_stiffness(written, written_patches)
+        stiffness, stiffer = find_bolted_stiffness(written, written_patches)
 
-        def subtract(n_errors: float) -> FreeRig:
-            """Subtract the joint with a stiffness that is larger by a number of its errors."""
+        def subtract(joint_stiffness: float, n_errors: int, build_rig) -> FreeRig:
+            """Subtract a joint [N/m] from the modes; the stiffness of the patch is larger by a number of its errors.
+
+            `build_rig` returns the rig without the joint.
+            """
             own_patches = _match_stiffness(patches, own, n_errors)
-            (written_patch,) = _match_stiffness(written_patches[:1], taken_off, n_errors)
-            stiffness = compute_full_stick_stiffness(written, written_patch)
-            rig = bolted.build_rig(stiffness)
+            rig = build_rig(joint_stiffness)
             removed = bolted._replace(
                 build_rig=None,
-                stiffness=(stiffness,),
+                stiffness=(joint_stiffness,),
                 stuck_stiffness=compute_full_stick_stiffness(model, own_patches[0]),
             )
             rig = replace(rig, structure=replace(rig.structure, bolted=removed))
@@ -131,8 +132,29 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
 
         # The second result has the joint stiffer by its error, and its change is the error of the
         # motion.
-        free = subtract(0.0)
-        return free if own is None else free._replace(stiffer=subtract(1.0))
+        free = subtract(stiffness, 0, bolted.build_rig)
+        if own is None:
+            return free
+        build_stiffer_rig = bolted.build_stiffer_rig or bolted.build_rig
+        return free._replace(stiffer=subtract(stiffer, 1, build_stiffer_rig))
+
+
+def find_bolted_stiffness(model: Model, patches: Sequence) -> tuple[float, float]:
+    """Return the stiffness [N/m] of a joint that is subtracted from bolted modes, and that of a joint stiffer by its error.
+
+    Both are 0 without contact.
+
+    Parameters
+    ----------
+    model : Model
+        Model with the joint that was bolted in the modal test.
+    patches : sequence of Patch or None
+        Its patch on its meshes, from fine to coarse.
+    """
+    own = _find_stick_stiffness(model, patches)
+    matched = [_match_stiffness(patches[:1], own, n_errors)[0] for n_errors in (0, 1)]
+    stiffness, stiffer = (compute_full_stick_stiffness(model, patch) for patch in matched)
+    return stiffness, stiffer
 
 
 def compute_full_stick_stiffness(model: Model, patch) -> float:
@@ -217,7 +239,7 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
 
 
 def _match_stiffness(
-    patches: Sequence, stiffness: StickStiffness | None, n_errors: float
+    patches: Sequence, stiffness: StickStiffness | None, n_errors: int
 ) -> list[Patch | None]:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:

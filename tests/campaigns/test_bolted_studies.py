@@ -40,6 +40,23 @@ tangential_ratio = 0.8
 law = "coulomb"
 static = 0.3
 """
+LAP_JOINT = """\
+[contact]
+length = "40 mm"
+width = "30 mm"
+height = "10 mm"
+element_size = "{size}"
+load = "10.7 kN"
+substrate = "steel"
+[contact.crown]
+radius = "31 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.34
+[accuracy]
+tolerance = 1e-2
+"""
 MODE = f"""\
 [structure]
 moving_mass = "{MASS} kg"
@@ -105,6 +122,27 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
         for changes in ({}, {"contact.load": "4.8 kN"})
     ]
     assert free[1] == pytest.approx(free[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["quasi_static", "balance"])
+def test_always_errors_of_assumed_slides_include_the_stiffness_of_the_joint(method):
+    """Coarse and fine meshes agree within their errors, and on each the joint has a tenth of the stiffness of the mode."""
+    coarse, fine = (
+        pf.backbone(
+            LAP_JOINT.format(size=size),
+            modes="74 Hz:0.002",
+            amplitudes="0.1 mm, 0.5 mm, 2 mm, 6 mm",
+            method=method.replace("_", "-"),
+        )
+        for size in ("0.5 mm", "0.125 mm")
+    )
+    for curves in (coarse, fine):
+        assert curves.attrs["free_frequency"] == pytest.approx(74 * np.sqrt(0.9), rel=1e-9)
+    for name in (f"{method}_frequency", f"{method}_damping"):
+        error = coarse[f"{name}_error"] + fine[f"{name}_error"]
+        assert (np.abs(coarse[name] - fine[name]) <= error).all(), name
+    # In gross slip the frequency is nearly the free one, whatever the stiffness of the joint.
+    assert coarse[f"{method}_frequency_error"][-1] < 2e-3
 
 
 @pytest.mark.slow

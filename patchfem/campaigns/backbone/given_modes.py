@@ -1,6 +1,7 @@
 """Model of a backbone from a scene without modes, or from modes given beside the scene."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,6 @@ from ...formatting import format_quantity
 from ...model.model import Model
 from ...model.structure import compute_sticking_stiffness
 from ...runs import joint
-from ...runs.patch import mesh_levels
 from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, parse_modes
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
@@ -68,11 +68,19 @@ def prepare_model(
     given_modes = tables.modes
 
     # The joint that was bolted in the modal test is that of the scene as written.
-    stiffness = _find_sticking_stiffness(build(BackboneTables(given_modes, stuck=False), None))
+    stiffness, stiffer = _find_sticking_stiffness(
+        build(BackboneTables(given_modes, stuck=False), None)
+    )
     used_modes = given_modes
     if stiffness is not None:
-        used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
+        mass = model.rig.modes.mass
+        used_modes = _assume_slides(given_modes, stiffness / mass)
         model = build(BackboneTables(used_modes), sets)
+        # The error of the stiffness is an error of the assumed slides as well.
+        if stiffer > stiffness:
+            stiffer_modes = _assume_slides(given_modes, stiffer / mass)
+            stiffer_rig = build(BackboneTables(stiffer_modes), sets).rig
+            model = _attach_stiffer_rig(model, stiffer_rig)
 
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
     if tables.assumes_mass and not tables.is_assumed:
@@ -88,22 +96,30 @@ def prepare_model(
     return PreparedModel(model, notes)
 
 
-def _find_sticking_stiffness(model: Model) -> float | None:
-    """Return the stiffness [N/m] of the sticking contact of a model with a single interface.
+def _attach_stiffer_rig(model: Model, stiffer_rig) -> Model:
+    """Return a model of a bolted joint whose modes have the slides of another rig if the joint is stiffer by its error."""
+    structure = model.rig.structure
+    build_rig = stiffer_rig.structure.bolted.build_rig
+    bolted = structure.bolted._replace(build_stiffer_rig=build_rig)
+    return replace(model, rig=replace(model.rig, structure=replace(structure, bolted=bolted)))
 
-    It is None if the contact is rigid, or if there is not exactly one interface.
+
+def _find_sticking_stiffness(model: Model) -> tuple[float, float] | tuple[None, None]:
+    """Return the stiffness [N/m] of the sticking contact of a model, and the same with its error added.
+
+    Both are None if the contact is rigid, or if there is not exactly one interface.
     """
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
-        return None
+        return None, None
     if model.patch is not None:
-        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
-        stiffness = joint.compute_full_stick_stiffness(model, patch)
-        return stiffness if 0 < stiffness < np.inf else None
+        stiffness, stiffer = joint.find_bolted_stiffness(model, joint.solve_patch(model))
+        return (stiffness, stiffer) if 0 < stiffness < np.inf else (None, None)
     try:
-        return compute_sticking_stiffness(interfaces[0], model.nominal_load)
+        stiffness = compute_sticking_stiffness(interfaces[0], model.nominal_load)
+        return stiffness, stiffness
     except PatchfemError:
-        return None
+        return None, None
 
 
 def _assume_slides(
