@@ -239,7 +239,7 @@ def test_always_case_that_fails_keeps_shared_mesh_of_others():
     models = with_shared_meshes([*valid, fault, alone, tipping])
     assert models[2] is fault and models[3].patch.mesh.shared is None
     (with_others, _), (alone_shared, _) = (
-        case.patch.mesh.shared.levels[0] for case in (models[0], with_shared_meshes(valid)[0])
+        case.patch.mesh.shared[0] for case in (models[0], with_shared_meshes(valid)[0])
     )
     assert np.array_equal(with_others.points, alone_shared.points)
     with pytest.raises(PatchfemError, match="tips over"):
