@@ -113,18 +113,16 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     with locate_errors(model.source):
         written_patches = patches if bolted.model is None else solve_patch(written)
         own = _find_stick_stiffness(model, patches)
-        stiffness, stiffer = find_bolted_stiffness(written, written_patches)
+        stiffnesses = find_bolted_stiffness(written, written_patches)
+        builders = (bolted.build_rig, bolted.build_stiffer_rig or bolted.build_rig)
 
-        def subtract(joint_stiffness: float, n_errors: int, build_rig) -> FreeRig:
-            """Subtract a joint [N/m] from the modes; the stiffness of the patch is larger by a number of its errors.
-
-            `build_rig` returns the rig without the joint.
-            """
+        def subtract(n_errors: int) -> FreeRig:
+            """Subtract the joint with its stiffness (0) or with one that is larger by its error (1)."""
             own_patches = _match_stiffness(patches, own, n_errors)
-            rig = build_rig(joint_stiffness)
+            rig = builders[n_errors](stiffnesses[n_errors])
             removed = bolted._replace(
                 build_rig=None,
-                stiffness=(joint_stiffness,),
+                stiffness=(stiffnesses[n_errors],),
                 stuck_stiffness=compute_full_stick_stiffness(model, own_patches[0]),
             )
             rig = replace(rig, structure=replace(rig.structure, bolted=removed))
@@ -132,11 +130,8 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
 
         # The second result has the joint stiffer by its error, and its change is the error of the
         # motion.
-        free = subtract(stiffness, 0, bolted.build_rig)
-        if own is None:
-            return free
-        build_stiffer_rig = bolted.build_stiffer_rig or bolted.build_rig
-        return free._replace(stiffer=subtract(stiffer, 1, build_stiffer_rig))
+        free = subtract(0)
+        return free if own is None else free._replace(stiffer=subtract(1))
 
 
 def find_bolted_stiffness(model: Model, patches: Sequence) -> tuple[float, float]:
