@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press, press_to_approach
 
-from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
-from patchfem.contact.active_set import solve_primal, solve_primal_dual
+from patchfem.contact import StripCompliance, active_set, patch_problem, solve_by_gradients
 from patchfem.contact.conjugate_gradients import project_forces
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
@@ -186,7 +185,7 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     x = np.array([-1e-3, 0, 1e-3])
     problem = patch_problem(x, gap)
     for start in (gap < 0, np.ones(3, bool)):
-        assert solve_primal_dual(StripCompliance(CYCLE), problem, start)[0] is None
+        assert active_set.solve_primal_dual(StripCompliance(CYCLE), problem, start)[0] is None
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
@@ -233,7 +232,7 @@ def test_exact_primal_sets_agree_with_enumeration(seed):
 
     # the nodes of the largest gaps carry the start
     start = project_forces(gap, problem.motions[:, : problem.target.size], problem.target)
-    solution, n_sets = solve_primal(StripCompliance(c), problem, start)
+    solution, n_sets = active_set.solve_primal(StripCompliance(c), problem, start)
     expected = solve_by_enumeration(c, x, gap, 100.0, moment)[0]
     assert solution.force == pytest.approx(expected, abs=1e-9 * 100.0)
     assert 1 < n_sets < 20 * n_nodes and ((start > 0) != (expected > 0)).any()

@@ -293,9 +293,11 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     if _is_finest(run):
         return refine.Verdict(0.0)
     counters = run.solution.book
+    pressed = [face.patches[0] for face in run.inputs.faces]
     nodes = max(
-        1.0 if run.patch is None else run.patch.x.size,
-        *(counters.get(n, 0.0) for n in ("points", "strips")),
+        1.0,
+        *(patch.x.size for patch in pressed),
+        *(counters.get(name, 0.0) for name in ("points", "strips")),
     )
     work = run.numerics.steps * run.numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
