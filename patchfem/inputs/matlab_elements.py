@@ -16,7 +16,8 @@ VERSION_5_MARKS = {b"\x00\x01IM": "little", b"\x01\x00MI": "big"}
 HEADER_BYTES = 128  # length [bytes] of the header of a file
 COMPRESSED_TYPE = 15  # type number of a compressed variable
 VARIABLE_TYPE = 14  # type number of a variable
-NUMBER_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)  # type numbers of integers, floats and characters
+# Type numbers of integers, floats and characters.
+NUMBER_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 NESTED_CLASSES = (1, 2, 3)  # classes of cells, structures and objects, which contain variables
 SPARSE_CLASS = 5  # class of a sparse matrix
 UNREAD_CLASSES = (
