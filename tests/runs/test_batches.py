@@ -48,6 +48,14 @@ TEXTS = {
 END_TOLERANCES = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 RIG = POINT + COULOMB + SHORT
 STEADY = "relative_displacement_amplitude_steady"
+CLOSE_MEASURES = {
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "stick_fraction",
+    "slip_start_phase",
+    "secant_stiffness",
+    "loop_area",
+}
 
 
 def assert_equal_case(results, case: int, single, rel: float = 0.0) -> None:
@@ -94,7 +102,11 @@ def test_exact_batch_agrees_with_single_runs(kind):
 @pytest.mark.share(2, 4, 5)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_95_of_100_measures_lie_within_both_errors(law):
-    """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors."""
+    """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors.
+
+    Motion, stick and forces differ by a quarter of the tolerance at most. Reversals of `tanh` are not resolved: its
+    acceleration peak differs by a tolerance, and its secant stiffness, a difference of nearly equal forces, by four.
+    """
     cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
     assert sum(one["engine"] == lumped.ENGINE for one in results.numerics.values()) >= 4
@@ -102,6 +114,13 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert (results.outcome == singles.outcome).all() and results.notes == singles.notes
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
     assert np.mean([row.holds for row in rows]) >= 0.95
+    factor = 5.0 if law == "tanh" else 0.25
+    for name in CLOSE_MEASURES & singles.values.keys():
+        expected = singles.values[name]
+        is_known = np.isfinite(expected)
+        allowed = cases[0].accuracy.tolerance * np.abs(expected) + singles.floors[name]
+        difference = np.abs(results.values[name] - expected)
+        assert (difference <= factor * allowed)[is_known].all(), name
 
 
 # Changes after which a rig is not one mode with one point under a sine, or has no motion.
