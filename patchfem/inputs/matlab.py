@@ -91,8 +91,8 @@ def _read_version_5(data: bytes, arrays: Arrays) -> None:
 
     try:
         variables = loadmat(io.BytesIO(data), struct_as_record=False)
-    # a wrong type code raises a TypeError, a wrong count a MemoryError
-    except (matlab.MatReadError, TypeError, MemoryError) as error:
+    # a wrong type code raises a TypeError or UnboundLocalError, a wrong count a MemoryError
+    except (matlab.MatReadError, TypeError, MemoryError, UnboundLocalError) as error:
         raise ValueError(str(error)) from None
     for name, value in variables.items():
         if not name.startswith("__"):
