@@ -215,9 +215,9 @@ def find_margin_root(rig, state, i, k, left, right):
     f_left = find_value(rig, state, left, i, k)
     if f_left < -MARGIN_TOL:
         return left
-    # A margin that starts at 0 may first increase.
+    # A margin that starts at 0, or at a round-off above it, may first increase.
     inside = 0.0
-    while f_left <= 0:
+    while f_left <= MARGIN_TOL:
         inside = FIRST_LOOK if inside == 0 else 4 * inside
         if inside > 1:
             return left

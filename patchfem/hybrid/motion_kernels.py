@@ -65,7 +65,7 @@ def find_drive(rig, clock, t):
     ----------
     rig : Rig
         Arrays of the rig.
-    clock : (14,) array
+    clock : (16,) array
         Row of `records.State.clock`.
     t : float
         Time [s], in the current piece.

@@ -284,7 +284,7 @@ def add_start(rig, clock, t, row):
     ----------
     rig : Rig
         Arrays of the rig.
-    clock : (15,) array
+    clock : (16,) array
         Row of `records.State.clock`.
     t : float
         Time [s].

@@ -6,7 +6,7 @@ from hybrid_cases import coulomb, make_modes, make_oscillator
 
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import masing
-from patchfem.hybrid.records import LawNumbers, Status
+from patchfem.hybrid.records import Clock, LawNumbers, Memory, Status
 
 AMPLITUDE = "relative_displacement_amplitude"
 COULOMB_AMPLITUDE = (
@@ -37,6 +37,30 @@ def test_grazing_onset(excess):
     assert motion.status is Status.DONE
     assert motion.values["friction_work"] <= (1e-9 if excess > 0 else 0.0)
     assert motion.values[AMPLITUDE] < 1e-10
+
+
+def test_slip_that_starts_at_round_off_and_reverses_within_the_step():
+    """Two modes at speeds whose slides cancel but for round-off, under an excess a of the force that falls at the rate s:
+    the slip reverses after 2 a/s, within the first step, at (2/3) a^3/s^2, within 1 % for the springs of the modes."""
+    excess, rate = 1e-3, 1.0
+    row = np.array([1.0, 0.1])
+    push = 0.8 * (row @ row)
+    modes = make_modes([1.0, 1.5], slide=row, base=[-1.0, 0.0], faces=[row])
+    signal = drives.make_record([0.0, 0.1], [push + excess, push + excess - 0.1 * rate], 0.1)
+    interface = cases.Interface(coulomb(), cases.Load(0.8), row)
+    rig = cases.make_rig(modes, signal, [interface], (1.0, 1.0), cases.Options(True))
+    schedule = cases.make_schedule(1.0, signal.period, 1)
+    case = cases.Case(rig, cases.make_start(rig, [interface]), *schedule, np.zeros(0), 1)
+    start = cases.make_arrays(case)[0]
+    start.memory[0, Memory.DIRECTION] = 1.0
+    start.clock[Clock.STEP] = 0.01
+    for speed in np.random.default_rng(1).uniform(-1e-2, 1e-2, 100):
+        start.y[2:4] = -0.1 * speed, speed
+        motion = runs.run_case(case, start=start)
+        assert motion.status is Status.DONE
+        time, *slides = motion.event_rows[0, :3]
+        assert time == pytest.approx(2 * excess / rate, rel=1e-2)
+        assert row @ slides == pytest.approx(2 / 3 * excess**3 / rate**2, rel=1e-2)
 
 
 def test_onset_with_lower_kinetic_friction_is_a_jump():
