@@ -13,10 +13,8 @@ import numpy as np
 from ...dynamics.harmonic import forces
 from ...dynamics.harmonic import laws as balance_laws
 from ...effects import law_has_trait
-from ...friction.laws.elastic_plastic import parallel_element
-from ...friction.laws.stretch import points_element
-from ...friction.protocol import Element
-from ...friction.record import make_law
+from ...friction import protocol, record
+from ...friction.laws import elastic_plastic, stretch
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load
 from ...hybrid.laws.grooves import make_grooves
@@ -29,8 +27,7 @@ from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements
-from . import strips
-from .bond_lists import choose_bond_summation
+from . import bond_lists, strips
 from .numerics import Numerics
 
 STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
@@ -54,16 +51,16 @@ class Joint(NamedTuple):
     yields: np.ndarray | None = None
     reduction: "shear_modes.JenkinsSet | None" = None
 
-    def make_element(self) -> Element:
+    def make_element(self) -> "protocol.Element":
         """Return the law under its mean load in the form of the march and of harmonic balance."""
         if self.stiffness is not None:
-            return parallel_element(self.stiffness, self.yields)
+            return elastic_plastic.parallel_element(self.stiffness, self.yields)
         load = self.load.mean
         if law_has_trait(self.law.law, "bonds"):
-            return points_element(
+            return stretch.points_element(
                 make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED), load
             )
-        return make_law(self.law, load).element(load)
+        return record.make_law(self.law, load).element(load)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law in the form of the engine `hybrid`."""
@@ -161,7 +158,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
         return [(Load(float(one)), ()) for one in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
-    length = make_law(model.friction, load.mean).element(load.mean).length
+    length = record.make_law(model.friction, load.mean).element(load.mean).length
     if patch.strips is None:
         found = jenkins_elements.elements(patch, static, length)
         return [(load, (found.stiffness, found.yield_displacement, found))]
@@ -239,7 +236,7 @@ def _find_stick_tolerance(joints, laws) -> float:
 # ---- march and harmonic balance
 
 
-def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
+def make_contact(model: Model, numerics: Numerics, patch) -> "contacts.Contact":
     """Return the contact points of a time integration, with all interfaces and nonlinear springs.
 
     Parameters
@@ -263,7 +260,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     if len(rows) == 1 and model.friction is not None:
         has_bonds = law_has_trait(model.friction.law, "bonds")
         if has_bonds or model.grooves is not None or rig.friction.load_varies:
-            choice = choose_bond_summation(model, numerics) if has_bonds else None
+            choice = bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
             contact = shear.make_points(model, patch, rows[0], choice, numerics.shear_modes)
             return replace(contact, point_sets=[*contact.point_sets, *springs])
 
@@ -274,7 +271,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 
-def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
+def make_single_law(model: Model, numerics: Numerics, patch) -> "protocol.Element | None":
     """Return the law of a rig with one interface under a constant load; None for bonds that are no single element.
 
     Parameters
@@ -288,7 +285,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
     """
     if law_has_trait(model.friction.law, "bonds") and not model.rig.friction.has_partial_slip:
         is_spread = model.partial_slip or model.side == "lower"
-        if is_spread or choose_bond_summation(model, numerics).engine != "recursion":
+        if is_spread or bond_lists.choose_bond_summation(model, numerics).engine != "recursion":
             return None
     return list_joints(model, patch, numerics.meshed)[0].make_element()
 
