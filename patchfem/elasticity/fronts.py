@@ -354,7 +354,7 @@ def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:
     size = 2 * own.size
     own_boundary = matrix[:size, size:].copy()
     remaining = matrix[size:, size:].copy()
-    factor = matrix[:size, :size]
+    factor = matrix[:size, :size].copy()
     smallest_pivot = 1.0
     # The coupling W and the remaining stiffness S overwrite their terms
     if own.size:
