@@ -64,9 +64,8 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
                 _add_group(arrays, file, "", 0)
         else:
             refuse_large_content(path, matlab_elements.count_unpacked_bytes(data), REMEDY)
-            content = matlab_elements.unpack_variables(data)
-            matlab_elements.check_elements(content)
-            _read_version_5(content, arrays)
+            matlab_elements.check_elements(data)
+            _read_version_5(data, arrays)
     return arrays
 
 

@@ -18,12 +18,9 @@ COMPRESSED_TYPE = 15  # type number of a compressed variable
 VARIABLE_TYPE = 14  # type number of a variable
 # Type numbers of integers, floats and characters.
 NUMBER_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
-NESTED_CLASSES = (1, 2, 3)  # classes of cells, structures and objects, which contain variables
+# Classes of cells, structures, objects, functions and opaque objects, which contain variables
+NESTED_CLASSES = (1, 2, 3, 16, 17)
 SPARSE_CLASS = 5  # class of a sparse matrix
-UNREAD_CLASSES = (
-    16,
-    17,
-)  # classes of functions and of other content that SciPy does not read as arrays
 COMPLEX_FLAG = 1 << 11  # bit of the flags of complex numbers
 
 
@@ -50,29 +47,31 @@ def count_unpacked_bytes(data: bytes) -> int:
     return total
 
 
-def unpack_variables(data: bytes) -> bytes:
-    """Return the content of a file with its variables unpacked; another version is returned as it is.
-
-    Raises zlib.error for variables that are damaged or cut off.
-    """
-    if data[124:128] not in VERSION_5_MARKS:
-        return data
-    pieces = [data[:HEADER_BYTES]]
-    for variable in _list_variables(data):
-        piece = data[variable.start - 8 : variable.stop]
-        if variable.kind == COMPRESSED_TYPE:
-            piece = zlib.decompress(piece[8:])
-        pieces.append(piece)
-    return b"".join(pieces)
-
-
 def check_elements(data: bytes) -> None:
-    """Raise ValueError if an element inside a variable without compression has a wrong type or length.
+    """Raise ValueError if an element inside a variable of a file has a wrong type or length.
 
-    SciPy 1.17 ends the process there. `data` is the content of `unpack_variables`.
+    SciPy 1.17 ends the process there. `data` is the content of the file; nothing is checked in another version. Raises
+    zlib.error for compressed variables that are damaged or cut off.
     """
     order = VERSION_5_MARKS.get(data[124:128])
-    variables = [element for element in _list_variables(data) if element.kind == VARIABLE_TYPE]
+    for variable in _list_variables(data):
+        content = data
+        if variable.kind == COMPRESSED_TYPE:
+            # Only one variable is unpacked at a time, because all together may be large.
+            content = zlib.decompress(memoryview(data)[variable.start : variable.stop])
+            variable = next(_list_elements(content, order, 0, len(content)), None)
+        if variable is not None and variable.kind == VARIABLE_TYPE:
+            if variable.stop > len(content):
+                raise ValueError("a variable is cut off")
+            _check_variable(content, order, variable)
+
+
+def _check_variable(data: bytes, order: str, outer: Element) -> None:
+    """Raise ValueError if an element inside a variable, `outer`, or inside its variables is wrong.
+
+    `order` is that of the bytes, "little" or "big".
+    """
+    variables = [outer]
     while variables:
         variable = variables.pop()
         parts = list(_list_elements(data, order, variable.start, variable.stop))
@@ -80,8 +79,6 @@ def check_elements(data: bytes) -> None:
             continue  # an empty cell
         flags = int.from_bytes(data[parts[0].start : parts[0].start + 4], order)
         array_class = flags & 0xFF
-        if array_class in UNREAD_CLASSES:
-            continue
 
         # Numbers follow flags, dimensions and name; a sparse matrix has two arrays of places before them.
         count = 4 + 2 * (array_class == SPARSE_CLASS) + bool(flags & COMPLEX_FLAG)
