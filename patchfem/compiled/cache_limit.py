@@ -38,8 +38,8 @@ def mark_used(folder: Path) -> None:
 def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
     """Remove the least recently used folders of compiled code beside this one.
 
-    The `max_others` most recently used ones and those used in the last hour stay. Several processes may do this at
-    once: a folder is renamed before it is removed, and gets its name back if it was marked in the meantime.
+    The `max_others` most recently used ones and those used in the last hour stay. Several processes may do this at the
+    same time, because a folder is renamed before it is removed, and gets its name back if it was marked in the meantime.
     """
     others = {}
     for entry in os.scandir(folder.parent):

@@ -158,7 +158,8 @@ def solve_on_set(
     def close_gap(gap_force: np.ndarray, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the nodal forces (k,) [N] and orthogonalized motions (r,) that close a gap.
 
-        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
+        `gap_force` (k,) [N] are the forces that close the gap without any motion, and `loads` (r,) the loads on the
+        motions.
         """
         motion = (loads + rows[:, nodes] @ gap_force) / stiffness
         return motion @ forces[:, nodes] - gap_force, motion

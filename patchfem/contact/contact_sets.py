@@ -69,7 +69,7 @@ class ContactSets:
     def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
         """Return the arrays in which compiled code searches contact sets, starting from the preloaded one.
 
-        max_bytes: size of the contact sets that can be stored [bytes].
+        `max_bytes` is the largest memory for the stored contact sets [bytes].
         """
         # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
         n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_SLOTS)))

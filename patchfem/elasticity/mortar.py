@@ -134,8 +134,8 @@ def _hat_functions(x, cell, positions) -> np.ndarray:
 def _join_nodes(lower_x, upper_x) -> np.ndarray:
     """Return the nodes (k,) [m] of the coarser of two interfaces at each place.
 
-    After each node follows the farther one of the next nodes of both pieces.
-    lower_x, upper_x: nodes [m] of the pieces, with the same ends.
+    After each node follows the farther one of the next nodes of both pieces. `lower_x` and `upper_x` [m] are the nodes
+    of the pieces, which have the same ends.
     """
     end = lower_x[-1]
     tolerance = LENGTH_TOL * (end - lower_x[0])

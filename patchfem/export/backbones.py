@@ -139,7 +139,7 @@ def _make_quantities(backbone: Backbone) -> Quantities:
 def _take(curve: Curve, name: str, k: int) -> Quantity:
     """Return a value of point k of a curve with its error.
 
-    curve, name: a backbone curve, and one of its columns, such as "frequency" or "damping".
+    `name` is a column of the curve, such as "frequency" or "damping".
     """
     return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
 
@@ -354,9 +354,10 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
 
 
 def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | None:
-    """Return the point with the largest sum of changes, each over its maximum; None if all are within their errors.
+    """Return the point with the largest sum of changes, each over its maximum.
 
-    changes: arrays (k,) of the change of a value and of the sum of both errors.
+    Each pair has the changes (k,) of a value, and the sums (k,) of the errors of both values. The result is None if all
+    changes are within their errors.
     """
     score = 0.0
     for step, error in changes:
@@ -369,7 +370,7 @@ def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | 
 def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
     """Return the change of the frequency or of the damping ratio between two values as a clause.
 
-    name: "frequency" or "damping"; step: the change with its error; ends: first and last value [SI].
+    `name` is "frequency" or "damping", `step` the change with its error, and `ends` are the first and last value [SI].
     """
     texts = [format_quantity(value, UNITS[name], DIGITS[name]) for value in ends]
     if abs(step.value) <= step.error:

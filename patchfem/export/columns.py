@@ -30,8 +30,8 @@ ENDS = (
 def list_rows(answer: Answer, source: str) -> list[Cells]:
     """Return the rows of a source.
 
-    source: "curves" for the curves of a backbone below each other, the path of a list, or of objects or lists by name, in
-    the details, such as "pressed/measures", or the name of a dimension.
+    `source` is "curves" for the curves of a backbone below each other, the name of a dimension, or a path in the
+    details, such as "pressed/measures", which leads to a list, or to objects or lists by name.
     """
     if source == "curves":
         return _stack_curves(answer)
@@ -129,8 +129,7 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
 def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
     """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
 
-    rows, column: cells by name of all rows, and the column with its heading and style.
-    part: of the quantities: "value", "low" or "high".
+    `rows` have the cells by name, and `part` of a quantity is "value", "low" or "high".
     """
     heading = column.heading
     cells = [row.get(column.name) for row in rows]

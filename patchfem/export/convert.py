@@ -67,7 +67,7 @@ def export_results(
 def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> None:
     """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options.
 
-    out, frame: file to write, and number of the only frame, None for the default; histories: whether --histories is given.
+    `frame` is the number of the only frame, None for the default, and `histories` tells whether --histories is given.
     """
     if histories:
         raise PatchfemError(
@@ -147,9 +147,9 @@ def view_results(
 
 
 def _open_window(frames: Frames, number: int, title: str) -> None:
-    """Open a window with the von Mises stress in both pieces; Missing if there is no screen.
+    """Open a window with the von Mises stress in both pieces.
 
-    frames, number: fields of all frames, and index of the one to show; title: of the window.
+    `number` is the index of the frame to show, and `title` that of the window. Missing is raised if there is no screen.
     """
     has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not has_screen:

@@ -171,7 +171,8 @@ def _find_main_measure(runs: list[Cost]) -> str:
 def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
     """Return CPU time and error of a run, the tolerance of the scene, and the main measure.
 
-    row: the run with its judgement; main: name of the measure; tolerance: relative one of the scene.
+    `row` is the run with its judgement, `main` the name of the main measure, and `tolerance` the relative one of the
+    scene.
     """
     run = row.run
     out = {
@@ -189,7 +190,8 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
 def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
     """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too.
 
-    rows: runs with their judgements; main: name of the main measure; tolerance: relative one of the scene.
+    `rows` are runs with their judgements, `main` is the name of the main measure, and `tolerance` the relative one of
+    the scene.
     """
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}

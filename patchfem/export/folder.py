@@ -106,9 +106,10 @@ class Folder:
             raise
 
     def __exit__(self, kind, value, trace) -> None:
-        """Put the results in place, or give the partial folder up after an error; the lock is released in any case.
+        """Put the results in place, or give the partial folder up after an error.
 
-        kind, value, trace: type of the error, the error and its traceback; None without an error.
+        The lock is released in any case. The arguments are the type of the error, the error and its traceback; they are
+        None without an error.
         """
         with defer_signals():
             try:

@@ -82,10 +82,7 @@ def write_arrays(data: Variables, attributes: Attributes, path: Path) -> None:
 
 
 def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
-    """Write one variable, and the dimensions that the file does not have yet.
-
-    file, name: open netCDF file, and name of the variable; variable: dimensions, values and attributes.
-    """
+    """Write one variable, and the dimensions that the file does not have yet."""
     values = np.asarray(variable.values)
     for dimension, size in zip(variable.dims, values.shape, strict=True):
         if dimension not in file.dimensions:

@@ -143,9 +143,10 @@ FITTED_KEY = "value of this key of the scene that fits the measurement best, wit
 
 
 def find_definition(name: str, kind: str = "") -> Definition | None:
-    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none.
+    """Return the definition of a quantity, whose name may end in the number of an interface.
 
-    kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
+    `kind` is that of the answer, because a comparison of surfaces gives names of runs a meaning of their own. The result
+    is None for an unknown name.
     """
     if "." in name:
         return Definition("1", FITTED_KEY)
@@ -256,7 +257,8 @@ def format_value(value: float | str, unit: str, digits: int = 4, name: str = "")
 def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) -> str:
     """Return a value, in its display unit, with the ends of its interval in brackets.
 
-    value, unit: in display units; quantity: has the ends in SI units; scale: display units in one SI unit.
+    `value` and `unit` are those to display, while the ends of `quantity` are in SI units. `scale` is the number of
+    display units in one SI unit.
     """
     ends = [None if end is None else end * scale for end in (quantity.low, quantity.high)]
     if None in ends:

@@ -241,9 +241,10 @@ def collect_data(result: Result) -> Variables:
 
 
 def _read_row(result: Result, name: str, row: Row) -> Variables:
-    """Return the variable of a row; codes become small integers, names become strings. {} without values.
+    """Return the variable of a row with values from a run, or {} if the run has no such values.
 
-    result, name: the run, and name of the variable; row: places of the values in the run, with dimensions and unit.
+    Codes become small integers, and names become strings. `row` has the places of the values in the run, with dimensions
+    and unit.
     """
     found = (_look_up(result, place) for place in row.places.split())
     values = next((one for one in found if one is not None), None)
@@ -372,7 +373,8 @@ def _collect_patch(result: Result) -> Variables:
 def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame") -> Variables:
     """Return positions and areas of the nodes, and the fields along x in all frames.
 
-    fields: by name in all frames; surface: nodes of the interface; frame: name of the dimension of the frames.
+    `fields` are those of all frames by name, `surface` has the nodes of the interface, and `frame` is the name of the
+    dimension of the frames.
     """
     area = "area of the interface that belongs to a node, summed over all pairs of pieces"
     nodes = {
@@ -390,7 +392,7 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
 def _make_field(name: str, values, frame: str) -> Variable:
     """Return a field along x over frames, and over strips if it has three dimensions.
 
-    name, values: of the field in `FIELDS`, in SI units; frame: name of the dimension of the frames.
+    The values are in SI units. `name` is that of the field in `FIELDS`, and `frame` that of the dimension of the frames.
     """
     unit, text = FIELDS[name]
     dims = (frame, *("strip", "x")[3 - np.ndim(values) :])

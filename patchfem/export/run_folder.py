@@ -165,7 +165,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
 def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
     """Write the fields of one interface of a run into a folder of its own, and return notes on them.
 
-    result, face: the run, and its interface with patch and fields; folder: is made.
+    `face` has the patch and the fields of the interface. The folder is made.
     """
     folder.mkdir(parents=True, exist_ok=True)
     face_result = replace(

@@ -99,10 +99,9 @@ def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> t
 
 
 def _make_headline(result: Result, measures: Quantities, details: JsonObject) -> str:
-    """Return the sentence with the key numbers of a run; "" if it has none.
+    """Return the sentence with the key numbers of a run, or "" if it has none.
 
-    result, measures: the run, and its measures; details: further keys of summary.json, of which `contact` and `cycles`
-    count.
+    `details` are further keys of summary.json, of which `contact` and `cycles` are used.
     """
     kind = _choose_headline(result, measures)
     parts = []
@@ -141,9 +140,9 @@ def _is_shown(measures: Quantities, name: str) -> bool:
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
-    """Return the dissipated energy of the interface, or of the first of several interfaces, as a clause; [] without it.
+    """Return the dissipated energy of the first interface as a clause, or [] without it.
 
-    result, measures: the run, and its measures; text: words with a place for the energy.
+    `text` has a place for the energy. The clause says which of several interfaces is meant.
     """
     names = [
         name
@@ -294,9 +293,9 @@ def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -
 
 
 def _describe_readings(readings: Iterable[JsonObject]) -> str:
-    """Return a sentence on the computed readings over the measured ones; "" without a measurement.
+    """Return a sentence on the computed readings over the measured ones, or "" without a measurement.
 
-    readings: as `list_readings` returns them; those of repeat runs are left out.
+    `readings` are as `list_readings` returns them, and those of repeat runs are left out.
     """
     text = " and ".join(
         f"the {row['reading']} is {format_number(row['ratio'], 3)} times the measured one"

@@ -12,7 +12,7 @@ from .columns import make_tables
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """Return the lines of an answer for the standard output, without warnings and notes.
 
-    is_verbose: whether all quantities are shown instead of the key quantities.
+    `is_verbose` selects all quantities instead of the key quantities.
     """
     lines = [answer.title] if answer.title else []
     lines += answer.verdict

@@ -183,7 +183,8 @@ class Grooves:
     def _integrate_series(self, start, end, signed_friction):
         """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles as a power series, for small mu A k.
 
-        start, end: angles k q - phase [rad]; signed_friction: mu times the sign of the motion. Floats or arrays.
+        `start` and `end` are angles k q - phase [rad], and `signed_friction` is mu times the sign of the motion. They
+        are floats or arrays.
         """
         powers = _integrate_sine_powers(start, end, N_SLOPE_TERMS + 2)
         b = signed_friction * self.max_slope
@@ -195,7 +196,8 @@ class Grooves:
     def _integrate_loss(self, start, end, signed_friction):
         """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles in closed form.
 
-        start, end: angles k q - phase [rad]; signed_friction: mu times the sign of the motion. Floats or arrays.
+        `start` and `end` are angles k q - phase [rad], and `signed_friction` is mu times the sign of the motion. They
+        are floats or arrays.
         """
         has_friction = signed_friction != 0
         mu = np.where(has_friction, signed_friction, 1.0)

@@ -370,8 +370,8 @@ class _Map(NamedTuple):
 def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).
 
-    linear: map of the period; rcond: singular values below this fraction of the largest one count as 0. The matrix is
-    singular where a state does not matter, such as bonds that have long been forgotten.
+    `linear` is the map of the period. Singular values below the fraction `rcond` of the largest one count as 0, because
+    the matrix is singular where a state does not matter, such as bonds that have long been forgotten.
     """
     return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 

@@ -12,16 +12,18 @@ from .records import Friction
 def _no_force(law, p, memory, point, s, rates):
     """Return no force: the end of the chain of laws, for a number that none of them has.
 
-    law: number of a law in `LAWS`; p, memory, point, s, rates: arguments of the `force_and_rates` of a law.
+    `law` is the number, and the numbers `p`, the `memory`, the motion (`point`), the states `s` and the `rates` of the
+    law are not used.
     """
     return Friction(0.0, 0.0, 0.0)
 
 
 @njit(**NJIT_KERNEL)
 def _no_margins(law, p, memory, point, s, margins):
-    """Write no margins, at the end of the chain of laws; the arguments are those of the `write_margins` of a law.
+    """Write no margins: the end of the chain of laws, for a number that none of them has.
 
-    law: number of a law in `LAWS`; p, memory, point, s, margins: its numbers, memory, motion, states and output.
+    `law` is the number, and the numbers `p`, the `memory`, the motion (`point`), the states `s` and the `margins` of the
+    law are not used.
     """
     pass
 
@@ -30,7 +32,8 @@ def _no_margins(law, p, memory, point, s, margins):
 def _no_switch(law, p, memory, point, s, which):
     """Return False, at the end of the chain of laws: the regime does not change.
 
-    law: number of a law in `LAWS`; p, memory, point, s, which: its numbers, memory, motion, states, and a `Margin`.
+    `law` is the number, and the numbers `p`, the `memory`, the motion (`point`) and the states `s` of the law are not
+    used, nor is the `Margin` at which the regime would change, `which`.
     """
     return False
 

@@ -40,7 +40,7 @@ START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
 class _DrivenRecord:
     """Record of a response and its input (k,), with the samples that are fitted.
 
-    derivative: number of time derivatives between displacement and response.
+    `derivative` is the number of time derivatives between displacement and response.
     """
 
     def __init__(self, step: float, force, response, derivative: int):
@@ -75,8 +75,8 @@ class _DrivenRecord:
     def find_starts(self, fit: SinusoidFit) -> list[np.ndarray]:
         """Return initial poles (2,) at the frequency where the input explains most of the residual.
 
-        This part of the power of a line is |G_xf|^2 / G_ff times the coherence, averaged over windowed segments (H1
-        estimator: Bendat and Piersol, Random Data, ch. 6).
+        This part of the power of a line is |G_xf|^2 / G_ff times the coherence, averaged over windowed segments. It is
+        the H1 estimator of Bendat and Piersol, Random Data, ch. 6.
         """
         size = 2 * (self.force.size // (2 * N_SEGMENTS))
         records = (self.force[self.inner], fit.residual)

@@ -123,9 +123,8 @@ def describe_missing_samples_at_end(time: np.ndarray, half_cycles: HalfCycles) -
 def _describe_missing_samples(time: np.ndarray, middle: float, length: float) -> str:
     """Return a sentence if a half cycle within the record has too few samples, else "".
 
-    middle, length: midpoint and half period [s].
-
-    time: (n,) times of the samples [s], increasing.
+    `time` (n,) [s] are the increasing times of the samples, `middle` [s] is the midpoint of the half cycle, and `length`
+    [s] the half period.
     """
     low, high = middle - length / 2, middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])

@@ -230,11 +230,9 @@ def _invert_normal_matrix(jacobian, norms) -> tuple[np.ndarray, np.ndarray]:
 def _list_unknown_directions(model: UnitCubeResidual, u, free, changes) -> np.ndarray:
     """Return the directions in parameter space that the residual does not determine.
 
-    The directions (d, n) are relative changes with a maximum of 1. If a value at the point u is 0, they are
-    changes relative to the range. changes: of the free coordinates (d, f).
-
-    model: residual with the space of the parameters; u: (n,) point in the unit cube; free: (f,) indices of its
-    coordinates inside the bounds that have an effect.
+    The directions (d, n) are relative changes with a maximum of 1. If a value at the point u is 0, they are changes
+    relative to the range. `u` (n,) is a point in the unit cube, `free` (f,) are the indices of its coordinates inside
+    the bounds that have an effect, and `changes` (d, f) are the undetermined changes of these.
     """
     values = model.space.to_values(u)
     scale = values if values[free].all() else model.space.high - model.space.low

@@ -204,9 +204,8 @@ def _assemble_fit(
 ) -> Fit:
     """Return the result of a fit from its best descent.
 
-    model, best: the residual, and the descent with the smallest sum of squares.
-    descent_rms: root mean square of the residual after each descent.
-    kind: value of `IntervalKind`.
+    `best` is the descent with the smallest sum of squares, `descent_rms` the root mean square of the residual after each
+    descent, and `kind` a value of `IntervalKind`.
     """
     u = best.u
     cost = best.cost
@@ -231,10 +230,8 @@ def _assemble_fit(
 def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarray, float]:
     """Move parameters near a bound onto it, unless the sum of squares increases.
 
-    A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are
-    fitted again. Returns the point u (n,) and the sum of squares.
-
-    model: the residual; u, cost: (n,) point in the unit cube, and its sum of squares.
+    A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are fitted again.
+    `u` (n,) is a point in the unit cube, and `cost` its sum of squares; the function returns both at the end.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
     belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)

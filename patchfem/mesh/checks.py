@@ -51,7 +51,7 @@ class TaggedMesh(NamedTuple):
     def select(self, kinds, *tags: str) -> list[TaggedBlock]:
         """Return the members of the blocks of given kinds, or of other kinds than the plane elements, that have a tag.
 
-        kinds: `ELEMENTS`, or None for lines and vertices.
+        `kinds` is `ELEMENTS` for the plane elements, and None for the other ones, which are lines and vertices.
         """
         out = []
         for kind, cells, names in self.blocks:

@@ -26,10 +26,8 @@ class End:
     def half_contact_length(self, length: float) -> float:
         """Return half the length [m] of the face that can be in contact.
 
-        A chamfer does not touch. A rounding touches up to the
-        slope `MAX_INTERFACE_SLOPE`.
-
-        length: length of the piece [m].
+        A chamfer does not touch. A rounding touches up to the slope `MAX_INTERFACE_SLOPE`. `length` is that of the piece
+        [m].
         """
         half_flat_length = length / 2 - self.size
         if self.kind != "radius":

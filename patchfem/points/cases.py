@@ -147,8 +147,8 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
 def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
     """Return the energies [J] of the whole run and the relative error of their balance.
 
-    cases, now: the cases, and their states (c, 20) at the end, in the order of `case_rows.Now`.
-    mass: moving mass (c,) [kg] of each case. Energies of `now` and of the parameters are per unit of this mass.
+    `now` (c, 20) are the states of the cases at the end, in the order of `case_rows.Now`, and `mass` (c,) [kg] are their
+    moving masses. Energies in `now` and in the parameters are per unit of this mass.
     """
     columns = cases.parameters.T
     stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)

@@ -30,12 +30,9 @@ class PointLaw(NamedTuple):
 def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
     """Return a PointLaw whose other numbers and memory are 0.
 
-    law, numbers: the law, and its numbers, which follow it in the rows of `PointLaw.numbers`.
-    memory: first values of the state of the law.
-    load: normal load [N].
-    n_memory: number of rows of the memory.
-
-    The entries of numbers and memory are floats, or arrays (c,) with a value for each of c points.
+    The `numbers` follow the law in the rows of `PointLaw.numbers`, `memory` has the first values of the state of the
+    law, which has `n_memory` rows, and `load` [N] is the normal load. The entries of numbers and memory are floats, or
+    arrays (c,) with a value for each of c points.
     """
     shape = np.broadcast_shapes(np.shape(load), *map(np.shape, (*numbers, *memory)))
     rows = np.zeros((N_NUMBERS, *shape))

@@ -9,7 +9,7 @@ from .return_maps_kernels import PointState
 def press_list(lists, j, load):
     """Leave the load of a point as it is, because a march without lists has no bonds that form under it.
 
-    lists, j, load: arrays of the lists, number of the point and normal load [N], all unused.
+    The point `j` and the other arguments are those of `lists_kernels.press_list`, and are not used.
     """
 
 
@@ -17,7 +17,7 @@ def press_list(lists, j, load):
 def write_list_mean(numbers, values, lists, j, dt):
     """Leave the mean force of a point as it is, because no point of the march has a list.
 
-    numbers, values, lists, j, dt: as `lists_kernels.write_list_mean` takes them; all unused.
+    The point `j` and the other arguments are those of `lists_kernels.write_list_mean`, and are not used.
     """
 
 
@@ -25,7 +25,7 @@ def write_list_mean(numbers, values, lists, j, dt):
 def advance_list(numbers, values, lists, j, v0, v1, dt):
     """Report room (True) for a list that does not exist, so that the march goes on.
 
-    numbers, values, lists, j, v0, v1, dt: as `lists_kernels.advance_list` takes them; all unused.
+    The point `j` and the other arguments are those of `lists_kernels.advance_list`, and are not used.
     """
     return True
 
@@ -34,6 +34,6 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
 def read_list(numbers, lists, j, load):
     """Return a `PointState` of zeros: without a list there is no force, energy or stretch.
 
-    numbers, lists, j, load: as `lists_kernels.read_list` takes them; all unused.
+    The point `j` and the other arguments are those of `lists_kernels.read_list`, and are not used.
     """
     return PointState(0.0, 0.0, 0.0)

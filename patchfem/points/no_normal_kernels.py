@@ -8,7 +8,8 @@ from ..compiled.jit import njit
 def find_set(sets, slot, approach, rotation):
     """Return -1, the slot of no contact set.
 
-    sets, slot: contact sets and the slot of the present one; approach, rotation: position [m], [rad]. All are unused.
+    The arguments are the contact sets, the slot of the present one, the approach [m] and the rotation [rad], which are
+    not used.
     """
     return -1
 
@@ -17,7 +18,7 @@ def find_set(sets, slot, approach, rotation):
 def press_state(sets, slot, approach, rotation, forces):
     """Leave the forces as they are, because the march has no contact sets.
 
-    sets, slot, approach, rotation, forces: as `press_kernels.press_state` takes them; all unused.
+    The arguments are those of `press_kernels.press_state`, and are not used.
     """
 
 
@@ -25,7 +26,7 @@ def press_state(sets, slot, approach, rotation, forces):
 def compute_energy(sets, slot, heave, rotation):
     """Return zeros for the energy of the contact and its derivatives by heave and rotation.
 
-    sets, slot, heave, rotation: as `press_kernels.compute_energy` takes them; all unused.
+    The arguments are those of `press_kernels.compute_energy`, and are not used.
     """
     return 0.0, 0.0, 0.0
 
@@ -34,5 +35,5 @@ def compute_energy(sets, slot, heave, rotation):
 def path_mean(sets, slot, heave, rotation, change, turn, out):
     """Leave `out` as it is, because the march has no contact sets.
 
-    sets, slot, heave, rotation, change, turn, out: as `press_path_kernels.path_mean` takes them; all unused.
+    The arguments are those of `press_path_kernels.path_mean`, and are not used.
     """

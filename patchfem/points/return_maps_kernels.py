@@ -165,18 +165,17 @@ def mean_force(numbers, memory, j, load, step):
 def _end_path(force, slope, dq):
     """Return the `MeanForce` of a law of the path alone, as d(mean dq)/d(dq) is the force at the end.
 
-    force, slope: mean force [N], and its derivative by the increment [N/m]; dq: increment [m].
+    `force` [N] is the mean force over the increment `dq` [m], and `slope` [N/m] its derivative by the increment.
     """
     return MeanForce(force, slope, 0.0, force + slope * dq, 0.0)
 
 
 @njit(**NJIT_KERNEL)
 def _stretch(start, move, limit):
-    """Stretch a spring by an increment; it slips at +-limit.
+    """Stretch a spring, which slips at +-`limit`, by an increment `move`.
 
-    start, move, limit: stretch before the increment, increment and limit, all in the same unit.
-
-    Returns a `Relaxed` with the elastic fraction of the increment in place of the end.
+    `start` is the stretch before the increment, and all arguments have the same unit. The result is a `Relaxed` with the
+    elastic fraction of the increment in place of the end.
     """
     free = start + move
     end = min(max(free, -limit), limit)
@@ -275,7 +274,7 @@ def _mean_lugre(numbers, stretch, j, load, step):
 def _lugre_force(numbers, j, load, stretch, velocity):
     """Return the force [N] of the LuGre law of point j at a stretch [m] and a velocity [m/s].
 
-    numbers: (k, m) of the laws of m points; load: normal load [N].
+    `numbers` (k, m) are those of the laws of m points, and `load` [N] is the normal load.
     """
     direction = 1.0 if velocity > 0 else -1.0
     return load * rate_equation(numbers[:, j], stretch, velocity, direction).force
@@ -285,7 +284,8 @@ def _lugre_force(numbers, j, load, stretch, velocity):
 def _mean_spring(numbers, slide, j, dq):
     """Return the mean force [N] over dq and its slope [N/m] of a cubic or interlocking spring.
 
-    numbers: (k, m) of the laws of m points, of which j is the spring; slide, dq: start and increment [m].
+    `numbers` (k, m) are those of the laws of m points, of which point `j` is the spring. `slide` [m] is the start of the
+    increment `dq` [m].
     """
     end = slide + dq
     if numbers[0, j] == Law.CUBIC:

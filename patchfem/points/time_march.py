@@ -416,11 +416,10 @@ def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
-    """Return the arrays of the lists of bonds; empty ones without lists.
+    """Return the arrays of the lists of bonds, which are empty for a contact without lists.
 
-    contact: law, and the numbers of the sum over bonds.
-    points: arrays of the contact points, with their ports, laws and loads.
-    is_prescribed: whether the slide of the points is given, and does not follow from forces.
+    `contact` has the law and the numbers of the sum over bonds, and `points` the ports, laws and loads of the contact
+    points. `is_prescribed` tells whether the slide of the points is given, and does not follow from forces.
     """
     count = points.port.size
     if contact.bond_sum is None:

@@ -233,7 +233,8 @@ def _select_overlapping_spans(span) -> np.ndarray:
 def _smooth_values(values, indices, span) -> np.ndarray:
     """Return the midpoint values of least-squares parabolas that are fitted over spans around each index.
 
-    values: (n,) samples; indices, span: (k,) midpoints, and numbers of samples on either side of them.
+    `values` (n,) are samples, `indices` (k,) those at the midpoints, and `span` (k,) the numbers of samples on either
+    side.
     """
     smoothed = np.empty(indices.size)
     for m in np.unique(span):

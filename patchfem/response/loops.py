@@ -128,10 +128,8 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple[int, float, float]
 def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, float]:
     """Find the zero of a decreasing sampled velocity (k,) next to a given sample.
 
-    The zero is sought in the step before the sample if `first`, else in the step after it. Returns the index
-    of the preceding sample and the position as a fraction of the step; (None, 0) without a zero.
-
-    v: (k,) velocity [m/s]; sample: index beside which the zero is sought.
+    The velocity `v` is in [m/s]. The zero is sought in the step before the sample if `first`, else in the step after it.
+    Returns the index of the preceding sample and the position as a fraction of the step, or (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
     if abs(v[sample]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
@@ -144,12 +142,10 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
 def _force_at_reversal(
     slide, force, sample: int, fraction: float, value: float, rule: str
 ) -> float | None:
-    """Return the friction force [N] at the largest relative displacement; None if unknown.
+    """Return the friction force [N] at the largest relative displacement, or None if it is unknown.
 
-    The largest displacement `value` lies in the step after a sample, at the fraction `fraction` of
-    the step; the rule is as in `find_reversals`.
-
-    slide, force: (k,) samples of displacement [m] and force [N].
+    `slide` (k,) [m] and `force` (k,) [N] are samples. The largest displacement `value` lies in the step after a sample,
+    at the fraction `fraction` of the step; the rule is as in `find_reversals`.
     """
     if rule == "rate":
         return float(

@@ -274,10 +274,8 @@ def interpolate_peak(samples) -> tuple[float, float]:
 def _extrapolate_to_kink(before: float, top: float, after: float, last: float) -> float:
     """Return by how much a kink exceeds the largest of four samples, if it lies in the step after it.
 
-    The lines through the first two and through the last two samples cross at the kink. The result is 0 if they do not
-    cross in this step.
-
-    before, top, after, last: four successive samples, of which `top` is the largest.
+    The arguments are successive samples, of which `top` is the largest. The lines through the first two and through the
+    last two samples cross at the kink. The result is 0 if they do not cross in this step.
     """
     rise = top - before
     fall = after - last

@@ -167,10 +167,8 @@ def _has_drift(measures: Measures, tolerance: float, window_drift: float) -> boo
     """Return whether the midpoint of the motion drifts.
 
     It drifts if both the drift from cycle to cycle (`drift_per_cycle`) and the drift from window to window
-    (`window_drift`, [m] per cycle) exceed the tolerance. On a belt, a window contains complete stick-slip cycles, whereas
-    a cycle of the drive does not.
-
-    measures: with the drift and the amplitude; tolerance: relative one of the run; window_drift: [m] per cycle.
+    (`window_drift`, [m] per cycle) exceed the relative tolerance of the run. On a belt, a window contains complete
+    stick-slip cycles, whereas a cycle of the drive does not.
     """
     drift = measures.get("drift_per_cycle")
     if drift is None or drift.value is None:

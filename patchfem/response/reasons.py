@@ -128,12 +128,10 @@ def find_invalid(
 def _list_open_loops(measures: Measures, window, drive) -> list[str]:
     """Return the names of the areas of friction loops that are not closed.
 
-    The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
-    release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no
-    meaning. For several interfaces, only the sum of the energies is known: a loop does not close if its
-    interface returns more energy than it takes although no energy is created.
-
-    measures, window: measures by name, and histories of the last cycles with the sums of energy; drive: with its period.
+    The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a release, the
+    interface also stores or returns energy. If this exceeds the dissipation, the area has no meaning. For several
+    interfaces, only the sum of the energies is known: a loop does not close if its interface returns more energy than it
+    takes although no energy is created. `window` has the histories of the last cycles with the sums of energy.
     """
     ledger = window.extra.get("ledger")
     loop = measures.get("loop_area")

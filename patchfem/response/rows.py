@@ -175,10 +175,7 @@ class LastCycles:
         return interfaces
 
     def evaluate_load(self, function: Callable[[np.ndarray], float]) -> float | None:
-        """Return the value of a function of the normal load (k,) [N]; None for a constant load.
-
-        function: function that is applied to the load history in the window.
-        """
+        """Return the value of a function of the normal load (k,) [N] in the window, or None for a constant load."""
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(function(load))
 

@@ -232,11 +232,9 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
 def _extrapolate_magnitudes(phasors, find_remainders, n_points: int, n_limits: int) -> np.ndarray:
     """Return the magnitudes (n, l) [m] of extrapolated phasors from the last windows.
 
-    Column k follows from the `n_points` phasors that end k windows before the last one.
-
-    phasors: (n, k) complex amplitudes of successive windows [m].
-    find_remainders: function of the last phasors (n, p) that returns what each still lacks from its limit (n,).
-    n_points, n_limits: phasors for one limit, and number of limits l.
+    Column k follows from the `n_points` phasors that end k windows before the last one. `phasors` (n, k) [m] are the
+    complex amplitudes of successive windows, and `n_limits` is the number l of limits. `find_remainders` is a function
+    of the last phasors (n, p) that returns the difference (n,) from each to its limit.
     """
     ends = phasors.shape[1] - np.arange(n_limits)
     limits = [

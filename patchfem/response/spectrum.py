@@ -106,7 +106,7 @@ def absolute_harmonic(window, drive, n: int) -> complex:
 def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
     """Return the magnitudes [m s-2] of the first and third harmonic of the absolute acceleration.
 
-    window: Response over complete cycles of a drive that ends as a sinusoid.
+    `window` is a `Response` over complete cycles of a drive that ends as a sinusoid.
     """
     first, third = (float(abs(absolute_harmonic(window, drive, n))) for n in (1, 3))
     return first, third

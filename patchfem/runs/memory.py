@@ -104,7 +104,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     """Return the contributions of modes, drive, histories, bonds and harmonic balance of a rig.
 
-    has_steps: whether the scene sets the steps per cycle.
+    `has_steps` tells whether the scene sets the steps per cycle.
     """
     model = plan.model
     drive = model.rig.drive
@@ -195,9 +195,9 @@ def _read_allowed(group: Path) -> float:
 
 
 def _read_number(path: Path, name: str = "", place: int = 0) -> float:
-    """Return the word of a file after a name, or at a place, as a number; nan if there is none.
+    """Return a word of a file as a number, or nan if there is none.
 
-    path: file of the operating system; name: word before the number; place: index of the number if there is no name.
+    It is the word after `name`, or without a name that with the index `place`. The file is one of the operating system.
     """
     try:
         words = path.read_text("ascii").split()

@@ -138,9 +138,8 @@ def _nodal_forces(patch, fields: Arrays) -> list[tuple[np.ndarray, np.ndarray]]:
 def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
     """Return a condensed piece with its displacement and stress under nodal forces [N/m].
 
-    sign: -1 for the lower and 1 for the upper piece.
-    piece: condensed piece, with y towards its inside.
-    shear, normal: forces (1 + f, n) on the nodes of its face; the first row is the pressed state.
+    `sign` is -1 for the lower and 1 for the upper piece, and `piece` has y towards its inside. The forces `shear` and
+    `normal` (1 + f, n) act on the nodes of its face, and their first row is the pressed state.
     """
     cells = recovery.get_cells(piece)
     u = compute_displacement(piece, shear, normal)
@@ -155,7 +154,7 @@ def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
 def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
     """Return the fields of a piece whose holder moves by `held` (f, n, 2) [m].
 
-    other_error: error of the stress of the other piece, which counts in the norm of both.
+    `other_error` is the error of the stress of the other piece, which counts in the norm of both.
     """
     flip = np.array([1.0, piece.sign])
     return PieceFields(
@@ -170,11 +169,10 @@ def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
 
 
 def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
-    """Return the stresses (f, k) [Pa] between coating and substrate at x (k,) [m], none without a coating.
+    """Return the stresses (f, k) [Pa] between coating and substrate at x (k,) [m], {} without a coating.
 
-    Compression is positive; the shear stress is that on the lower one of both along +x.
-
-    piece: a piece with its loads; side: "lower" or "upper", at the end of the names of the stresses.
+    Compression is positive; the shear stress is that on the lower one of both along +x. `side`, "lower" or "upper", is
+    at the end of the names of the stresses.
     """
     traction = coating_traction.compute_coating_traction(piece.cells, piece.u)
     bonds = coating_traction.interpolate_coating_traction(piece.cells, traction, x)
@@ -185,7 +183,8 @@ def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
 def _holder_motion(patch, fields: Arrays, points) -> np.ndarray:
     """Return the motion (f, n, 2) [m] of points (n, 2) [m] that move with the upper holder.
 
-    patch: pressed patch, whose rotation and approach hold where `fields`, the fields of all frames by name, have none.
+    `fields` are the fields of all frames by name. Where they lack the rotation or the approach, those of the pressed
+    patch hold.
     """
     rotation = _holder_field(fields, "rotation", patch.pressure.rotation)
     closing = _holder_field(fields, "closing", patch.pressure.approach)
@@ -197,7 +196,7 @@ def _holder_motion(patch, fields: Arrays, points) -> np.ndarray:
 def _holder_field(fields: Arrays, name: str, constant: float) -> np.ndarray:
     """Return a motion of the upper holder (f, 1), or the constant that it has in all frames.
 
-    fields: fields of all frames by name; name: "rotation" [rad], "closing" or "slide" [m].
+    `fields` are those of all frames by name, and `name` is "rotation" [rad], "closing" or "slide" [m].
     """
     return fields.get(f"holder_{name}", np.full(len(fields["time"]), constant))[:, None]
 
@@ -205,7 +204,7 @@ def _holder_field(fields: Arrays, name: str, constant: float) -> np.ndarray:
 def _interpolate_displacement(piece: PieceFields, interface, x) -> np.ndarray:
     """Return the displacement (f, k, 2) [m] of the face of a piece at positions x (k,) [m].
 
-    interface: node numbers of the face in order of x.
+    `interface` has the node numbers of the face in order of x.
     """
     node_x = piece.points[interface, 0]
     face = piece.displacement[:, interface]

@@ -58,9 +58,10 @@ def run_probe(plan: Plan) -> Probe:
 
 
 def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:
-    """Describe what each setting multiplies: clauses such as "twice drive.cycles takes up to twice the time of the motion".
+    """Describe what each setting multiplies, in clauses.
 
-    plan: the run; has_motion, has_contact: whether its motion and its contact took measurable time.
+    An example is "twice drive.cycles takes up to twice the time of the motion". `has_motion` and `has_contact` tell
+    whether motion and contact took measurable time.
     """
     factors = []
     if has_motion:

@@ -148,7 +148,7 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
 def _interpolate(x, given_x, values) -> np.ndarray:
     """Interpolate values (k,) or (s, k) from the nodes of one mesh to those of another.
 
-    x, given_x: positions of the new nodes, and (k,) those of the values, increasing [m].
+    `x` [m] are the positions of the new nodes, and `given_x` (k,) [m] the increasing positions of the values.
     """
     return np.apply_along_axis(lambda row: np.interp(x, given_x, row), -1, values)
 
@@ -156,9 +156,8 @@ def _interpolate(x, given_x, values) -> np.ndarray:
 def _measure_change(first: PatchState, second: PatchState, name: str) -> tuple[float, float | None]:
     """Return the change of a measure from the first to the second state, and its error.
 
-    The error is the sum of the errors of both values, or None if one of them is unknown.
-
-    first, second: less and more worn state; name: of the measure, which is 0 where the first state has none.
+    The error is the sum of the errors of both values, or None if one of them is unknown. `first` is the less worn state,
+    and the measure `name` is 0 where this state has none.
     """
     value, error = second.measures[name]
     earlier, earlier_error = first.measures.get(name, (0.0, 0.0))
@@ -177,7 +176,7 @@ def _interpolation_error(state: PatchState, x) -> float:
 def _enclose(value: float, error: float | None, unit: str) -> Quantity:
     """Return a quantity that is not negative, with the interval of its numerical error.
 
-    value, error: in the unit `unit`; without an error (None) the interval is unknown.
+    `value` and `error` are in the unit `unit`. The interval is unknown if the error is None.
     """
     if error is None:
         return Quantity(value, None, None, unit, "", "no error is estimated")

@@ -217,10 +217,20 @@ def _correct_path(
 def _take_halves(
     problem: WearProblem, state: WearState, path, length: float, tolerance: float
 ) -> tuple[WearState, float]:
-    """Take a jump in two halves with a constant slip path; return the state and error / tolerance.
+    """Take a jump in two halves with a constant slip path, and return the state and error / tolerance.
 
-    problem, state: contact with its coefficient, and worn state before the jump.
-    path: slip path per cycle at the nodes [m]; length: cycles of the jump; tolerance: relative error of depth and force.
+    Parameters
+    ----------
+    problem : WearProblem
+        Contact with its coefficient.
+    state : WearState
+        Worn state before the jump.
+    path : array
+        Slip path per cycle at the nodes [m].
+    length : float
+        Number of cycles of the jump.
+    tolerance : float
+        Relative error of depth and force.
     """
     rate = wear_rates(problem.coefficient, path, problem.area)
     coarse, coarse_force = solve_jump(problem.press, state.depth, rate, length)

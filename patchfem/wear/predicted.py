@@ -266,8 +266,8 @@ def _suspect_units(ratio: float, axis: str) -> str:
 def _require_similar(width: float | None, bins: Bins, history: WearHistory, best: Place) -> None:
     """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run.
 
-    width: of the measured track; None without one. bins: measured depth. history, best: computed depth, and its fitted
-    place.
+    `width` is that of the measured track, None without one, and `bins` have the measured depth. `history` is the
+    computed depth over the cycles, and `best` its fitted place.
     """
     if not history.work[1] <= best.ratio <= MAX_COEFFICIENT_RATIO:
         raise PatchfemError(
@@ -325,7 +325,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
 def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = False) -> Place:
     """Fit coefficient and position by least squares from a start; with `is_fixed` the position stays.
 
-    bins: measured depth; history: computed depth over the cycles.
+    `bins` have the measured depth, and `history` is the computed depth over the cycles.
     """
     from scipy.optimize import least_squares
 
@@ -415,7 +415,7 @@ def _make_result(
 def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences.
 
-    bins: measured depth; history, best: computed depth over the cycles, and its fitted place.
+    `bins` have the measured depth, `history` is the computed depth over the cycles, and `best` its fitted place.
     """
     columns = []
     for name, step in (("ratio", 0.01 * best.ratio), ("centre", bins.width / 2)):
@@ -432,11 +432,11 @@ def _measure_spread(
     """Return the standard deviations of ratio and centre, and the number of independent blocks.
 
     The measured wear scatters about the computed one with a correlation along x. The number of blocks is that of
-    correlation lengths of the differences in the worn part; the fit takes up two of them, so that the variance is divided
-    by the remainder, and Student's t replaces the normal quantile.
+    correlation lengths of the differences in the worn part. The fit takes up two of them, so that the variance is
+    divided by the remainder, and Student's t replaces the normal quantile.
 
-    bins: measured depth with its noise; residual, computed: (b,) differences of both depths, and computed depth [m].
-    jacobian: (b, 2) derivatives of the computed depth by ratio and centre.
+    `bins` have the measured depth with its noise, `residual` (b,) [m] are the differences of both depths, `computed`
+    (b,) [m] is the computed depth, and `jacobian` (b, 2) its derivatives by ratio and centre.
     """
     from scipy.special import stdtrit
 

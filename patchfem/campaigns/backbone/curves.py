@@ -252,7 +252,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
 def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
     """Widen the errors of a curve by the effect of the modes that a reduced structure omits.
 
-    richer: the curve of the structure with more modes.
+    `richer` is the curve of the same structure with more modes.
     """
     low, high = richer.amplitude[[0, -1]] * [1 - EQUAL_AMPLITUDE_TOL, 1 + EQUAL_AMPLITUDE_TOL]
     curve = curve.at((curve.amplitude >= low) & (curve.amplitude <= high))

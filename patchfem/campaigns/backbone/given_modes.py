@@ -127,7 +127,7 @@ def _assume_slides(
 ) -> tuple[GivenMode, ...]:
     """Return the modes; a missing `slide` is set according to the assumed joint stiffness.
 
-    stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
+    `stiffness_per_mass` [1/s2] is the stiffness of the sticking contact divided by the modal mass.
     """
     fraction = _assumed_fraction(len(modes))
     completed = []
@@ -174,7 +174,7 @@ def _describe_mode(mode: GivenMode) -> str:
 def _note_slides(n_modes: int, stiffness: float | None) -> tuple[str, ...]:
     """Return a note on the assumed `slide` of modes.
 
-    stiffness: of the sticking contact [N/m], or None if it is rigid.
+    `stiffness` [N/m] is that of the sticking contact, or None if the contact is rigid.
     """
     if stiffness is None:
         return (

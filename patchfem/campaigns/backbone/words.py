@@ -35,7 +35,7 @@ NO_CURVE = (
 def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, ...]:
     """Write notes on a backbone: removed joint, gaps of the curves, what the errors leave out.
 
-    amplitudes: requested ones (k,) [m].
+    `amplitudes` (k,) [m] are the requested ones.
     """
     model = joint.model
     curves = backbone.curves

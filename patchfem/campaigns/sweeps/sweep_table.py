@@ -130,7 +130,7 @@ class SweepTable:
     def blank(cls, cases: Cases, tolerance: float = np.nan) -> "SweepTable":
         """Return the table of cases without results.
 
-        tolerance: that of all cases, unless it is swept.
+        `tolerance` is the relative tolerance of all cases, unless it is swept.
         """
         columns = zip(cases.axes, cases.make_columns(range(len(cases))))
         keys = [SweptKey(axis.key, convert_unit(axis.unit), values) for axis, values in columns]

@@ -175,9 +175,16 @@ class FreeBalance:
     ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
-        x: unknowns (N,), which end with omega, zeta and the amplitude of the coordinate.
-        amplitude: of the output [m]; None selects a motion without damping, zeta a = 0.
-        modal, slopes: harmonics (H + 1, n) of the coordinates [m] and their derivatives (H + 1, n, N).
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns, which end with omega, zeta and the amplitude of the coordinate.
+        amplitude : float or None
+            Amplitude of the output [m]. None selects a motion without damping, zeta a = 0.
+        modal : (H + 1, n) array
+            Harmonics of the coordinates [m].
+        slopes : (H + 1, n, N) array
+            Derivatives of these harmonics by the unknowns.
         """
         gradient = np.zeros(x.size)
         if amplitude is None:

@@ -131,7 +131,7 @@ def _pack_points(
 ) -> tuple[HarmonicBalance, np.ndarray, np.ndarray, np.ndarray]:
     """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each.
 
-    first, second: motions with equal numbers of harmonics; width: unit of omega [rad/s], such as the width of a sweep.
+    Both motions have the same number of harmonics. `width` is the unit of omega [rad/s], such as the width of a sweep.
     """
     balance = HarmonicBalance(first.group.modes, first.group, first.samples)
     packed = [pack_harmonics(motion.slides) for motion in (first, second)]

@@ -162,9 +162,16 @@ def _step_factor(n_newton: int) -> float:
 def _make_border(evaluate, w, row, unit) -> tuple[np.ndarray, np.ndarray]:
     """Return the scaled residual (N,), and the scaled Jacobian with a further row, (N + 1, N + 1).
 
-    evaluate: function of x and p that returns `PathEquations`.
-    w, unit: point (x, p) of the curve, and the sizes by which its entries are scaled, (N + 1,) each.
-    row: (N + 1,) last row, which selects a point or a direction.
+    Parameters
+    ----------
+    evaluate : callable
+        Function of x and p that returns `PathEquations`.
+    w : (N + 1,) array
+        Point (x, p) of the curve.
+    row : (N + 1,) array
+        Last row, which selects a point or a direction.
+    unit : (N + 1,) array
+        Sizes by which the entries of `w` are scaled.
     """
     residual, jacobian, by_p = evaluate(w[:-1], w[-1])
     matrix = np.empty((w.size, w.size))
@@ -214,12 +221,20 @@ def correct_point(evaluate, w, tangent, unit, tolerance: float, *, is_fixed: boo
 
 
 def _take_step(evaluate, point: _PathPoint, step: float, unit, tolerance: float):
-    """Return the point after a step along the curve as `correct_point` does; None if it fails or jumps.
+    """Return the point after a step along the curve as `correct_point` does, or None if it fails or jumps.
 
-    evaluate: function of x and p that returns `PathEquations`.
-    point, step: point with its tangent, and arc length of the step in scaled units.
-    unit: (N + 1,) sizes by which unknowns and parameter are scaled.
-    tolerance: relative change of the motion at which Newton's method ends.
+    Parameters
+    ----------
+    evaluate : callable
+        Function of x and p that returns `PathEquations`.
+    point : _PathPoint
+        Start of the step, with its tangent.
+    step : float
+        Arc length of the step in scaled units.
+    unit : (N + 1,) array
+        Sizes by which unknowns and parameter are scaled.
+    tolerance : float
+        Relative change of the motion at which Newton's method ends.
     """
     corrected = correct_point(
         evaluate, point.w + step * unit * point.tangent, point.tangent, unit, tolerance
@@ -234,8 +249,8 @@ def _take_step(evaluate, point: _PathPoint, step: float, unit, tolerance: float)
 def _make_point(evaluate, w, direction, unit) -> _PathPoint:
     """Return a point of the curve with its tangent, which points in a direction (N + 1,).
 
-    evaluate: function of x and p that returns `PathEquations`.
-    w, unit: point (x, p), and the sizes by which its entries are scaled, (N + 1,) each.
+    `evaluate` is a function of x and p that returns `PathEquations`. `w` is the point (x, p), and `unit` has the sizes
+    by which its entries are scaled, (N + 1,) each.
     """
     _, matrix = _make_border(evaluate, w, direction, unit)
     tangent = factor(matrix)(np.append(np.zeros(w.size - 1), 1.0))
@@ -245,9 +260,8 @@ def _make_point(evaluate, w, direction, unit) -> _PathPoint:
 def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list[float]:
     """Return the parameter at a fold between two points at a distance along the first tangent, [] without a fold.
 
-    first, second: successive points; length: arc length between them in scaled units; width: unit of the parameter.
-
-    The parameter is a cubic of the distance along the first tangent; a fold is its extreme.
+    The parameter is a cubic of the distance along the first tangent, and a fold is its extreme. The points follow each
+    other on the curve, `length` is the arc length between them in scaled units, and `width` the unit of the parameter.
     """
     slopes = np.array([first.tangent[-1], second.tangent[-1]])
     if slopes[0] * slopes[1] >= 0:

@@ -31,9 +31,13 @@ class LawGroup:
     """Friction laws and springs on interface rows of a modal basis.
 
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of `modes`, or
-    participations (n,); a law alone acts on interface 0. An Element is converted to its law; None means bonds that are
-    no single element.
-    modes: the modal basis; parts: pairs (row, law); rows: (i, n); laws: a tuple of laws for every row.
+    participations (n,). A law alone acts on interface 0. An Element is converted to its law, and None means bonds that
+    are no single element.
+
+    - modes: the modal basis
+    - parts: pairs (row, law)
+    - rows (i, n): participations of the interfaces in the modes
+    - laws: the laws of each row
     """
 
     def __init__(self, modes, parts):
@@ -66,7 +70,7 @@ class LawGroup:
     def with_elements(self, change) -> "LawGroup":
         """Return a copy with other elastic-plastic elements.
 
-        change: function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both of the new elements.
+        `change` is a function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both for the new elements.
         """
         parts = []
         for row, law in self.parts:
@@ -145,10 +149,9 @@ class LawGroup:
     def _differentiate_row(self, slides: Slides, i: int, forces: list[LawForce]) -> ForceHarmonics:
         """Return the harmonics (H + 1,) of the force of a row, and their derivatives.
 
-        A local stiffness K(theta) enters by its harmonics up to 2 H, a reversal by the harmonics of its stiffness and the
-        waves at its angle.
-
-        slides: sampled motion of all interfaces; i: the row; forces: forces of the laws of this row, in their order.
+        A local stiffness K(theta) enters by its harmonics up to 2 H, a reversal by the harmonics of its stiffness and
+        the waves at its angle. `slides` is the sampled motion of all interfaces, `i` the row, and `forces` are those of
+        the laws of this row, in their order.
         """
         h = slides.harmonics.shape[1] - 1
         force, slope, holds = (
@@ -175,7 +178,7 @@ class LawGroup:
 def find_local_jacobian(stiffness) -> np.ndarray:
     """Return the derivatives (H + 1, 2 H + 1) of the harmonics of a force K(theta) q(theta) by those of q.
 
-    stiffness: (2 H + 1,) harmonics of K.
+    `stiffness` (2 H + 1,) are the harmonics of K.
     """
     h = stiffness.size // 2
     # Coefficients of exp(i m theta), m = -2 H..2 H.

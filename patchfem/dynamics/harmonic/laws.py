@@ -64,7 +64,7 @@ class LawForce(NamedTuple):
 class Law:
     """Force law of an interface for harmonic balance.
 
-    total: tangent stiffness at rest [N/m], 0 for a law that creeps under any force.
+    The attribute `total` is the tangent stiffness at rest [N/m], 0 for a law that creeps under any force.
     """
 
     __slots__ = ()

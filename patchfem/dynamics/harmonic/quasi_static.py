@@ -178,7 +178,7 @@ def find_static_motions_from_loops(
 def _make_motion(modes, omega: float, z, loss: float) -> StaticMotion:
     """Return the motion of an equilibrium z (n,) [m] with a frequency [rad/s] and a loss per cycle [J].
 
-    modes: modes of the structure, whose dampers add to the loss; omega: the frequency; z: modal coordinates.
+    The dampers of the structure, in `modes`, add to the loss.
     """
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
     work = 2 * np.pi * omega**2 * modes.mass * float(z @ z)

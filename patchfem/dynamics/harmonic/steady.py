@@ -88,12 +88,20 @@ def find_steady_motion(
 
 
 def _choose_counts(drive, group: LawGroup, harmonics: int | None, start) -> list[int]:
-    """Return the numbers of harmonics that are tried in turn; a given number twice, because the samples change.
+    """Return the numbers of harmonics that are tried in turn.
 
-    drive: sine drive with its frequency.
-    group: friction laws and the modes on which they act.
-    harmonics: number that the user asks for, else None.
-    start: motion from which the search begins, whose number of harmonics is a hint; None without one.
+    A given number is tried twice, because the samples change.
+
+    Parameters
+    ----------
+    drive : core.SineDrive
+        Sine drive with its frequency.
+    group : LawGroup
+        Friction laws and the modes on which they act.
+    harmonics : int or None
+        Number that the user asks for.
+    start : SteadyMotion or None
+        Motion from which the search begins, whose number of harmonics is a hint.
     """
     if harmonics is not None:
         return [harmonics, harmonics]
@@ -256,11 +264,20 @@ def _follow_levels(
 ) -> CurvePath:
     """Follow the motions with h harmonics over the drive level, from WEAK_DRIVE up to a ratio of a level [m s-2].
 
-    balance: equations for the laws with a number of samples.
-    omega, level: frequency [rad/s] and amplitude of the acceleration of the drive [m s-2].
-    h: number of harmonics.
-    ratio: last level divided by `level`.
-    settings: steps along the curve.
+    Parameters
+    ----------
+    balance : HarmonicBalance
+        Equations for the laws with a number of samples.
+    omega : float
+        Frequency of the drive [rad/s].
+    level : float
+        Amplitude of the acceleration of the drive [m s-2].
+    h : int
+        Number of harmonics.
+    ratio : float
+        Last level divided by `level`.
+    settings : PathSettings
+        Steps along the curve.
     """
 
     def evaluate(x, level):

@@ -60,7 +60,7 @@ def draw(panel: Panel, axes):
 def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
     """Draw points with error bars, or a line with its band, into matplotlib axes.
 
-    curve, style: data in display units, and style of the panel; colour: of line, symbols and band; axes: changed.
+    The data are in display units. `style` is that of the panel, and `colour` applies to line, symbols and band.
     """
     if style in ("points", "dots") and not curve.is_line:
         if style == "dots":
@@ -122,9 +122,9 @@ def make_figure(panels: list[Panel]):
 
 
 def _save(figure, target, ending: str) -> None:
-    """Write a figure into a file or a stream; equal figures give equal files.
+    """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
 
-    figure, target: matplotlib figure, and path or stream; ending: format without a dot, such as "svg".
+    `ending` is the format without a dot, such as "svg".
     """
     from matplotlib import rc_context
 

@@ -140,9 +140,9 @@ def _select(data: Variables, chart: Chart) -> Variables:
 
 
 def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
-    """Return the indices of the span of a chart along `time` or `x`; None for the whole.
+    """Return the indices of the span of a chart along `time` or `x`, or None for the whole of it.
 
-    data, x_name: variables of an answer, and name of the horizontal one; span: as in `table.Chart`.
+    `data` are the variables of an answer, `span` is as in `table.Chart`, and `x_name` names the horizontal variable.
     """
     period = float(data["period"].values) if "period" in data else np.inf
     if span == "cycles" and np.isfinite(period):
@@ -163,9 +163,9 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
 
 
 def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
-    """Return the variables at some indices of a dimension; those without this dimension are unchanged.
+    """Return the variables at some indices along a dimension.
 
-    data: variables by name; dimension, indices: name of a dimension, and positions along it.
+    Variables without this dimension are unchanged.
     """
     taken = {
         name: replace(
@@ -182,9 +182,8 @@ def _make_curves(
 ) -> list[Curve]:
     """Return the curves of a variable: one for each interface, case, code, or element of an overlay.
 
-    data, chart: variables by name, and what the chart shows.
-    name, own_x: the variable, and that against which it is drawn; "" for the horizontal variable of the chart.
-    axes: horizontal and vertical axis, whose scales apply.
+    `name` is the variable, and `own_x` that against which it is drawn, or "" for the horizontal variable of the chart.
+    The scales of `axes`, the horizontal and the vertical one, apply.
     """
     own_x = own_x or _find_x(data, chart)
     if not {name, own_x} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
@@ -247,10 +246,10 @@ def _find_band(data: Variables, name: str) -> list[np.ndarray]:
 
 
 def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
-    """Return a curve for each code; points of other codes are missing in it, so that its line is interrupted.
+    """Return a curve for each code, in which the points of other codes are missing.
 
-    curve: all shown points; codes: variable with the code of each point; keep: indices of the shown points in it.
-    is_joined: whether points are joined by a line.
+    This interrupts its line. `curve` has all shown points, `codes` is the variable with the code of each point, and
+    `keep` has the indices of the shown points in it. `is_joined` tells whether a line joins the points.
     """
     numbers = np.asarray(codes.values)[keep]
     curves = []
@@ -269,8 +268,7 @@ def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: b
 def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Panel | None:
     """Return the panel of a variable over x and its first dimension.
 
-    data, chart: variables by name, and the chart, whose `y` is the variable.
-    x_axis, colours: horizontal axis, and scale and label of the colours.
+    The variable is `chart.y`. `colours` has the scale and the label of the colours.
     """
     variable = data[chart.y]
     values = np.atleast_2d(_as_floats(variable))

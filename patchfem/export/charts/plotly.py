@@ -87,7 +87,7 @@ def _make_traces(panel: Panel) -> list[Figure]:
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line.
 
-    curve, style: data in display units, and style of the panel; colour: of line, symbols and band.
+    The data are in display units. `style` is that of the panel, and `colour` applies to line, symbols and band.
     """
     trace = {
         "x": curve.x,

@@ -136,7 +136,7 @@ def _write_pvd(frames: Frames, out: Path) -> None:
 def _write_csv(frames: Frames, out: Path, number: int) -> None:
     """Write the interface of a frame as a table in SI, one row per point.
 
-    frames, number: fields of all frames, and index of one; out: file to write.
+    `number` is the index of the frame.
     """
     line = frames.blocks["interface"]
     columns = {"x [m]": line.points[:, 0]}

@@ -95,7 +95,7 @@ def _create_group(parent, name: str) -> h5py.Group:
 def _write_block(group, block: Block, times) -> None:
     """Write the mesh of a block, its fields, and where each frame begins in them.
 
-    group, block: HDF5 group to fill, and mesh with fields; times: of the frames [s].
+    `group` is the HDF5 group to fill, and `times` [s] are those of the frames.
     """
     connectivity, starts, types = block.vtk_cells()
     group.attrs["Version"] = VERSION
@@ -130,7 +130,7 @@ def _write_block(group, block: Block, times) -> None:
 def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Dataset:
     """Write an array into an HDF5 group, compressed unless it is empty.
 
-    name, values: of the dataset; chunks: shape of a chunk, True to let h5py choose it.
+    `chunks` is the shape of a chunk, or True to let h5py choose it.
     """
     packing = {"chunks": chunks, "shuffle": True, "compression": "gzip", "compression_opts": 1}
     return group.create_dataset(name, data=values, **(packing if values.size else {}))
@@ -139,10 +139,8 @@ def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Data
 def _write_field(group, name: str, values: np.ndarray) -> None:
     """Write a field (f, n, ...) with its unit and the meaning of its codes.
 
-    group, name: HDF5 group, and name of the field in `FIELDS`; values: in SI units.
-
-    A chunk is one component in one frame: neighbours in it are neighbours in space, which compresses
-    well.
+    `name` is that of the field in `FIELDS`, whose values are in SI units. A chunk is one component in one frame:
+    neighbours in it are neighbours in space, which compresses well.
     """
     field = FIELDS[name]
     flat = values.reshape(-1, *values.shape[2:])
@@ -212,7 +210,8 @@ def _read_block(group, count: int) -> Block:
 def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
     """Read a field (f, size, ...), where f is `count`, or 1 if it does not change.
 
-    rows, name: HDF5 dataset of all frames below each other, and name of the field; size: points or cells in a frame.
+    `rows` is the HDF5 dataset of all frames below each other, `name` that of the field, and `size` the number of points
+    or cells in a frame.
     """
     values = rows[:].reshape(-1, size, *FIELDS[name].shape)
     if len(values) not in (1, count):

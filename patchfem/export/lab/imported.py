@@ -95,9 +95,14 @@ def convert_file(
 
 
 def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
-    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use.
+    """Return "table", "decay" or "modes", the form in which records are written.
 
-    out, settings: file to write, and options of the estimates; zero: whether --zero is given.
+    `zero` tells whether --zero is given.
+
+    Raises
+    ------
+    PatchfemError
+        If the file has another suffix, or if the form does not use a given option.
     """
     endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
     form = endings.get(out.suffix.lower())
@@ -186,9 +191,9 @@ def _write_decay(
 def _write_modes(
     modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
 ) -> dict[str, object]:
-    """Write identified modes as tables of a scene; return what the command prints.
+    """Write identified modes as tables of a scene, and return what the command prints.
 
-    modes, out: identified modes, and file to write; source: name of the file of records; notes: on these records.
+    `source` is the name of the file of records, and `notes` are on these records.
     """
     write_text(out, format_structure(modes, source))
     columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
@@ -261,9 +266,9 @@ def _refuse_modal_data(file: Path) -> None:
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Convert the text of an option to SI; None if it is "".
+    """Convert the text of an option to SI, or return None if it is "".
 
-    text, kind: number with a unit, and kind of quantity, such as "time"; option: its name, for an error message.
+    `kind` is the kind of quantity, such as "time", and `option` the name of the option for an error message.
     """
     try:
         return quantities.parse_quantity(text, kind) if text else None

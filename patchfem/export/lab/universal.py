@@ -152,7 +152,7 @@ def write_datasets(path: Path, datasets: list[dict]) -> None:
 def _correct_byte_count(path: Path, start: int, size: int) -> None:
     """Write the number of bytes of values into the header of the dataset 58 that begins at a position of the file.
 
-    path, start: file, and position of the dataset [bytes]; size: of its values [bytes].
+    `start` is the position of the dataset [bytes], and `size` the number of bytes of its values.
     """
     with open(path, "r+b") as file:
         file.seek(start)

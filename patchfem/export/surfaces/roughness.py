@@ -156,7 +156,7 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
 def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> JsonObject:
     """Return the means of one kind of files as an object of profile.json.
 
-    kind, count: kind and number of the files; means: by name of the parameter; notes: on what the means are worth.
+    `count` is the number of files, `means` are by name of the parameter, and `notes` say what the means are worth.
     """
     measures = {}
     for name, mean in means.items():

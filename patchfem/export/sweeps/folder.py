@@ -232,7 +232,7 @@ class Folder:
     def refuse_other_sweep(self, identity: JsonObject) -> None:
         """Raise PatchfemError if the tables in the folder are those of another scene or of other keys.
 
-        identity: `of` in sweep.json, from `answer.identify_sweep`.
+        `identity` is the object `of` in sweep.json, as `answer.identify_sweep` returns it.
         """
         stored = self.read_details().get("of", identity)
         if stored != identity:

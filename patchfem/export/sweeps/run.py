@@ -141,7 +141,7 @@ def sweep_into(
 def _note_stored_cases(folder: Folder, count: int, total: int, say: Callable[[str], None]) -> None:
     """Say that an interrupted sweep in the folder has some of the cases, which are computed again.
 
-    folder: of the sweep; count, total: cases that have an answer, and all cases; say: prints a line.
+    `count` of the `total` cases have an answer. `say` prints a line.
     """
     is_interrupted = folder.read_details().get("cases", {}).get("unfinished") != 0
     if count and is_interrupted:

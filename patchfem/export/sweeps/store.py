@@ -114,9 +114,9 @@ class Chunks:
         return rows[self.places]
 
     def merge_files(self, *, removes_others: bool) -> None:
-        """Merge the files into one; a damaged file is removed.
+        """Merge the files into one, and remove damaged files.
 
-        removes_others: whether to remove files without a requested case.
+        `removes_others` tells whether to remove files without a requested case as well.
         """
         outdated = set(self.list_files())
         if len(outdated) < 2:

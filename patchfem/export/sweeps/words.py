@@ -70,10 +70,7 @@ def _label(name: str) -> str:
 
 
 def _format_measure(name: str, unit: str, value: float) -> str:
-    """Return a value of a measure with its unit; 0 has none.
-
-    name, unit, value: of the measure, in SI units.
-    """
+    """Return a value of a measure, given in SI units, with its unit; 0 has none."""
     return format_value(value, unit, name=name) if value else "0"
 
 

@@ -200,7 +200,7 @@ def total(row, bonds):
 def _sum_new(path, after, bonds):
     """Return force and stored energy of the bonds that form on a path [m], for unit pressure.
 
-    after: path state at the end of the path; bonds: list of bonds before it, with the law.
+    `after` is the path state at the end of the path, and `bonds` the list of bonds before it, with the law.
     """
     if path == 0:
         return BondSum(0.0, 0.0)
@@ -216,7 +216,8 @@ def _sum_new(path, after, bonds):
 def _formed_growing_force(path, after, bonds):
     """Return the force [1] of the growing bonds that form on an increment at full pressure.
 
-    path, after: length of the increment [m], and the path state at its end; bonds: list before it, with the law.
+    `path` is the length of the increment [m], `after` the path state at its end, and `bonds` the list before it, with
+    the law.
     """
     law = bonds.law
     before = bonds.now

@@ -134,9 +134,10 @@ def _move_reference(bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _append_strips(increment, before, after, bonds):
-    """Append the strips of bonds that an increment forms; return False if the list is full.
+    """Append the strips of bonds that an increment forms, and return False if the list is full.
 
-    increment: signed displacement [m]; before, after: path states at its ends; bonds: the list, changed.
+    `increment` is the signed displacement [m], `before` and `after` are the path states at its ends, and `bonds` is the
+    list.
     """
     strips = bonds.bondlist
     status = bonds.status
@@ -305,9 +306,9 @@ def _join_last_strips(bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_strips(bonds, older, younger):
-    """Add a strip to an older one if it continues it in the same direction; return whether it does.
+    """Add a strip to an older one if it continues it in the same direction, and return whether it does.
 
-    bonds: the list, changed; older, younger: columns of both strips.
+    `bonds` is the list, which is changed, and `older` and `younger` are the columns of both strips.
     """
     strips = bonds.bondlist
     form = bonds.law[LAW.form]
@@ -355,7 +356,7 @@ def _join_strips(bonds, older, younger):
 def _have_similar_lengths(bonds, older, younger):
     """Return whether the growing bonds of two strips have similar lengths or are fully grown.
 
-    bonds: the list; older, younger: columns of both strips.
+    `bonds` is the list, and `older` and `younger` are the columns of both strips.
     """
     strips = bonds.bondlist
     mature = bonds.now[PATH.length]

@@ -272,9 +272,8 @@ def interpolate_value(fraction, value_1, value_2):
 def _integrate_strip(after, scale, bonds, column):
     """Integrate a strip on each side of u = 0, in pieces of linear density.
 
-    after: path state at which it is summed.
-    scale: factor that undoes the scale of the values of the strips (`_value_scale`).
-    bonds, column: the list, and the column of the strip.
+    `after` is the path state at which the strip is summed, and `column` its column in the list `bonds`. `scale` is the
+    factor that undoes the scale of the values of the strips (`_value_scale`).
     """
     strips = bonds.bondlist
     start = strips[STRIP.start, column]

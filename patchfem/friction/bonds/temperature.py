@@ -76,11 +76,11 @@ def growth_at_temperature(
 
 
 def _scale_rate(name: str, value: float, exponent, key: str):
-    """Return a rate times exp(exponent); error messages cite the scene keys `name` and `key`.
+    """Return a rate times exp(exponent), and refuse a result that a computer cannot represent.
 
-    name, value: the rate at the reference temperature, in SI units.
-    exponent: logarithm of the change by the temperature, a float or (m,).
-    key: key of the activation temperature in [temperature].
+    `value` is the rate at the reference temperature, in SI units. `exponent`, a float or (m,), is the logarithm of the
+    change by the temperature. The error message cites the scene keys `name`, of the rate, and `key`, of its activation
+    temperature.
     """
     total = np.log(value) + exponent
     limits = np.finfo(float)

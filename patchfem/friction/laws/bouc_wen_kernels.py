@@ -49,9 +49,9 @@ class FollowedPath(NamedTuple):
 
 @njit(**NJIT_KERNEL)
 def _find_rate(y, power, unloading):
-    """Return dy/dx at y; `unloading` is 1 - 2 s.
+    """Return the derivative dy/dx of the reduced force y, which is positive along the motion.
 
-    y: reduced force, positive along the motion; power: exponent n.
+    `power` is the exponent n, and `unloading` is 1 - 2 s.
     """
     size = y * y if power == 2.0 else abs(y) ** power
     return 1 - size if y > 0 else 1 - unloading * size
@@ -61,9 +61,8 @@ def _find_rate(y, power, unloading):
 def _saturate(distance, power, path):
     """Return the distance e of y from 1 after a path in lengths, and its mean over the path.
 
-    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2.
-
-    distance: e at the start, >= 0; power: exponent n; path: x in lengths eps.
+    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2. `distance`
+    is e at the start, which is not negative, `power` the exponent n, and `path` is x in lengths eps.
     """
     bend = 0.5 * (power - 1)
     if distance < SATURATED:
@@ -129,8 +128,8 @@ def follow_path(y, path, power, shape):
 def rate_equation(numbers, stretch, velocity, direction):
     """Return the force at the stretch eps z.
 
-    numbers, stretch: parameters of the law (`BoucWenNumber`), and the stretch [m].
-    velocity, direction: of the slip [m/s], and its sign; the force does not depend on them.
+    `numbers` are the parameters of the law (`BoucWenNumber`), and `stretch` is in [m]. The force does not depend on the
+    `velocity` of the slip [m/s] and its sign, `direction`.
 
     Returns
     -------
@@ -142,10 +141,10 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relax_stretch(numbers, stretch, increment, dt):
-    """Return the stretch eps z after an increment, for harmonic balance; it does not depend on time.
+    """Return the stretch eps z after an increment, for harmonic balance.
 
-    numbers, stretch: parameters of the law (`BoucWenNumber`), and the stretch before the increment [m].
-    increment, dt: displacement [m], and its duration [s], which is unused.
+    `numbers` are the parameters of the law (`BoucWenNumber`), and `stretch` [m] is the stretch before the increment [m].
+    The result does not depend on the duration `dt` [s].
 
     Returns
     -------

@@ -55,10 +55,18 @@ def _bond_gammainc(order: float, x):
 def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.ndarray:
     """Return the weights (n, m) of the nodes in the averages at positions (n,), for sliding towards +x.
 
-    is_bare (m - 1,): whether a segment between two nodes has no pressure; nothing is averaged beyond it.
-
-    nodes: (m,) positions of the nodes [m], increasing.
-    length, order: bond length eps [m] and order p of the kernel phi.
+    Parameters
+    ----------
+    positions : (n,) array
+        Positions at which the averages are taken [m].
+    nodes : (m,) array
+        Positions of the nodes [m], increasing.
+    is_bare : (m - 1,) array of bool
+        Segments between two nodes that have no pressure; nothing is averaged beyond them.
+    length : float
+        Bond length eps [m].
+    order : float
+        Order p of the kernel phi.
     """
     # The average is over the path behind a position: distances s >= 0 to the nodes below it
     distance = positions[:, None] - nodes

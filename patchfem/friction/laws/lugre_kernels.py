@@ -69,10 +69,8 @@ def relaxation_length(numbers, velocity):
 def rate_equation(numbers, stretch, velocity, direction):
     """Return the force at a stretch and a velocity, and dz/dx = 1 - z/(g/stiffness).
 
-    x increases along the slip.
-
-    numbers: parameters of the law (`LuGreNumber`).
-    stretch, velocity: z [m] and slip velocity [m/s]; direction: sign of the slip.
+    The coordinate x increases along the slip. `numbers` are the parameters of the law (`LuGreNumber`), `stretch` is z
+    [m], `velocity` that of the slip [m/s], and `direction` its sign.
 
     Returns
     -------
@@ -95,10 +93,9 @@ def rate_equation(numbers, stretch, velocity, direction):
 def relax_stretch(numbers, stretch, increment, dt):
     """Return z after an increment at constant velocity, for harmonic balance.
 
-    z relaxes towards +-g/stiffness. If the step takes no time, the limit is the kinetic force.
-
-    numbers, stretch: parameters of the law (`LuGreNumber`), and z before the increment [m].
-    increment, dt: displacement [m] and its duration [s], 0 or more.
+    z relaxes towards +-g/stiffness. If the step takes no time, the limit is the kinetic force. `numbers` are the
+    parameters of the law (`LuGreNumber`), `stretch` is z before the increment [m], and `dt` the duration of the
+    increment [s], 0 or more.
 
     Returns
     -------

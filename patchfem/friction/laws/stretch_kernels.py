@@ -26,10 +26,8 @@ class StretchNumber(IntEnum):
 def relax_stretch(numbers, stretch, increment, dt):
     """Return the stretch of mature bonds after an increment, for harmonic balance.
 
-    It relaxes over the bond length.
-
-    numbers, stretch: parameters of the law (`StretchNumber`), and the stretch before the increment [m].
-    increment, dt: displacement [m], and its duration [s], which is unused.
+    It relaxes over the bond length. `numbers` are the parameters of the law (`StretchNumber`), and `stretch` [m] is the
+    stretch before the increment [m]. The result does not depend on the duration `dt` [s].
 
     Returns
     -------
@@ -47,8 +45,8 @@ def relax_stretch(numbers, stretch, increment, dt):
 def rate_equation(numbers, stretch, velocity, direction):
     """Return the force of mature bonds of constant length at a stretch.
 
-    numbers, stretch: parameters of the law (`StretchNumber`), and the stretch [m].
-    velocity, direction: of the slip [m/s], and its sign; the force does not depend on them.
+    `numbers` are the parameters of the law (`StretchNumber`), and `stretch` is in [m]. The force does not depend on the
+    `velocity` of the slip [m/s] and its sign, `direction`.
 
     Returns
     -------

@@ -90,8 +90,8 @@ def solve_models(
 def _forward_result(on_result, case_indices: Sequence[int], index: int, result) -> None:
     """Call `on_result` with the index of a case in the whole study.
 
-    on_result: callback of the study; case_indices: indices in the study of the cases of a group.
-    index, result: index of the case in its group, and its result.
+    `on_result` is the callback of the study, `case_indices` are the indices in the study of the cases of a group, and
+    `index` is that of a case in the group.
     """
     on_result(case_indices[index], result)
 

@@ -90,10 +90,7 @@ class CaseResults:
         self.fill(case, measures)
 
     def fill(self, case: int, measures: Measures) -> None:
-        """Store measures of a case; existing values are replaced.
-
-        measures: core.Measure by name.
-        """
+        """Store the measures of a case, in place of existing values."""
         for name, measure in measures.items():
             self.add_measure(name, measure.unit)
             if measure.value is None:
@@ -149,9 +146,9 @@ class CaseResults:
 
 
 def _replace_texts(texts, part_texts, new_indices) -> None:
-    """Replace texts by case by those of a part of the cases, given the new index of each of them.
+    """Replace texts of a study, stored by case, by those of a part of its cases.
 
-    texts: by case of the study, changed; part_texts: by case of the part; new_indices: case of the part -> case of the
+    `texts` is changed. `part_texts` are by case of the part, and `new_indices` maps a case of the part to one of the
     study.
     """
     for case in new_indices.values():

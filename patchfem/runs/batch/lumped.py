@@ -317,9 +317,10 @@ def _select(record, rows):
 
 
 def _insert(record, rows, part):
-    """Replace rows of all arrays of a record or dict, nested ones too; return the record.
+    """Replace rows of all arrays of a record or dict, nested ones too, and return the record.
 
-    record: changed in place; rows: indices or mask; part: record of the same kind with only these rows.
+    `record` is changed in place, `rows` are indices or a mask, and `part` is a record of the same kind with only these
+    rows.
     """
     pairs = record.items() if isinstance(record, dict) else zip(record._fields, record)
     for name, value in pairs:
@@ -405,7 +406,7 @@ def make_results(
 def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
     """Replace values of a measure by the reason why they are missing.
 
-    results: changed; name: of the measure; cases: indices of the cases.
+    `name` is that of the measure, and `cases` are the indices of the cases. `results` is changed.
     """
     if not cases.size:
         return

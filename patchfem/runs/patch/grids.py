@@ -108,9 +108,8 @@ class ContactExtent:
 class BaseGrids(NamedTuple):
     """Coarsest grids of the pieces of a patch, graded towards the contact region.
 
-    There is a single grid if the pieces are identical.
-
-    contact: ContactExtent to which the grids are graded; None without a load.
+    There is a single grid if the pieces are identical. `contact` is the region to which the grids are graded, None
+    without a load.
     """
 
     bodies: list[TensorGrid]
@@ -224,7 +223,7 @@ def make_search_layout(patch_model) -> Layout:
 def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     """Return the column layout of the coarsest mesh, graded towards given contact regions.
 
-    extents: ContactExtents of one patch under several loads, or of several patches.
+    The regions are those of one patch under several loads, or of several patches.
     """
     length = patch_model.pieces.length
     half = length / 2

@@ -376,7 +376,7 @@ class Resolution(NamedTuple):
 def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     """Return how well the mesh of a solved patch resolves its contact.
 
-    missed_peak: `unresolved_edge_rounding_pressure` [Pa].
+    `missed_peak` is the measure `unresolved_edge_rounding_pressure` [Pa].
     """
     pair = patch.pair
     pieces = patch.pieces
@@ -561,9 +561,8 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
 def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
     """Format the changes of the measures from the assumed plane state to the opposite one.
 
-    patch_model: patch with its loading; a given approach makes the load a measure that changes.
-    values, other_values: static measures in the assumed and in the opposite state, by name. Changes of up to 0.1 % are left
-    out.
+    The values are the static measures in the assumed and in the opposite state, by name. Changes of up to 0.1 % are left
+    out. If the approach is given, the load is a measure that changes.
     """
     changes = []
     names = MEASURES_WITH_BAND

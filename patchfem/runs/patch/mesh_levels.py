@@ -37,8 +37,8 @@ def solve_with_coarser(
 
     If the element size is not prescribed, nested meshes are refined until the patch meets the
     tolerance. An unstructured mesh has no coarser one; its second solution is on the mesh with all
-    edges halved. Shared meshes are used as they are, unless they do not resolve a profile to the
-    tolerance: then the patch gets its own meshes, as in a single run.
+    edges halved. Shared meshes are used as they are, unless they do not resolve a profile to the tolerance.
+    In this case the patch gets its own meshes, as in a single run.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def solve_on_refined_meshes(
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
     """Return whether the measures that control the mesh meet the tolerance with given points.
 
-    patches: solved patch on successive meshes; points: solution on equally spaced points, or None.
+    `patches` are the solved patch on successive meshes, and `points` the solution on equally spaced points, or None.
     """
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1

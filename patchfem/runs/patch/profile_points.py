@@ -373,11 +373,10 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
 
 
 def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) -> np.ndarray:
-    """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool.
+    """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool, `active`.
 
-    An interval ends at a contact edge between two points, or at an end of the interface.
-
-    active: (n,) the contact set; contact_edges: edges between points, in order of x; length: of the interface [m].
+    An interval ends at a contact edge between two points, or at an end of the interface. The edges are in order of x,
+    and `length` is that of the interface [m].
     """
     is_active = np.concatenate([[False], active, [False]])
     edges = iter(contact_edges)

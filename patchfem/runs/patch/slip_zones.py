@@ -56,8 +56,8 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
 def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
     """Return the intervals of x [m] in which the yield displacement is below an amplitude.
 
-    x, yield_displacement: positions of neighbouring nodes, and displacement at which each of them slips, both [m].
-    amplitude: of the prescribed displacement [m].
+    `x` [m] are positions of neighbouring nodes, `yield_displacement` [m] is the displacement at which each of them
+    slips, and `amplitude` [m] that of the prescribed displacement.
     """
     is_yielding = np.concatenate([[False], yield_displacement < amplitude, [False]])
     ends = []

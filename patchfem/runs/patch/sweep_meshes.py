@@ -240,7 +240,7 @@ def _refine_until_tolerance_is_met(
 def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) -> bool:
     """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them.
 
-    patch_model: patch of one case; pairs: condensed pieces from fine to coarse; tolerance: relative error.
+    `patch_model` is the patch of one case, and `pairs` are from fine to coarse.
     """
     try:
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)

@@ -69,9 +69,8 @@ def estimate_peak_pressure(x, sigma, node_fraction=None) -> float:
 def _vertex_height(x, sigma, node: int) -> float:
     """Return by how much the parabola through a node and its neighbours rises above the pressure of the node [Pa].
 
-    If the neighbouring parabolas have a much smaller curvature, as beside a jump, the height is reduced.
-
-    x, sigma: positions [m] and pressures [Pa] of the nodes; node: index of an inner node, that with the largest pressure.
+    If the neighbouring parabolas have a much smaller curvature, as beside a jump, the height is reduced. `x` [m] and
+    `sigma` [Pa] are positions and pressures of the nodes, and `node` is the inner node with the largest pressure.
     """
     if not (sigma[node - 1] > 0 and sigma[node + 1] > 0):
         return 0.0
@@ -241,7 +240,7 @@ def loaded_nodes(patch: Patch) -> np.ndarray:
 def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray:
     """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
 
-    ends: contact edges from `contact_ends`.
+    `ends` are the contact edges from `contact_ends`.
     """
     return edges.contact_intervals(patch.x, patch.active, ends)
 
@@ -256,7 +255,7 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
 def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
     """Return the contact edges of one strip, with their fractions between two nodes.
 
-    patch: solved patch; strip: number of the strip, 0 without strips; pressed: factor of its nodes in contact.
+    `strip` is the number of the strip, 0 without strips, and `pressed` the factor of its nodes in contact.
     """
     x = patch.x
     state = patch.state
@@ -291,12 +290,10 @@ def _full_stick_stiffness(
 ) -> float:
     """Return the tangential contact stiffness [N/m] in full stick of the nodes in contact.
 
-    Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear
-    and normal displacement. ends: contact edges.
-
-    normal, tangential: (m, m) normal and shear compliance [m/N] of the interface nodes.
-    coupling: (m, m) compliance [m/N] of the normal closing under shear forces.
-    active: (m,) whether a node is in contact.
+    Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear and normal
+    displacement. `normal` and `tangential` (m, m) [m/N] are the normal and shear compliance of the interface nodes,
+    `coupling` (m, m) [m/N] is the normal closing under shear forces, `active` (m,) tells whether a node is in contact,
+    and `ends` are the contact edges.
     """
     if not coupling.any():
         sheared = edges.SetFactor(tangential, active)

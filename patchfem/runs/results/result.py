@@ -403,7 +403,7 @@ def engine_by_measure(result) -> dict[str, str]:
 def shorten_file_names(texts: Iterable[str], path: Path) -> list[str]:
     """Shorten absolute file names and rewrite powers of ten in remarks.
 
-    path: path of the scene; file names become relative to its folder.
+    File names become relative to the folder of the scene, whose path is `path`.
     """
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]

@@ -32,7 +32,7 @@ def measure_contact_length(patch) -> float:
 def warn_of_large_slide(patch, slide) -> list[str]:
     """Return a list with a warning if the displacement is large compared with the contact length.
 
-    slide: relative displacement (k,) [m].
+    `slide` (k,) [m] is the relative displacement.
     """
     largest = find_max_displacement(slide)
     contact = measure_contact_length(patch)

@@ -72,9 +72,7 @@ def has_bond_list(model: Model, numerics: Numerics) -> bool:
 def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
     """Choose the bond summation for the requested engine, which may be "auto".
 
-    `stretch` is the displacement of a block held by its bonds, in bond lengths.
-
-    model, numerics: model of the rig, and its settings with the steps per cycle.
+    `stretch` is the displacement of a block held by its bonds, in bond lengths. `numerics` has the steps per cycle.
     """
     law = model.bonds
     accuracy = model.accuracy

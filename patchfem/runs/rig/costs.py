@@ -177,8 +177,8 @@ def estimate_hybrid_steps(model: Model) -> float:
 def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
     """Estimate the fastest rate [1/s] at which a law forgets its state.
 
-    model, interface: the rig, and one of its interfaces with the numbers of its law.
-    mobility: inverse of the mass on which the law acts [1/kg].
+    `interface` is one of the rig, with the numbers of its law, and `mobility` [1/kg] the inverse of the mass on which
+    the law acts.
     """
     rig = model.rig
     keys = interface.numbers

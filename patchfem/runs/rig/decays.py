@@ -276,7 +276,8 @@ def estimate_decay_mesh_errors(
 def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarray:
     """Interpolate rows (r, k) of values linearly in the logarithm of the amplitude.
 
-    amplitudes, known_amplitudes: (n,) at which values are wanted, and (k,) increasing ones of the rows, in the same unit.
+    `known_amplitudes` (k,) are the increasing ones of the rows, and `amplitudes` (n,) those at which values are wanted,
+    in the same unit.
     """
     at = np.log(amplitudes)
     known = np.log(known_amplitudes)
@@ -336,9 +337,8 @@ def describe_unknown_mesh_error(reason: str, coarser_runs: ComparisonRuns) -> st
 def _find_nearest_mode(modes, laws, frequency: float) -> int:
     """Return the index of the mode with stuck interfaces that is nearest in frequency.
 
-    Modes that do not move the output are skipped.
-
-    modes: modes of the structure; laws: friction laws of the interfaces with their stiffness in stick; frequency: [Hz].
+    Modes that do not move the output are skipped. `laws` are the friction laws of the interfaces with their stiffness in
+    stick, and `frequency` is in [Hz].
     """
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):

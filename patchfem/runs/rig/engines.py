@@ -106,7 +106,7 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
 def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
     """List numerical settings with a coarser mesh: of the patch of [contact], or of one interface patch each.
 
-    model, numerics: the rig, and the settings of its run; has_coarse_patch: whether the patch of [contact] matters.
+    `numerics` are the settings of the run, and `has_coarse_patch` tells whether the patch of [contact] matters.
     """
     meshes = [replace(numerics, coarse_patch=True)] * has_coarse_patch
     if model.rig.friction.has_partial_slip:
@@ -273,9 +273,8 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows.
 
-    model, numerics: the rig, and the settings of its run.
-    patch, coarse: solved patch, and the patch on a coarser mesh; None without them.
-    solution: steady motion, with the errors that its finder knows by measure.
+    `patch` is the solved patch and `coarse` that on a coarser mesh, None without them. `solution` is the steady motion,
+    with the errors that its finder knows by measure.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
     if choose_steady_method(model) == "harmonic":

@@ -267,7 +267,7 @@ class LumpedEvaluator(RunEvaluator):
     def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
         """Choose the times of the samples and of `frames` snapshots.
 
-        drive, cycles: drive with its period, and number of its cycles in the run.
+        `cycles` is the number of cycles of the drive in the run.
         """
         period = drive.period
         end = cycles * period
@@ -297,10 +297,9 @@ class LumpedEvaluator(RunEvaluator):
     ) -> LumpedRun:
         """Return the histories, energies and events of a motion.
 
-        motion: what the engine returned, with a row for each sample.
-        drive, cycles: drive, and number of its cycles in the run.
-        times: times at which samples and snapshots were asked for.
-        start: state from which the motion went on; None from rest.
+        `motion` is what the engine returned, with a row for each sample, and `cycles` the number of cycles of the drive.
+        `times` are those at which samples and snapshots were requested, and `start` is the state from which the motion
+        went on, None from rest.
         """
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
@@ -375,9 +374,9 @@ class LumpedEvaluator(RunEvaluator):
     def _list_snapshots(self, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from the whole motion before.
 
-        What happened before its start is in the memory of its `State`, if it does not start from rest.
-
-        response: histories of the whole motion; times: of the snapshots [s]; start: `State` from which it went on, or None.
+        What happened before its start is in the memory of its `State`, if it does not start from rest. `response` has
+        the histories of the whole motion, `times` [s] are those of the snapshots, and `start` is the `State` from which
+        the motion went on, or None.
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
@@ -514,7 +513,7 @@ def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
     """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period.
 
-    begin, end, period: [s]; minimum: smallest number of times.
+    The times and the period are in [s], and `minimum` is the smallest number of times.
     """
     count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))

@@ -121,7 +121,8 @@ class LimitCycles(NamedTuple):
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface.
 
-    model, numerics: the rig, and its settings; patch: pressed patch of its interface, or None.
+    `numerics` are the settings of the run, and `patch` is the pressed patch of the interface, or None for an interface
+    without one. If no limit cycle can be computed, the note in the result says why.
     """
     rig = model.rig
     f = model.friction

@@ -222,7 +222,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
     """Report the completed fraction of all levels to the progress callback.
 
-    level, n_levels: number of the present level from 0, and number of levels; fraction: completed part of this level.
+    `level` counts the levels from 0, and `fraction` is the completed part of this level.
     """
     progress((level + fraction) / n_levels)
 

@@ -270,10 +270,8 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
 def _count_slip_period_cycles(model, numerics, solution) -> int:
     """Return the number of cycles of a complete stick-slip period on a belt.
 
-    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is
-    no period, or if the run is shorter than two windows.
-
-    model, numerics: the rig, and its settings with the cycles of the run; solution: its motion.
+    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is no period, or if the
+    run is shorter than two windows. `numerics` has the cycles of the run, and `solution` is its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):

@@ -132,7 +132,7 @@ class _SlipPathFunction:
 def compute_mean_worn_depth(patch, depth) -> float:
     """Return the mean worn depth [m] of a patch, i.e. worn volume divided by area.
 
-    depth: worn depth (m,) [m], (s, m) for strips.
+    `depth` [m] is the worn depth (m,), or (s, m) for strips.
     """
     area = patch.pieces.interface.weight
     return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
@@ -276,9 +276,9 @@ class WornCoating(NamedTuple):
 
 
 def find_worn_through_coating(model, depth) -> WornCoating | None:
-    """Return the coating that is worn through at a worn depth; None if there is none.
+    """Return the coating that is worn through at a worn depth, or None if there is none.
 
-    depth: worn depth of both pieces together (m,) [m], (s, m) for strips.
+    `depth` [m] is the worn depth of both pieces together (m,), or (s, m) for strips.
     """
     coating = _most_worn_coating(model, depth)
     return coating if coating.fraction >= 1 - THIN_FRACTION else None
@@ -321,9 +321,10 @@ def list_worn_pieces(model, depth) -> list[WornPiece]:
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the state after the next jump; the jump ends early if a coating is worn through.
+    """Compute the state after the next jump, which ends early if a coating is worn through.
 
-    model: wear and accuracy; problem: contact and coefficient; state: worn depth and cycle before the jump.
+    `model` has the wear and the accuracy, `problem` the contact and the coefficient, and `state` the worn depth and the
+    cycle before the jump.
     """
 
     def jump_to(cycle: float) -> WearState:
@@ -412,7 +413,8 @@ def _add_earlier_wear(model, patch):
 def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
     """Return contact, slip path and measures of a worn patch as a WearMoment.
 
-    patch: solved with the worn depth of `state`; motion: function that computed the last slip path, with its measures.
+    `patch` is solved with the worn depth of `state`, and `motion` is the function that computed the last slip path, with
+    its measures.
     """
     model = motion.model
     worn = make_worn_model(model, patch, state.depth)
@@ -561,7 +563,7 @@ def load_wear_state(path: Path, key: str) -> History:
 def make_missing_state_error(path: Path) -> PatchfemError:
     """Return the exception for a run folder that has no saved state.
 
-    path: path of the missing file.
+    `path` is that of the missing file.
     """
     return PatchfemError(
         f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; {RETRY_ADVICE}"

@@ -92,9 +92,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures:
     """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
-    error: error of the largest worn depth [m].
-
-    model, evolved: model with its wear, and the result of the jumps with their moments.
+    `evolved` is the result of the jumps with their moments, and `error` [m] that of the largest worn depth.
     """
     if find_worn_through_coating(model, evolved.state.depth) is None:
         return {}

@@ -223,7 +223,7 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
 def _follow_slide(model, patch, frames: int) -> _Motion:
     """Compute the motion of a bench.
 
-    model, patch: model, and its solved patch; frames: number of frames in each cycle, 0 for histories only.
+    `frames` is the number of frames in each cycle, 0 for histories only.
     """
     cycles = max(1, round(model.slide.cycles or 1))
     run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
@@ -249,7 +249,7 @@ def _follow_slide(model, patch, frames: int) -> _Motion:
 def _follow_rig(model, patch, frames: int) -> _Motion:
     """Compute the motion of a rig.
 
-    model, patch: model, and its solved patch; frames: number of frames in the last cycle, 0 for histories only.
+    `frames` is the number of frames in the last cycle, 0 for histories only.
     """
     settings = numerics.choose_numerics(model)
     solution = solve.solve_rig(model, settings, patch, frames)
@@ -294,8 +294,8 @@ def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
 def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
     """Return the histories of the last cycle of a bench or a rig.
 
-    model, window: model, and histories of the last cycles.
-    load: constant load [N] of a rig; over grooves the window has the vertical force.
+    `window` has the histories of the last cycles. `load` is the constant load [N] of a rig; over grooves the window has
+    the vertical force.
     """
     if model.rig is None:
         rows = slice(window.first, None)
@@ -346,10 +346,9 @@ def _make_point_slip(
 def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, float]:
     """Return the path [m] of points that slip alike, and its relative error.
 
-    The samples of the histories contain every reversal. Only the slope of grooves varies between them.
-    load: normal load [N] to which the tractions are related.
-
-    model: friction and grooves; cycle: histories of the last cycle.
+    The samples of the histories contain every reversal. Only the slope of grooves varies between them. `model` has
+    friction and grooves, `cycle` the histories of the last cycle, and `load` [N] is the normal load to which the
+    tractions are related.
     """
     slip, force, loads = (row[:, None] for row in (cycle.slip, cycle.force, cycle.load))
     points = _make_point_slip(model, cycle, slip, force, np.array([load]), loads)
@@ -363,9 +362,8 @@ def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, f
 def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
     """Return the paths (s, m) [m] of the strips of a rig with yaw, and their relative error.
 
-    The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact.
-
-    model, patch: model of the rig, and its patch in strips; window: histories of the last cycles with those of the strips.
+    The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact. `patch`
+    is in strips, and `window` has the histories of the last cycles with those of the strips.
     """
     loads = patch.strips.force.sum(axis=1)
     is_last = _is_in_last_cycle(model, window)

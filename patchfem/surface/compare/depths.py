@@ -203,9 +203,9 @@ def _bend_datum(depth, unworn, base) -> np.ndarray:
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     """Measure the largest depth of the worn parts without the bias of the maximum of noisy depths.
 
-    The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the
-    interval contains every single depth, because a crest may be worn as deep, and both ends what the samples do not
-    resolve: the part of the largest depth that every second sample does not show.
+    The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the interval
+    contains every single depth, because a crest may be worn as deep. Both ends contain what the samples do not resolve,
+    which is the part of the largest depth that every second sample does not show.
 
     Parameters
     ----------

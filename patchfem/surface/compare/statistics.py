@@ -106,9 +106,8 @@ def compute_threshold(n_tests: float) -> float:
 def smooth(z, deviations) -> np.ndarray:
     """Return the Gaussian mean line or surface of heights z (n,) or (m, n) without gaps.
 
-    deviations: standard deviation of the weights in samples, one for each axis or for all of them.
-
-    The heights are continued by their mirror image at the borders.
+    The heights are continued by their mirror image at the borders. `deviations` are the standard deviations of the
+    weights in samples, one for each axis or a single one for all axes.
     """
     spectrum = fft.dctn(z)
     for axis, deviation in enumerate(np.broadcast_to(deviations, z.ndim)):

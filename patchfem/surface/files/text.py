@@ -42,7 +42,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 def read_text(content: Content, *, has_units: bool = False) -> Table:
     """Read the columns or the matrix in the content of a text file.
 
-    has_units: whether the user states the units; then columns of unknown names are taken in their order.
+    `has_units` tells whether the user states the units. Columns of unknown names are then taken in their order.
     """
     path = content.path
     header, lines = read_header(path, enumerate(io.StringIO(_decode(content)), 1))

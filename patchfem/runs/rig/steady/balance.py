@@ -289,7 +289,8 @@ class BalanceFinder:
     ) -> tuple[Values, CycleRun]:
         """Compute the measures of a steady motion by name, and its cycle, from samples.
 
-        motion, drive: solution of the balance, and the sinusoidal drive; samples: number per cycle.
+        `motion` is a solution of the balance under the sinusoidal `drive`, and `samples` the number of samples per
+        cycle.
         """
         window = make_cycle_response(motion, self.modes, drive, samples)
         energies = find_cycle_energies(motion, self.modes)

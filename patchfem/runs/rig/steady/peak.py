@@ -209,9 +209,10 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
-    """Return the differences of all measures between a curve point and a Solution; {} if the point has no steady motion.
+    """Return the differences of all measures between a curve point and a Solution.
 
-    finder: computes steady motions; neighbour: curve point with drive and first guess; solution: motion at the peak.
+    `finder` computes steady motions, `neighbour` is the curve point with drive and first guess, and `solution` the
+    motion at the peak. The result is {} if the point has no steady motion.
     """
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)
