@@ -204,11 +204,7 @@ def advance(rig, state, record, t_end, cycle):
         event = find_event(rig, state)
         fraction = event.fraction
         face = event.face
-        if (
-            face >= 0
-            and event.which == Margin.SPEED
-            and MIN_PROGRESS < fraction < MIN_SPEED_FRACTION
-        ):
+        if event.which == Margin.SPEED and MIN_PROGRESS < fraction < MIN_SPEED_FRACTION:
             # The force changes steeply on one side of this speed. The error of a step with stages far on the other side
             # does not say how exact its dense output is up to the event.
             clock[Clock.STEP] = SPEED_STEP_RATIO * fraction * h
@@ -238,7 +234,7 @@ def advance(rig, state, record, t_end, cycle):
             return Status.EXCEEDS_TRAVEL
 
         n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
-        if face >= 0 and event.which == Margin.SPEED:
+        if event.which == Margin.SPEED:
             # The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
             clock[Clock.IS_SMOOTH] = 0.0
             speed_before = state.margins[0, face, Margin.MOTION]

@@ -8,7 +8,7 @@ from math import exp
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
-FADED = 6.0  # speed relative to v_s above which g is mu_k to the last digit, e^-36
+MAX_RISE_SPEED = 6.0  # largest speed, relative to v_s, at which g exceeds mu_k by more than e^-36
 MIN_LIMIT = 1e-9  # smallest g relative to mu_s; the rate of z divides by it
 
 
@@ -57,7 +57,7 @@ def write_margins(p, memory, point, s, margins):
     speed = memory[Memory.DIRECTION] * point.velocity
     margins[Margin.MOTION] = speed / point.speed_scale
     if p[0] > p[1]:
-        margins[Margin.SPEED] = memory[Memory.FLAG] * (speed / (FADED * p[3]) - 1)
+        margins[Margin.SPEED] = memory[Memory.FLAG] * (speed / (MAX_RISE_SPEED * p[3]) - 1)
 
 
 def switch(p, memory, point, s, which):
