@@ -17,6 +17,7 @@ from .records import (
     Face,
     Integral,
     LawNumbers,
+    Margin,
     Memory,
     Mode,
     Probe,
@@ -353,7 +354,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
         law = LAWS[int(rig.faces[i, Face.LAW])]
         memory[i, Memory.FLAG] = law in ("bouc_wen",)
         memory[i, Memory.COUNT] = law in ("pressed_springs",)
-        if law == "bonds":
+        if law in ("bonds", "lugre"):
             memory[i, Memory.FLAG] = -1.0
 
     state = State(
@@ -361,7 +362,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
         memory,
         clock,
         np.zeros((N_STATE_ROWS, n)),
-        np.full((5, n_faces, 4), np.inf),
+        np.full((5, n_faces, Margin.AFTER), np.inf),
         np.zeros((6, n_observed + 2 + n_faces)),
         np.zeros((n_faces, n_faces)),
     )

@@ -49,6 +49,8 @@ MIN_CUT_SPEED = (
 )
 SAME_SLIDE_TOL = 1e-9  # difference of slides that are equal, relative to their range
 MIN_SEEN = 1e-6  # fraction of a cycle before which an end of motion belongs to the cycle before
+MIN_SPEED_FRACTION = 0.9  # part of a step before a `Margin.SPEED` below which the step is repeated
+SPEED_STEP_RATIO = 1.02  # length of the repeated step relative to that part
 MAX_EMPTY_STEPS = 100  # events in a row without progress
 MIN_PROGRESS = 1e-13  # fraction of a step that counts as progress
 MIN_STEP = 1e-15  # relative to the end of the run
@@ -202,6 +204,11 @@ def advance(rig, state, record, t_end, cycle):
         event = find_event(rig, state)
         fraction = event.fraction
         face = event.face
+        if event.which == Margin.SPEED and MIN_PROGRESS < fraction < MIN_SPEED_FRACTION:
+            # The force changes steeply on one side of this speed. The error of a step with stages far on the other side
+            # does not say how exact its dense output is up to the event.
+            clock[Clock.STEP] = SPEED_STEP_RATIO * fraction * h
+            continue
         travel_end = find_travel_end(rig, state, fraction)
         if travel_end < fraction:
             fraction = travel_end
@@ -227,7 +234,16 @@ def advance(rig, state, record, t_end, cycle):
             return Status.EXCEEDS_TRAVEL
 
         n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
-        if face >= 0:
+        if event.which == Margin.SPEED:
+            # The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
+            clock[Clock.IS_SMOOTH] = 0.0
+            speed_before = state.margins[0, face, Margin.MOTION]
+            change_regime(rig, state, face, event.which)
+            speed = state.margins[0, face, Margin.MOTION]
+            if MIN_PROGRESS < speed < speed_before:
+                stop = fraction * h * speed / (speed_before - speed)
+                clock[Clock.STEP] = min(clock[Clock.STEP], stop)
+        elif face >= 0:
             clock[Clock.IS_SMOOTH] = 0.0
             write_event(rig, state, record, face, event.which)
             if change_regime(rig, state, face, event.which):

@@ -39,7 +39,7 @@ class StepEvent(NamedTuple):
 
 
 N_CHECKS = 3  # points of a step at which margins are evaluated, besides its start
-N_MARGINS = 4
+N_MARGINS = 5
 LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
 MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive

@@ -177,6 +177,7 @@ class Margin(IntEnum):
     - BRANCH: branch of the law between two limits of its own
     - CONTACT: contact or lift-off
     - LIMIT: a further limit of the law
+    - SPEED: speed beside which the force changes steeply; steps below it are short
     - AFTER: no margin; it marks the row after an event at which the force of a rigid law may jump
     """
 
@@ -184,7 +185,8 @@ class Margin(IntEnum):
     BRANCH = 1
     CONTACT = 2
     LIMIT = 3
-    AFTER = 4
+    SPEED = 4
+    AFTER = 5
 
 
 class Clock(IntEnum):
@@ -255,7 +257,7 @@ class State(NamedTuple):
     - memory (M, k): see `Memory`
     - clock (16,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
-    - margins (5, M, 4): margins at the points of a step, and those at the last evaluation
+    - margins (5, M, 5): margins at the points of a step, and those at the last evaluation
     - probes (6, 4 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
     - grip (M, M): force that holds an interface per unit of relative acceleration [kg]
     """

@@ -8,6 +8,7 @@ from math import exp
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
+MAX_RISE_SPEED = 6.0  # largest speed, relative to v_s, at which g exceeds mu_k by more than e^-36
 MIN_LIMIT = 1e-9  # smallest g relative to mu_s; the rate of z divides by it
 
 
@@ -36,7 +37,9 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the velocity in the direction of motion.
+    """Write the velocity in the direction of motion, and the side of the speed above which g is mu_k.
+
+    The stages of a step may all lie beside the narrow range of speeds where g is larger.
 
     Parameters
     ----------
@@ -51,11 +54,14 @@ def write_margins(p, memory, point, s, margins):
     margins : array
         Margins, which are written.
     """
-    margins[Margin.MOTION] = memory[Memory.DIRECTION] * point.velocity / point.speed_scale
+    speed = memory[Memory.DIRECTION] * point.velocity
+    margins[Margin.MOTION] = speed / point.speed_scale
+    if p[0] > p[1]:
+        margins[Margin.SPEED] = memory[Memory.FLAG] * (speed / (MAX_RISE_SPEED * p[3]) - 1)
 
 
 def switch(p, memory, point, s, which):
-    """Change the direction of motion.
+    """Change the direction of motion, or the side of the speed above which g is mu_k.
 
     Parameters
     ----------
@@ -70,7 +76,8 @@ def switch(p, memory, point, s, which):
     which : int
         Margin that has vanished (`records.Margin`).
     """
-    memory[Memory.DIRECTION] = -memory[Memory.DIRECTION]
+    column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
+    memory[column] = -memory[column]
     return False
 
 
