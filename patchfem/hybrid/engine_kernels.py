@@ -377,7 +377,7 @@ def skip_cycles(rig, state, record, cycle, count):
             if clock[Clock.N_EVENTS] < record.events.shape[0]:
                 row = record.events[int(clock[Clock.N_EVENTS])]
                 repeat_row(rig, state, row, record.events[number], c)
-                clock[Clock.N_EVENTS] += 1
+            clock[Clock.N_EVENTS] += 1
 
     for k in range(find_integrals(rig, state.y), state.y.size):
         state.y[k] += count * (state.y[k] - state.rows[CYCLE, k])

@@ -32,7 +32,6 @@ ERROR_FLOOR = 10.0  # smallest error of a value, relative to the step tolerance
 N_EVENTS = 200_000  # events that a single run stores at most
 MIN_EVENTS = 1000  # events for which it has room in any case, with EVENTS_PER_PART for each cycle and piece of the drive
 EVENTS_PER_PART = 100
-MORE_EVENTS = 8  # factor by which the room for events grows if they fill it
 MESSAGES = {
     Status.EXCEEDS_TRAVEL: "the output reaches the largest travel",
     Status.LEAVES_GROOVES: "the lifted mass takes all of the load, so that the contact leaves the grooves",
@@ -172,18 +171,18 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
         End of another motion of the same rig, from which the case goes on at t = 0; default: the start of the case.
     """
     n_parts = case.ends.size + len(case.rig.pieces)
-    n_events = min(N_EVENTS, MIN_EVENTS + EVENTS_PER_PART * n_parts)
-    is_full = True
-    while is_full:
+    n_needed = min(N_EVENTS, MIN_EVENTS + EVENTS_PER_PART * n_parts)
+    n_events = 0
+    # Without room for all events the histories would lack those of the last cycles, so that the motion is repeated.
+    while n_events < n_needed:
+        n_events = n_needed
         state, record = make_arrays(case, n_events)
         if start is not None:
             state = _restart(case, start)
             case = replace(case, y=state.y.copy())
         compiled.load("hybrid.engine_kernels").run_case(case.rig, state, record)
         clock = state.clock
-        # Without room for all events the histories would lack those of the last cycles, so that the motion is repeated.
-        is_full = n_events <= clock[Clock.N_EVENTS] < N_EVENTS
-        n_events = min(N_EVENTS, MORE_EVENTS * n_events)
+        n_needed = min(N_EVENTS, int(clock[Clock.N_EVENTS]))
     status = Status(int(clock[Clock.STATUS]))
     with np.errstate(invalid="ignore", divide="ignore"):
         values = compute_measures(case, state, record)

@@ -76,6 +76,22 @@ def test_onset_with_lower_kinetic_friction_is_a_jump():
     assert found[0] == pytest.approx(found[1], rel=1e-4)
 
 
+@pytest.mark.parametrize(("load", "repeats"), [(0.5, False), (0.8, True)])
+def test_more_events_than_there_is_room_for_are_kept(monkeypatch, load, repeats):
+    """With room for one event a motion has the same events, those of cycles that repeat the one before included."""
+    case = make_oscillator(
+        coulomb(), load=load, zeta=0.0, samples=np.linspace(0, 200 * 2 * np.pi, 2001)
+    )
+    expected = runs.run_case(case)
+    monkeypatch.setattr(runs, "MIN_EVENTS", 1)
+    monkeypatch.setattr(runs, "EVENTS_PER_PART", 0)
+    motion = runs.run_case(case)
+    assert expected.repeats is repeats
+    assert len(expected.event_rows) >= 400
+    assert np.array_equal(motion.event_rows, expected.event_rows)
+    assert np.array_equal(motion.rows, expected.rows)
+
+
 def test_interfaces_with_the_same_slide_share_their_force():
     """Two Coulomb interfaces on one slide move as one of their sum."""
     two = runs.run_case(
