@@ -312,8 +312,8 @@ class LumpedEvaluator(RunEvaluator):
             is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
 
-        motion = replace(motion, rows=motion.rows[is_kept])
-        response = motion.make_response(self.model.rig.modes, drive)
+        histories = motion.make_response(self.model.rig.modes, drive)
+        response = histories.select(is_kept)
         if self.model.grooves is not None and self.model.grooves.lifted_mass:
             response = self._add_vertical_force(response, drive)
         window = response.select(response.time >= times.window_start * (1 - 1e-15))
@@ -330,7 +330,7 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(response, times.snapshots, start),
+            snapshots=self._list_snapshots(histories, times.snapshots, start),
         )
         return strips.average_over_strips(run, self.patch) if self.strips_slide_apart else run
 
@@ -371,35 +371,35 @@ class LumpedEvaluator(RunEvaluator):
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
         return sort_events(events)
 
-    def _list_snapshots(self, response: Response, times, start) -> list[ElementSnapshot]:
+    def _list_snapshots(self, histories: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from the whole motion before.
 
-        What happened before its start is in the memory of its `State`, if it does not start from rest. `response` has
-        the histories of the whole motion, `times` [s] are those of the snapshots, and `start` is the `State` from which
-        the motion went on, or None.
+        What happened before its start is in the memory of its `State`, if it does not start from rest. `histories` are
+        those of the whole motion with its events, `times` [s] are those of the snapshots, and `start` is the `State`
+        from which the motion went on, or None.
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
 
-        at = np.searchsorted(response.time, times)
+        at = np.searchsorted(histories.time, times)
         states = []
         for i, (_, limit) in enumerate(self.joints.elements):
             # Between two turns of the slide all elements move alike, so that the turns determine their stretches.
-            slide = response.slides[:, i]
+            slide = histories.slides[:, i]
             directions = np.sign(np.diff(slide))
             turns = 1 + np.flatnonzero(directions[1:] != directions[:-1])
-            points = np.union1d(np.append(0, turns), at)
-            path = slide[:1] if start is None else _list_remembered_slides(start, i)
-            steps = np.diff(np.append(path, slide[points]))
+            points = np.union1d(turns, np.append(0, at))
+            remembered = [] if start is None else _list_remembered_slides(start, i)
+            path = np.append(remembered, slide[points])
 
             stretch = np.zeros(np.shape(limit))
-            stretches = []
-            for step in steps:
+            found = {}
+            for k, step in enumerate(np.diff(path, prepend=path[0]), -len(remembered)):
                 stretch = np.clip(stretch + step, -limit, limit)
-                stretches.append(stretch)
-            found = dict(zip(points, stretches[path.size - 1 :]))
+                if k >= 0 and points[k] in at:
+                    found[points[k]] = stretch
             states.append([(float(slide[k]), found[k]) for k in at])
-        return [ElementSnapshot(float(time), list(faces)) for time, *faces in zip(times, *states)]
+        return [ElementSnapshot(float(time), faces) for time, *faces in zip(times, *states)]
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the measures of the engine.
@@ -505,7 +505,7 @@ class LumpedEvaluator(RunEvaluator):
 def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
     """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
     count = int(run.cycles_done + 1e-9)
-    if not count or count >= len(run.extremes):
+    if not count:
         return run
     return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
 

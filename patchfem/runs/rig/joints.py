@@ -5,6 +5,8 @@ the contact points of a march (`make_contact`), and the laws for harmonic balanc
 A patch that slips part by part under a constant load is its exact set of Jenkins elements.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -49,9 +51,9 @@ class Joint(NamedTuple):
     speed: float
     stiffness: np.ndarray | None = None
     yields: np.ndarray | None = None
-    reduction: "shear_modes.JenkinsSet | None" = None
+    reduction: shear_modes.JenkinsSet | None = None
 
-    def make_element(self) -> "protocol.Element":
+    def make_element(self) -> protocol.Element:
         """Return the law under its mean load in the form of the march and of harmonic balance."""
         if self.stiffness is not None:
             return elastic_plastic.parallel_element(self.stiffness, self.yields)
@@ -236,7 +238,7 @@ def _find_stick_tolerance(joints, laws) -> float:
 # ---- march and harmonic balance
 
 
-def make_contact(model: Model, numerics: Numerics, patch) -> "contacts.Contact":
+def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     """Return the contact points of a time integration, with all interfaces and nonlinear springs.
 
     Parameters
@@ -271,7 +273,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> "contacts.Contact":
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 
-def make_single_law(model: Model, numerics: Numerics, patch) -> "protocol.Element | None":
+def make_single_law(model: Model, numerics: Numerics, patch) -> protocol.Element | None:
     """Return the law of a rig with one interface under a constant load; None for bonds that are no single element.
 
     Parameters
@@ -290,7 +292,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> "protocol.Elemen
     return list_joints(model, patch, numerics.meshed)[0].make_element()
 
 
-def make_law_group(model: Model, numerics: Numerics, patch) -> "forces.LawGroup":
+def make_law_group(model: Model, numerics: Numerics, patch) -> forces.LawGroup:
     """Return the laws of all interfaces and the nonlinear springs of a rig for harmonic balance.
 
     Parameters
