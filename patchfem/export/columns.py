@@ -20,11 +20,8 @@ Lists = dict[str, list[str | float | None]]
 Cells = dict[str, Quantity | str | float]
 # table of a page: `title`, `headings`, and `rows` of strings
 Table = dict[str, str | list[str] | list[list[str]]]
-ENDS = (
-    "error",
-    "low",
-    "high",
-)  # endings of the names of arrays with the error or the interval of another array
+# endings of the names of arrays with the error or the interval of another array
+ENDS = ("error", "low", "high")
 
 
 def list_rows(answer: Answer, source: str) -> list[Cells]:

@@ -9,6 +9,7 @@ import patchfem as pf
 from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.fits.curve import compute_points
 from patchfem.export import backbones
+from patchfem.export.columns import format_curves
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -179,11 +180,16 @@ def test_refuses_scenes_without_a_rig():
         "balance"
     }
     grooves = '[normal.grooves]\nwavelength = "80 um"\namplitude = "6.5 um"\n'
-    backbone = compute_backbone(pf.build(make_shaken_block(PLASTIC) + grooves), "", [1e-5])
+    model = pf.build(make_shaken_block(PLASTIC) + grooves)
+    backbone = compute_backbone(model, "", [1e-5])
     assert backbone.missing == {
         "balance": "balance cannot be computed on grooves",
         "quasi-static": "static curve cannot be computed on grooves",
     }
+    answer = backbones.make_answer(backbone, model.source)
+    for reason in backbone.missing.values():
+        assert any(reason in note for note in answer.remarks.notes)
+    assert format_curves(answer) == {}
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,16 @@ def test_exact_colours_are_stress_of_frame(bench_folder):
     assert (1e6 * pieces.get_clim()[1] >= stress).mean() == pytest.approx(0.998, abs=1e-3)
 
 
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_exact_pictures_of_a_frame_are_equal_files(small_folder, tmp_path, ending):
+    """Two pictures of the same frame are equal byte for byte; an SVG file once had random names of its parts."""
+    paths = [tmp_path / f"{name}.{ending}" for name in "ab"]
+    for path in paths:
+        assert run_cli("view", small_folder, "-o", path).code == 0
+    first, second = (path.read_bytes() for path in paths)
+    assert first == second and len(first) > 1000
+
+
 def test_exact_gif_has_frames_of_last_cycle(small_folder, tmp_path):
     """A .gif has the frames of the last cycle, each with other pixels."""
     answer = run_cli("view", small_folder, "-o", tmp_path / "a.gif")

@@ -108,8 +108,12 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     `joint` is the mode with its contact.
     """
     band = backbone.band
+    reasons = [
+        f"Method {method} has no curve here: {reason}."
+        for method, reason in backbone.missing.items()
+    ]
     if band is None:
-        return (NO_CURVE,)
+        return (NO_CURVE, *reasons)
     if joint.is_linear:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = backbone.best
@@ -128,9 +132,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
             f"A ring-down reads other values where it decays fast: at {format_length(curve.amplitude[k], 3)} a cycle "
             f"takes {100 * lost_fraction[k]:.0f} % of the amplitude."
         )
-    for method, reason in backbone.missing.items():
-        sentences.append(f"Method {method} has no curve here: {reason}.")
-    return tuple(sentences)
+    return (*sentences, *reasons)
 
 
 def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:

@@ -59,11 +59,11 @@ class ModelReadings:
         return self(values, conditions)
 
     def __call__(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
-        # the gains do not change the motion
         """Return acceleration [m s-2] and displacement [m] readings (2, c) for values of the free keys.
 
         `conditions` are the indices of those that are computed; others are NaN. Readings of the last values are kept.
         """
+        # the gains do not change the motion
         key_values = tuple(float(values[k]) for k in self.models.model_parameters)
         if key_values != self.last_values:
             self.last_values = key_values

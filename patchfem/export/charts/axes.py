@@ -121,21 +121,21 @@ def make_figure(panels: list[Panel]):
     return figure
 
 
-def _save(figure, target, ending: str) -> None:
+def save(figure, target, ending: str, dpi: float = 150.0) -> None:
     """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
 
-    `ending` is the format without a dot, such as "svg".
+    `ending` is the format without a dot, such as "svg", and `dpi` the number of pixels per inch.
     """
     from matplotlib import rc_context
 
     with rc_context(STYLE):
-        figure.savefig(target, dpi=150, format=ending, metadata=NO_DATE.get(ending))
+        figure.savefig(target, dpi=dpi, format=ending, metadata=NO_DATE.get(ending))
 
 
 def _to_svg(figure) -> str:
     """Return a figure as SVG, the form in which a notebook shows it."""
     text = io.StringIO()
-    _save(figure, text, "svg")
+    save(figure, text, "svg")
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
@@ -157,7 +157,7 @@ def write_plot(answer: Answer, path) -> None:
         raise PatchfemError(f"{path}: this answer has no chart")
     with write_atomically(path) as partial:
         figure = make_figure(panels[: PICTURE_CHARTS.get(answer.kind, 1)])
-        _save(figure, partial, ending[1:])
+        save(figure, partial, ending[1:])
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):

@@ -114,26 +114,29 @@ class Chunks:
         return rows[self.places]
 
     def merge_files(self, *, removes_others: bool) -> None:
-        """Merge the files into one, and remove damaged files.
+        """Merge the files into one, which has the newest result of each case.
 
-        `removes_others` tells whether to remove files without a requested case as well.
+        `removes_others` tells whether to remove cases that are not requested.
         """
         outdated = set(self.list_files())
         if len(outdated) < 2:
             return
-        all_names = []
+        all_names = np.empty(0, np.uint64)
         parts = []
-        start = 0
-        for path in self.list_files():
+        for path in reversed(self.list_files()):
             names, results = read_chunk(path)
-            if names.size and not (removes_others and (self._find_rows(names) < 0).all()):
-                all_names.append(names)
-                parts.append((start + np.arange(names.size), results))
-                start += names.size
+            distinct, rows = np.unique(names, return_index=True)
+            is_kept = ~np.isin(distinct, all_names)
+            if removes_others:
+                is_kept &= np.isin(distinct, self.distinct)
+            if is_kept.any():
+                rows = np.sort(rows[is_kept])
+                parts.append((all_names.size + np.arange(rows.size), results.select(rows)))
+                all_names = np.append(all_names, names[rows])
         if parts:
             # the new file may have the name of an old one
-            results = join_case_results(start, parts)
-            outdated.discard(write_chunk(self.folder, np.concatenate(all_names), results))
+            results = join_case_results(all_names.size, parts)
+            outdated.discard(write_chunk(self.folder, all_names, results))
         for path in outdated:
             path.unlink()
 

@@ -123,6 +123,21 @@ def test_exact_interrupted_sweep_that_is_run_anew_is_named(scene_file, tmp_path)
     assert "already have an answer" not in run_cli(*words).err
 
 
+def test_exact_repeated_sweep_keeps_one_result_of_each_case(scene_file, tmp_path):
+    """A sweep that is run again, also with other values, leaves one result of each of its cases in a single file.
+
+    Once each run added its results to those of the runs before.
+    """
+    out = tmp_path / "out"
+    for values in ("0.2,0.3", "0.2,0.3", "0.3,0.4"):
+        over = ("--over", f"friction.static={values}")
+        assert run_cli("sweep", scene_file, *over, "-o", out).code == 0
+        (path,) = (out / "chunks").iterdir()
+        names, results = store_chunks.read_chunk(path)
+        assert len(names) == len(results) == np.unique(names).size == 2
+        assert [row["friction.static"] for row in read_rows(out)] == values.split(",")
+
+
 def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
     """`--keep` stores nothing, a summary or a results folder of each case, and a failed case has a summary."""
     over = ("--over", "friction.static=-1,0.1")
