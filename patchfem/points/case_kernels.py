@@ -598,13 +598,14 @@ def find_parabola_extreme(first, middle, last):
 
 
 @njit(**NJIT_KERNEL)
-def observe_acceleration(waves, h, case, start, now, seen):
+def observe_acceleration(waves, h, is_steep, case, start, now, seen):
     """Update the largest acceleration by that of a step.
 
     Without an event it is the extreme of the parabola through both ends and the middle of the step. At an event, where the
     point stops, reverses or is released (`Now.EVENT`), the velocity is 0 and the force may jump, so that the accelerations
     before and after it count. The slide there is taken from the end of the step, which differs by O(h^2), because the
-    velocity is 0 at the event.
+    velocity is 0 at the event. The force of the law "tanh" may bend too sharply for a parabola in a shortest step, and where
+    the velocity changes its sign without an event; the value at the end counts there.
 
     Parameters
     ----------
@@ -612,6 +613,8 @@ def observe_acceleration(waves, h, case, start, now, seen):
         Sines of the drive at the start, in the middle and at the end of the step.
     h : float
         Duration of the step [s].
+    is_steep : bool
+        Whether it is a shortest step of the law "tanh".
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     start : tuple of float
@@ -630,7 +633,7 @@ def observe_acceleration(waves, h, case, start, now, seen):
         before = find_acceleration(sine, q, 0.0, start[2], case)
         after = find_acceleration(sine, q, 0.0, now[Now.FORCE], case)
         peak = max(peak, abs(before), abs(after))
-    else:
+    elif start[1] * v >= 0 and not is_steep:
         first = find_acceleration(waves[0], start[0], start[1], start[2], case)
         at = find_middle(h, start, now)
         middle = find_acceleration(waves[1], at.slide, at.velocity, at.force, case)
@@ -948,7 +951,8 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         if observes:
             share = slip_share(numbers, memory, j, case[Number.LOAD], now[Now.VELOCITY])
             observe_forces(h, work, share, start, now, numbers, j, case[Number.LOAD], seen)
-            observe_acceleration(drive, h, case, start, now, seen)
+            is_steep = numbers[0, j] == Law.TANH and level == LEVELS
+            observe_acceleration(drive, h, is_steep, case, start, now, seen)
             observe_harmonics(time, h, omega, start, now, seen)
             observe_stick(omega * time, omega * h, share, start, now, seen)
         tick += size

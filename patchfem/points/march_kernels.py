@@ -1150,6 +1150,9 @@ def press_at_rest(system):
     points = system.points
     values = points.values
     n = system.state.shape[1] // 2
+    if system.sets.counters[PRESENT_SLOT] < 0:
+        return  # the march ends without a contact set
+
     for i in range(2):
         p = int(ports.contact[i])
         ports.values[Port.SLIDE, p] = sum_products(ports.rows[p], system.state[0, :n])

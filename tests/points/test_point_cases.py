@@ -53,6 +53,29 @@ def test_exact_stick_under_static_friction():
     assert values["stick_fraction"][0] == 1
 
 
+def test_always_released_block_is_located_within_its_shortest_step():
+    """With 34 steps per cycle the amplitude of stick-slip motions agrees with that of 2048 steps."""
+    batch = make(laws.make_coulomb(1.8, 1.0, LIMIT), LIMIT * np.linspace(1.9, 3.0, 6), 0.6, 60)
+    coarse, fine = [cases.march_cases(batch, steps).values for steps in (34, 2048)]
+    assert (fine["stick_fraction"] > 0.01).all()
+    amplitude = "relative_displacement_amplitude"
+    assert coarse[amplitude] == pytest.approx(fine[amplitude], rel=3e-6)
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1e-4])
+@pytest.mark.parametrize("ratio", [0.6, 0.9, 1.3])
+def test_always_acceleration_peak_of_steep_tanh_is_that_of_coulomb(ratio, speed):
+    """With a small reference speed, relative to that of the drive, the peak is that of rigid friction."""
+    accelerations = LIMIT * np.array([1.5, 2.0, 3.0, 5.0])
+    tanh = laws.make_tanh(1.0, speed * DRIVE.acceleration / OMEGA, LIMIT)
+    peak = "absolute_acceleration_peak"
+    rigid = make(laws.make_coulomb(1.0, 1.0, LIMIT), accelerations, ratio, 60)
+    truth = cases.march_cases(rigid, 1024).values[peak]
+    for steps in (34, 54):
+        values = cases.march_cases(make(tanh, accelerations, ratio, 60), steps).values
+        assert values[peak] == pytest.approx(truth, rel=3e-3)
+
+
 def make_laws() -> dict:
     """Return one law of each kind with a limit of LIMIT."""
     keys = {

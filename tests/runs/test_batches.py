@@ -99,13 +99,13 @@ def test_exact_batch_agrees_with_single_runs(kind):
 # ---- points that are marched together
 
 
-@pytest.mark.share(2, 4, 5)
+@pytest.mark.share(1, 2, 3, 4, 5)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_95_of_100_measures_lie_within_both_errors(law):
     """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors.
 
-    Motion, stick and forces differ by a quarter of the tolerance at most. Reversals of `tanh` are not resolved: its
-    acceleration peak differs by a tolerance, and its secant stiffness, a difference of nearly equal forces, by four.
+    Motion, stick and forces differ by a quarter of the tolerance at most. Reversals of `tanh` are not resolved: its secant
+    stiffness, a difference of nearly equal forces, differs by four tolerances.
     """
     cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
@@ -114,8 +114,8 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert (results.outcome == singles.outcome).all() and results.notes == singles.notes
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
     assert np.mean([row.holds for row in rows]) >= 0.95
-    factor = 5.0 if law == "tanh" else 0.25
     for name in CLOSE_MEASURES & singles.values.keys():
+        factor = 5.0 if law == "tanh" and name == "secant_stiffness" else 0.25
         expected = singles.values[name]
         is_known = np.isfinite(expected)
         allowed = cases[0].accuracy.tolerance * np.abs(expected) + singles.floors[name]

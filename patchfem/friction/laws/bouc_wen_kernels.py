@@ -94,7 +94,7 @@ def follow_path(y, path, power, shape):
     FollowedPath
     """
     unloading = 1 - 2 * shape
-    longest = PIECE / max(1.0, power)
+    longest = PIECE / max(2.0, power)
     nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
     left = path
     area = 0.0

@@ -32,19 +32,19 @@ def integrate_rate_equation(slide, exponent, shape):
     return np.array(z)
 
 
-# Relative error of the stored energy; beside z = 0 a fractional power is resolved by graded pieces.
 @pytest.mark.share(0, 2, 3, 4)
 @pytest.mark.parametrize(
-    "exponent, shape, tolerance",
-    [(1.0, 0.5, 1e-9), (2.0, 0.8, 1e-9), (1.5, 0.2, 3e-9), (4.0, 1.0, 1e-9), (0.5, 0.9, 1e-7)],
+    "exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0), (0.5, 0.9)]
 )
-def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape, tolerance):
+def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
     """Force and stored energy on the bench agree with the integrated rate equation, and the energy balance closes."""
     time, slide = shrinking_sine(60)
     result = run_bench_along_path(law_keys(exponent, shape), time, slide)
     z = integrate_rate_equation(slide, exponent, shape)
     assert np.abs(result.force - LIMIT * z).max() <= 1e-6 * LIMIT
     work, stored, dissipated, created = result.ledger
+    # The root of z that an exponent of 1/2 has at 0 is resolved by graded pieces.
+    tolerance = 1e-9 if exponent >= 1 else 1e-8
     assert stored == pytest.approx(LIMIT * EPS * z**2 / 2, abs=tolerance * LIMIT * EPS)
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1] - created[-1], rel=1e-12)
     assert created[-1] == 0 if shape >= 0.5 else created[-1] > 1e-3 * dissipated[-1]
