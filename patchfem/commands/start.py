@@ -69,7 +69,9 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
-    """Write the scene of a joint that follows from two answers; ask the user for an answer that is "".
+    """Write the scene of a joint that follows from what is known and what is wanted.
+
+    The user is asked for each of both that is "".
 
     Parameters
     ----------

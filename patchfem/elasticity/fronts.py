@@ -303,7 +303,11 @@ def _unite(parts) -> np.ndarray:
 
 
 def _assemble_cells(blocks, order, position) -> np.ndarray:
-    """Return the stiffness (2 k, 2 k) of cells (CellBlock) for k nodes `order`; `position` is a workspace."""
+    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
+
+    `blocks` are the cells by element, `order` (k,) are the nodes, and `position` (N + 1,) is a workspace for the places
+    of all N nodes in `order`.
+    """
     position[order] = np.arange(order.size)
     size = 2 * order.size
     total = 0.0
@@ -315,7 +319,11 @@ def _assemble_cells(blocks, order, position) -> np.ndarray:
 
 
 def _add_stiffnesses(terms, order, position) -> np.ndarray:
-    """Return the sum (2 k, 2 k) of the stiffnesses of two halves for k nodes `order`; `position` is a workspace."""
+    """Return the sum (2 k, 2 k) [N/m per m] of the stiffnesses of two halves for k nodes.
+
+    `terms` are the `_Stiffness` of the halves, `order` (k,) are the nodes of the sum, and `position` (N + 1,) is a
+    workspace for the places of all N nodes in a term.
+    """
     total = None
     for nodes, matrix in terms:
         # Nodes that the term does not contain take the zeros in its last rows and columns

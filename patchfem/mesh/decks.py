@@ -101,10 +101,11 @@ class Deck:
             members += [number for number, _ in new]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
-        """Return the node or element numbers of a set, which may contain other sets.
+        """Return the numbers of the nodes or elements in a set, which may contain other sets.
 
-        `kind` is "NSET" or "ELSET", and `lines` are the words of the data lines: numbers and names, or first, last and
-        step of a range if `is_range`.
+        `kind` is "NSET" for nodes or "ELSET" for elements, and `lines` are the words of the data lines. A line lists
+        numbers and names of other sets. If `is_range`, it has the first number, the last one, and optionally the step
+        between them. PatchfemError is raised for a set with more than `max_members` members.
         """
         members = []
         for words in lines:

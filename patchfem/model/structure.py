@@ -194,7 +194,10 @@ def _build_given_modes(scene) -> ModalBasis:
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Return modes with a relative displacement for each strip if one of them yaws the patch of a scene."""
+    """Return the modes of a scene with a relative displacement for each strip of its patch.
+
+    The modes are returned unchanged if none of them yaws the patch. The displacement of a strip is that at its middle.
+    """
     if not needs_strip_displacements(scene):
         return modes
     n_strips = scene.contact.strips.count

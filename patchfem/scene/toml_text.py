@@ -67,9 +67,9 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML.
+    """Return the values of a TOML text and the lines of its keys.
 
-    `path` names the file in the message.
+    `path` names the file in the message of the SceneError that is raised if the text is not TOML.
     """
     try:
         values = tomllib.loads(text)

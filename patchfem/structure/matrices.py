@@ -313,9 +313,10 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_row(row, n: int, name: str) -> np.ndarray:
-    """Check that a row of numbers has n finite real entries; `slide` may have several rows.
+    """Return a row of numbers as an array (n,), after checking that it has n finite real entries.
 
-    `name` is that of the row, such as "output", for the message.
+    A column is returned as a row. If `name`, the name of the row in the error message, is "slide", the result may have
+    several rows (k, n).
     """
     if name == "slide":
         return read_numbers(row, name, (n,), (None, n))
@@ -326,10 +327,8 @@ def _check_row(row, n: int, name: str) -> np.ndarray:
 def _find_shape_signs(phi, output) -> np.ndarray:
     """Return the sign (n,) of each mode shape that makes the output move in the positive direction.
 
-    At a node of the shape the largest entry is made positive instead.
-
-    The columns of phi (n, n) are the shapes, and `output` (n,) is the motion of the output per unit of each
-    coordinate.
+    At a node of the shape the largest entry is made positive instead. The columns of phi (n, n) are the shapes, and
+    `output` (n,) is the motion of the output per unit of each coordinate.
     """
     motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]

@@ -126,7 +126,7 @@ def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
 
 
 def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict[str, object]:
-    """Write measured records as a table.
+    """Write the histories of a laboratory file as a table, one row per sample, in SI units.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     out : Path
         Table to write.
     requests : iterable of str
-        Channels that are asked for, such as "force=Load cell [lbf]"; without any, those that the file states.
+        Requested channels, such as "force=Load cell [lbf]"; without any, those that the file states.
     zero : bool
         Whether time and displacements are shifted to start at 0.
 

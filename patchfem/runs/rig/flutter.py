@@ -121,8 +121,9 @@ class LimitCycles(NamedTuple):
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface.
 
-    `numerics` are the settings of the run, and `patch` is the pressed patch of the interface, or None for an interface
-    without one. If no limit cycle can be computed, the note in the result says why.
+    A law of rigid friction is a relay, and harmonic balance finds the limit cycles of all other laws. If none can be
+    computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and `patch` is the pressed patch of
+    the interface, or None for an interface without one.
     """
     rig = model.rig
     f = model.friction

@@ -158,7 +158,11 @@ def choose_frame_count(tolerance: float) -> int:
 
 
 def slips_uniformly(model) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip by equal distances."""
+    """Return whether all points of a patch, or of each of its strips, slip by equal distances.
+
+    This holds if the patch has no partial slip and the upper piece carries the shapes. A lower piece with shapes moves
+    under the pressure, so that its points slip by different distances.
+    """
     return not model.partial_slip and model.side == "upper"
 
 

@@ -22,7 +22,8 @@ MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row n
 COMMENT_SIGNS = ("#", "%", "//")
 # Pattern of a number with a decimal comma, such as -1,25e-6
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-# Pattern of a height that was not measured
+# Cells that stand for a height that was not measured: nan with or without a sign, stars such as ***, bad, and an empty
+# cell; capital letters do not matter
 MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
 _COLUMN = re.compile(

@@ -153,7 +153,8 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
 
-    # The first row and column may be coordinates, which no header states
+    # No header tells whether the first row and the first column are coordinates. Evenly spaced numbers in both are
+    # coordinates, unless the second row is even as well, as that of a tilted plane.
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
     if has_axes and not _is_even(z[1, 1:]):
         raise PatchfemError(
