@@ -152,7 +152,7 @@ def _note_modes(
 ) -> tuple[str, ...]:
     """Return notes on modes that are not given in the scene.
 
-    The modes stand for a scene without mode if `is_assumed`, else they were given beside it; `is_stuck` tells whether
+    The modes stand for a scene without mode if `is_assumed`, else they were given beside it. `is_stuck` tells whether
     their frequencies are those with a stuck contact.
     """
     names = ", ".join(_describe_mode(mode) for mode in modes)

@@ -154,7 +154,10 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
-        """Return the response surface through some of the cases; with smoothing it may miss them."""
+        """Return the response surface through some of the cases.
+
+        With smoothing it may miss them.
+        """
         return RBFInterpolator(
             coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
         )
