@@ -38,7 +38,7 @@ class FaultTolerantCache(FunctionCache):
         self._cache_file.__class__ = ChecksummedFiles
 
     def load_overload(self, sig, target_context):
-        """Load the code for a signature (`sig`); return None if there is none or its file is damaged.
+        """Load the code for a signature (`sig`), or return None if there is none or its file is damaged.
 
         The index of a damaged file is removed, so numba compiles the function again.
 
@@ -58,7 +58,7 @@ class FaultTolerantCache(FunctionCache):
 
 
 def store_on_disk(function):
-    """Make a numba dispatcher, `function`, store its machine code in the cache folder; return it."""
+    """Make a numba dispatcher, `function`, store its machine code in the cache folder, and return it."""
     from . import _set_cache_folder
 
     _set_cache_folder()

@@ -173,7 +173,7 @@ def _build_result(result_format, values):
 
 
 def load_file(path: Path) -> LoadedFunction | None:
-    """Load the function in the file `path`; return None if there is no usable file.
+    """Load the function in the file `path`, or return None if there is no usable file.
 
     The file may be missing or damaged, or contain code that this machine cannot run.
     """
