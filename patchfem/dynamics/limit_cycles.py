@@ -354,7 +354,7 @@ def _find_mode_cycles(
     mode : int
         Index of the coordinate of the mode.
     size : float
-        Estimated amplitude of the coordinate [m]; the examined range of amplitudes is relative to it.
+        Estimated amplitude of the coordinate [m]. The examined range of amplitudes is relative to it.
     """
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])

@@ -58,7 +58,7 @@ class FreeEquations(NamedTuple):
 
     - residual: (N,) [m]
     - jacobian: (N, N) derivatives by the unknowns
-    - motion: the motion that the unknowns describe; None if omega is not positive
+    - motion: the motion that the unknowns describe, or None if omega is not positive
     """
 
     residual: np.ndarray
@@ -234,11 +234,11 @@ class FreeBalance:
             Parameters
             ----------
             equations : FreeEquations
-                Scaled equations before the step; unused.
+                Scaled equations before the step (unused).
             residual : (N,) array
                 Their linearised residual after it [1].
             size : float
-                Norm of the unknowns; unused, because the residual is scaled.
+                Norm of the unknowns. It is not used, because the residual is scaled.
             """
             return float(np.linalg.norm(residual)) < MAX_RESIDUAL
 

@@ -27,7 +27,7 @@ class SteadyMotion:
     - samples: samples per cycle
     - error: relative error of the motion
     - iterations: number of Newton steps
-    - multipliers: Floquet multipliers in decreasing magnitude; None until they are computed
+    - multipliers: Floquet multipliers in decreasing magnitude, or None until they are computed
     """
 
     omega: float
