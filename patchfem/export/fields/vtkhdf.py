@@ -45,7 +45,7 @@ def write_fields(result, path: Path) -> None:
     Parameters
     ----------
     result : Result
-        Result of a run; notes on yielding are added to it.
+        Result of a run. Notes on yielding are added to it.
     path : Path
         File to write.
     """

@@ -135,7 +135,7 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     out : Path
         Table to write.
     requests : iterable of str
-        Requested channels, such as "force=Load cell [lbf]"; without any, those that the file states.
+        Requested channels, such as "force=Load cell [lbf]", or without any, those that the file states.
     zero : bool
         Whether time and displacements are shifted to start at 0.
 
@@ -165,7 +165,7 @@ def _write_decay(
     out : Path
         Table to write.
     begin : float or None
-        Time at which the decay begins [s]; None: it is found.
+        Time at which the decay begins [s]. It is found if this is None.
     notes : list of str
         Notes on the records.
     """

@@ -39,7 +39,7 @@ class Column(NamedTuple):
     - name: name of the quantity.
     - unit: unit as in netCDF, such as "m s-2".
     - values (k,): one value for each row.
-    - number: number of the interface or mode, from 1; 0 if there is only one.
+    - number: number of the interface or mode, from 1, or 0 if there is only one.
     """
 
     name: str
