@@ -24,7 +24,10 @@ N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance lea
 
 @njit(**NJIT_KERNEL)
 def copy_values(source, target):
-    """Copy an array of one dimension; an assignment of a slice would need reference counts."""
+    """Copy an array of one dimension.
+
+    An assignment of a slice would need reference counts.
+    """
     for k in range(source.size):
         target[k] = source[k]
 
