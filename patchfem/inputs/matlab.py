@@ -107,11 +107,11 @@ def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
     arrays : dict of str to array
         Arrays by name, which are extended.
     name : str
-        Name of the variable; fields of a structure are named NAME.FIELD.
+        Name of the variable. Fields of a structure are named NAME.FIELD.
     value
         What SciPy has read.
     depth : int
-        Number of structures that contain the value; below MAX_NESTING, structures are opened.
+        Number of structures that contain the value. Below MAX_NESTING, structures are opened.
     """
     if sparse.issparse(value):
         arrays[name] = _check_sparse(sparse.csc_array(value))
@@ -160,7 +160,7 @@ def _find_class(item) -> str:
 def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
     """Add the numbers of a dataset of an HDF5 file to the arrays, by name.
 
-    Other programs than MATLAB may write fewer than two dimensions; the array has two.
+    Other programs than MATLAB may write fewer than two dimensions. The array has two.
     """
     values = np.asarray(dataset[()])
     if "MATLAB_empty" in dataset.attrs:  # such a dataset contains the shape

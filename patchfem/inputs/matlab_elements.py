@@ -51,7 +51,9 @@ def count_unpacked_bytes(data: bytes) -> int:
 
 
 def unpack_variables(data: bytes) -> bytes:
-    """Return the content of a file with its variables unpacked; another version is returned as it is.
+    """Return the content of a file with its variables unpacked.
+
+    Another version is returned as it is.
 
     Raises zlib.error for variables that are damaged or cut off.
     """
@@ -100,7 +102,7 @@ def check_elements(data: bytes) -> None:
 
 
 def _list_variables(data: bytes) -> Iterator[Element]:
-    """Iterate over the variables of a file with a content; nothing for another version."""
+    """Iterate over the variables of a file with a content, or over nothing for another version."""
     order = VERSION_5_MARKS.get(data[124:128])
     place = HEADER_BYTES if order else len(data)
     while place + 8 <= len(data):

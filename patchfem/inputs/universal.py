@@ -110,7 +110,7 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
 
 
 def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
-    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit; None without.
+    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit, or None without it.
 
     `path` names the file in the message.
     """
