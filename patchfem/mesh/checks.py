@@ -266,7 +266,7 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
 def _check_middles(points, edges: CellEdges, side: str) -> None:
     """Raise PatchfemError unless the nodes between corners lie in the middles of their edges.
 
-    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`; `side` names
+    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`. `side` names
     the piece in the message.
     """
     is_quadratic = edges.middles >= 0
@@ -342,8 +342,8 @@ def _check_interface(points, nodes, side: str) -> None:
 def _check_connections(mesh: PieceMesh, side: str) -> None:
     """Raise PatchfemError unless the cells of a piece are connected through common edges.
 
-    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface; `side`
-    ("lower" or "upper") names the piece in a message.
+    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface. `side` ("lower"
+    or "upper") names the piece in a message.
     """
     edges = mesh.edges
     border = edges.ends[edges.is_border]
@@ -383,7 +383,7 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
 def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
     """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
 
-    The rows of `border` (e, 2) are the nodes of the boundary edges; `side` names the piece in the message.
+    The rows of `border` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
     """
     # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)

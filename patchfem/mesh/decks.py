@@ -39,7 +39,7 @@ class Deck:
     - sets: numbers by name, for node sets and element sets
     - surfaces: data lines by name
 
-    The text of the deck is read block by block when the object is made; names of sets and surfaces are in lower case.
+    The text of the deck is read block by block when the object is made. Names of sets and surfaces are in lower case.
     """
 
     def __init__(self, text: str):
@@ -86,10 +86,10 @@ class Deck:
         kind: str,
         parameters: dict[str, str],
     ) -> None:
-        """Add numbered nodes or elements to the known ones; raise PatchfemError for a number given twice.
+        """Add numbered nodes or elements to the known ones.
 
-        `new` lists number and content. If the `parameters` of the block name a set of this `kind` ("NSET" or "ELSET"),
-        the numbers become members of it.
+        PatchfemError is raised for a number given twice. `new` lists number and content. If the `parameters` of the
+        block name a set of this `kind` ("NSET" or "ELSET"), the numbers become members of it.
         """
         for number, content in new:
             if number in known:
