@@ -219,7 +219,7 @@ class PatchMesh:
     - file: mesh file of the two pieces.
     - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse; the upper one is None if it is
+    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse. The upper one is None if it is
       like the lower one.
     - slip: slide whose partial slip the mesh has to resolve.
     - n_finer: halvings of the elements beyond those that the static measures need.

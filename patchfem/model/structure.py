@@ -219,7 +219,7 @@ def _find_driven_mass(scene) -> int:
 
 
 def build_start(scene, modes: ModalBasis) -> InitialState | None:
-    """Build the initial state of the rig of a scene in its modes; None if it starts at rest.
+    """Build the initial state of the rig of a scene in its modes, or None if it starts at rest.
 
     Raises
     ------
@@ -279,7 +279,7 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring; 0 for rigid-body modes.
+    """Return the natural frequencies (n,) [Hz] with the bonded spring, or 0 for rigid-body modes.
 
     `structure` is the table [structure], and `modes` are the modes with the spring.
     """
