@@ -9,16 +9,16 @@ for the shear coordinates b of the pieces. These are the conditions of the minim
 
     (dq - free)^T C^-1 (dq - free)/2 + sum of the work of the points + kappa (b db + db^2/4),
 
-which Newton's method with a line search finds; it is convex unless the force of a point falls with its slide. Normal
-contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts
-half before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave
-them out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change
-of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
+which Newton's method with a line search finds. It is convex unless the force of a point falls with its slide. Normal
+contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts half
+before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave them
+out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change of db
+instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
 point at rest is released, is halved up to the last level. The constant force of a step lets a held port move and come
-back; the work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
-(rigid or tanh) would also gain energy where a port reverses and moves back in one step; such a step is halved too, so
+back. The work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
+(rigid or tanh) would also gain energy where a port reverses and moves back in one step. Such a step is halved too, so
 that no law creates energy.
 """
 
@@ -1189,8 +1189,8 @@ def try_step(system, level, row, begin, end, drive):
     -------
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
-        halved; then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact set
-        was found, in which case the counter `PRESENT_SLOT` is -1.
+        halved. Then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact
+        set was found, in which case the counter `PRESENT_SLOT` is -1.
     """
     points = system.points
     shear = points.shear
@@ -1382,7 +1382,7 @@ def write_sample(system, row, sample):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(system, steps, samples):
-    """March over a number of whole steps; 0 steps press the points to the normal contact of the present state.
+    """March over a number of whole steps, or press the points to the normal contact of the present state for 0 steps.
 
     Parameters
     ----------
@@ -1391,7 +1391,7 @@ def march(system, steps, samples):
     steps : int
         Number of steps.
     samples : (steps + 1, k) array
-        Samples before each step and at the end; output.
+        Samples before each step and at the end (output).
 
     Returns
     -------
