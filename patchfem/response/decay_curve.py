@@ -77,7 +77,10 @@ class DecayCurve(NamedTuple):
         return DecayCurve(*(column[selection] for column in self))
 
     def interpolate(self, name: str, amplitudes) -> np.ndarray:
-        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m]; NaN outside the range of the curve."""
+        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m].
+
+        The result is NaN outside the range of the curve.
+        """
         knots, indices = np.unique(np.log(self.amplitude), return_index=True)
         if not knots.size:
             return np.full(len(amplitudes), np.nan)
