@@ -101,7 +101,7 @@ class PointForces(NamedTuple):
 
     - force (n,): nodal forces [N].
     - load, moment: sum [N] and moment [N m] of the forces.
-    - approach, rotation: [m] and [rad]; the rotation includes that of the gap.
+    - approach, rotation: [m] and [rad]. The rotation includes that of the gap.
     - n_iterations: iterations of the solver.
     """
 

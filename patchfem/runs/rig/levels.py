@@ -160,7 +160,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     Parameters
     ----------
     evaluator : RunEvaluator
-        Integrates and evaluates each level; its model has the levels of the drive.
+        Integrates and evaluates each level. Its model has the levels of the drive.
     frames : int
         Number of snapshots of the interface in the last cycle of the last level.
     progress : callable, optional
@@ -185,7 +185,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         level : float
             Drive level [m s-2].
         before
-            Run from whose end the level goes on; None for rest.
+            Run from whose end the level goes on, or None for rest.
         n_frames : int
             Number of snapshots of the interface in the last cycle.
         report : callable, optional
