@@ -70,10 +70,10 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Parse frequency, damping ratio and slide of a mode; raise ValueError if one has the wrong unit.
+    """Parse frequency, damping ratio and slide of a mode.
 
-    Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5"; the slide is the participation of the
-    interface.
+    ValueError is raised if one has the wrong unit. Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5".
+    The slide is the participation of the interface.
     """
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")

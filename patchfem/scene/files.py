@@ -31,7 +31,10 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a path is that of an existing file; one that the system does not accept is not."""
+    """Return whether a path is that of an existing file.
+
+    One that the system does not accept is not.
+    """
     try:
         return path.is_file()
     except (OSError, ValueError):
