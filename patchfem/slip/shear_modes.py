@@ -336,7 +336,9 @@ def shear_modes(
 
 
 def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) -> ShearModes:
-    """Return all modes of the nodes that carry load; `shear_modes` selects from them.
+    """Return all modes of the nodes that carry load.
+
+    `shear_modes` selects from them.
 
     Parameters
     ----------
