@@ -176,7 +176,7 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
 
 
 def _to_matrix(values, name: str):
-    """Convert a single number to a matrix (1, 1); return matrices and None unchanged.
+    """Convert a single number to a matrix (1, 1), and return matrices and None unchanged.
 
     Raises PatchfemError, which names the array `name`, for other `values`.
     """

@@ -190,7 +190,7 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) for a stiffness K [N/m].
 
     `root` is the Cholesky factor (n, n) of the mass matrix, or its diagonal (n,). The columns of the shapes are
-    eigenvectors y of L^-1 K L^-T; L^-T y is the mode shape of unit modal mass.
+    eigenvectors y of L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
     """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
@@ -206,7 +206,10 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _require_finite(per_mass) -> np.ndarray:
-    """Return the stiffness `per_mass` (n, n) [1/s2]; raise PatchfemError if it has overflowed."""
+    """Return the stiffness `per_mass` (n, n) [1/s2].
+
+    PatchfemError is raised if it has overflowed.
+    """
     if not np.isfinite(per_mass).all():
         raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
     return per_mass
@@ -249,9 +252,10 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
-    """Return a symmetric matrix as a dense array; raise PatchfemError if it is not symmetric.
+    """Return a symmetric matrix as a dense array.
 
-    `name`, such as "K", stands in the message; `shape` is that of the mass matrix, with which it must agree.
+    PatchfemError is raised if it is not symmetric. `name`, such as "K", stands in the message. `shape` is that of the
+    mass matrix, with which it must agree.
     """
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
@@ -264,9 +268,10 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
 
 
 def _project_damping_matrix(phi, C) -> np.ndarray:
-    """Project a damping matrix C [N s/m] on mode shapes phi; raise PatchfemError if C adds energy.
+    """Project a damping matrix C [N s/m] on mode shapes phi.
 
-    The columns of phi (n, n) are shapes of unit modal mass, so the result (n, n) is in 1/s.
+    PatchfemError is raised if C adds energy. The columns of phi (n, n) are shapes of unit modal mass, so the result (n,
+    n) is in 1/s.
     """
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)

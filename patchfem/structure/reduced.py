@@ -227,8 +227,8 @@ def _compute_lowest_modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the `count` lowest modes of a structure, normalized to unit modal mass.
 
-    K (n, n) [N/m] and M [kg] are sparse; `factor` is that of K + shift M, with the shift in 1/s^2. Returns the
-    circular frequencies (m,) [rad/s] and shapes (n, m).
+    K (n, n) [N/m] and M [kg] are sparse. `factor` is that of K + shift M, with the shift in 1/s^2. Returns the circular
+    frequencies (m,) [rad/s] and shapes (n, m).
     """
     n = K.shape[0]
     count = min(count, n)
