@@ -20,7 +20,7 @@ class Areal:
     """Areal scan of a surface.
 
     - x (n,), y (m,): increasing positions along rows and along columns [m].
-    - z (m, n): heights [m]; NaN where one is missing.
+    - z (m, n): heights [m], or NaN where one is missing.
     - source: name of the scan for messages.
     - notes: sentences on its treatment.
     """

@@ -428,7 +428,7 @@ def _doubt(
     code : str
         Verdict: the given one, or one of two possible causes.
     numbers : dict
-        Heights [m] by name that both causes would have; {} if there is one cause.
+        Heights [m] by name that both causes would have, or {} if there is one cause.
     """
     area, grown, bend = sizes
     bow = 2 / 3 * max(bend, 0.0) * depths.size
@@ -518,7 +518,7 @@ def _name_ends(
 
 
 def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
-    """Compare the waves along lines of the common part; return their ratios after/before by name.
+    """Compare the waves along lines of the common part, and return their ratios after/before by name.
 
     `result` is the comparison, and `direction` "x" or "y" that of the lines. Without a common place the ratios have no
     value.

@@ -110,7 +110,7 @@ class Model:
     def keep_common(self, state) -> None:
         """Keep the points that both surfaces show at a state.
 
-        They are `known`; `common` has those near the border of the other surface, too.
+        They are `known`. `common` has those near the border of the other surface, too.
         """
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)

@@ -147,7 +147,7 @@ def correlate(first, second) -> np.ndarray:
     It is -inf where the images overlap too little.
 
     `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. Lags count pixels by which the
-    second image is moved; negative lags stand at the end of each axis.
+    second image is moved. Negative lags stand at the end of each axis.
     """
     size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]

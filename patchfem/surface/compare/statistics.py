@@ -139,7 +139,7 @@ def subtract_local_level(values, mask) -> np.ndarray:
 def find_mirror_finish(surfaces) -> dict[str, float]:
     """Return rms height and noise [m] of a surface hardly rougher than its white noise, else {}.
 
-    `surfaces` are arrays of heights (n,) or (m, n) [m]; the first such surface counts.
+    `surfaces` are arrays of heights (n,) or (m, n) [m]. The first such surface counts.
     """
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)

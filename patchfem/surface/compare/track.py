@@ -146,8 +146,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 def _has_unworn_valleys(relative, is_high) -> bool:
     """Return whether wear inside an end of a track touched tops alone.
 
-    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops; then the
-    valleys between them are less deep.
+    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops. Then the valleys
+    between them are less deep.
     """
     if is_high.all() or not is_high.any():
         return False

@@ -54,7 +54,7 @@ def compare_waves(
     Returns
     -------
     dict of str to Quantity
-        "amplitude_ratio" and "slope_ratio"; without value where noise or the length does not allow one.
+        "amplitude_ratio" and "slope_ratio", without value where noise or the length does not allow one.
     """
     is_kept = np.ones(lines[0].shape[1], bool)
     for end in ends:

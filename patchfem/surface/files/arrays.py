@@ -74,6 +74,9 @@ def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
 
 
 def _make_table(path, columns: dict[str, np.ndarray]) -> Table:
-    """Return the table of columns without units; `path` is the file."""
+    """Return the table of columns without units.
+
+    `path` is the file.
+    """
     columns = {name: np.asarray(values, float) for name, values in columns.items()}
     return Table(path, columns, {}, str(path), remedy=f"write it as text and {HEADER_EXAMPLE}")

@@ -49,7 +49,7 @@ class Column(NamedTuple):
 class Header(NamedTuple):
     """What stands above the numbers of a text file.
 
-    - columns: columns that a line names; [] without such a line.
+    - columns: columns that a line names, or [] without such a line.
     - facts: what is said of a matrix or of points, such as {"width": "4 um"}.
     - count: number of values in the first row, or of columns that a line names with their units.
     - number: number of the line of names, or of the first row.
@@ -144,7 +144,7 @@ def _parse_column(cell: str) -> Column:
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
-    """Return number and unit in the text of a fact such as `4.0 um`; None for what is missing."""
+    """Return number and unit in the text of a fact such as `4.0 um`, or None for what is missing."""
     number, _, unit = text.strip().partition(" ")
     if not NUMBER_PATTERN.fullmatch(number):
         return None, text.strip() or None
@@ -152,7 +152,7 @@ def parse_fact(text: str) -> tuple[float | None, str | None]:
 
 
 def split_cells(text: str) -> tuple[list[str], str | None]:
-    """Split the text of a line into cells; return these and the delimiter, None for blanks.
+    """Split the text of a line into cells, and return these and the delimiter, which is None for blanks.
 
     It is the delimiter that leaves only numbers, or else the first one. So a decimal comma is not taken for a delimiter.
     """

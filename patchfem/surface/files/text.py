@@ -96,7 +96,7 @@ def _find_roles(
     header : Header
         What stands above the numbers.
     has_units : bool
-        Whether the user states the units; then columns of unknown names have their roles in their order.
+        Whether the user states the units. Then columns of unknown names have their roles in their order.
 
     Returns
     -------

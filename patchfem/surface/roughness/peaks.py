@@ -72,12 +72,11 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace shorter than `cutoff` [m]; of all if it is None.
+    """Measure the moments of the waves of a trace shorter than `cutoff` [m], or of all waves if it is None.
 
-    Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
-    trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
-    PatchfemError for fewer than 16 samples, for a flat trace and for a cut-off of fewer than four
-    steps.
+    Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off trimmed at each end).
+    A trace no longer than the cut-off keeps all of its waves. Raises PatchfemError for fewer than 16 samples, for a flat
+    trace and for a cut-off of fewer than four steps.
     """
     clean = remove_spikes(trace)
     is_removed = clean.missing & ~trace.missing
