@@ -102,7 +102,7 @@ def _print_split(
 ):
     """Print the tables that divide a trace between the mesh and a layer of asperities, and write the new scene.
 
-    The trace is a file, `scene_path` the scene of the patch, and `cutoff` [m] the wavelength between both, None for the
+    The trace is a file, `scene_path` the scene of the patch, and `cutoff` [m] the wavelength between both, or None for the
     shortest wave that mesh and load resolve. The new scene is written to `out`, unless it is None. `json_` prints JSON.
     """
     target = scene_path if out is None else out
