@@ -244,7 +244,7 @@ def lock_exclusively(path: Path):
         yield
         return
     try:
-        # Ask again and again; a lock that waits by itself could not be given up.
+        # Ask again and again. A lock that waits by itself could not be given up.
         end = monotonic() + MAX_LOCK_WAIT
         while monotonic() < end:
             try:
