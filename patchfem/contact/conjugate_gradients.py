@@ -60,7 +60,7 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
         rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
         target[k] = (target[k] - target[0] * middle) / half_length[k]
 
-    # Without a spring these are all forces; a spring adds two, which turn the piece in opposite directions
+    # Without a spring these are all forces. A spring adds two, which turn the piece in opposite directions.
     spring_indices = np.flatnonzero(problem.springs)
     if not spring_indices.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)

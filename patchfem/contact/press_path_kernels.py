@@ -176,7 +176,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             out[PathMean.ROTATION_BY_HEAVE] = out[PathMean.HEAVE_BY_ROTATION]
             return slot
 
-        # The set beyond the border; it may be stored in the slot of the set before the border
+        # The set beyond the border. It may be stored in the slot of the set before the border.
         name = sets.stored.names[slot]
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
