@@ -218,7 +218,7 @@ class FreeBalance:
         NotConverged
             If there is no motion near x.
         """
-        # Slides and residuals in units of the amplitude; frequency and damping ratio have the size 1
+        # Slides and residuals in units of the amplitude. Frequency and damping ratio have the size 1.
         size = abs(x[-1])
         unit = np.full(x.size, size)
         unit[-3:-1] = 1.0
@@ -274,7 +274,7 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
-            # First guess: slides and amplitude in proportion to the target; frequency and damping ratio stay.
+            # First guess: slides and amplitude in proportion to the target. Frequency and damping ratio stay.
             scaled = x * (targets[-1] / start)
             scaled[-3:-1] = x[-3:-1]
             try:

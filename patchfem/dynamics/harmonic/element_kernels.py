@@ -3,8 +3,8 @@
 from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 
-# Ratio of the stretch to its limit above which an element slips; one that sticks since the largest slide returns to its
-# limit there but for round-off.
+# Ratio of the stretch to its limit above which an element slips. An element that sticks since the largest slide
+# returns to its limit there but for round-off.
 SLIP_RATIO = 1 + 1e-12
 
 
@@ -43,7 +43,7 @@ def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
                 stretch = limit if stretch > 0 else -limit
                 offset = q[i] - stretch
                 reversal = reversal_of_node[i]
-            # The first node is the last one too; it belongs to the cycle once the cycle is closed.
+            # The first node is the last one too. It belongs to the cycle once the cycle is closed.
             if step == 0:
                 continue
 
