@@ -14,7 +14,7 @@ from . import quantities
 from .answer import Answer, Quantity, Variable
 from .charts.table import CSV_FILES, CSV_UNITS, TABLES, Column, CsvFile, parse_columns
 
-# cells of a column of a CSV file by its heading; a missing cell is None or ""
+# cells of a column of a CSV file by its heading. A missing cell is None or "".
 Lists = dict[str, list[str | float | None]]
 # cells of a row by column
 Cells = dict[str, Quantity | str | float]
