@@ -28,7 +28,7 @@ N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycl
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].
 N_FIRST_CYCLES = 1.2  # cycles at the beginning of a decay to which the first sinusoid is fitted
-# Smallest place of the middle of the first half cycle, in half periods; one half less the error of the fit
+# Smallest place of the middle of the first half cycle, in half periods, one half less the error of the fit
 MIN_FIRST_MIDDLE = 0.48
 FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
