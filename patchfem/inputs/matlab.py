@@ -21,7 +21,7 @@ MAX_NESTING = 8  # largest depth of nested structures
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMBER_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
 Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
-# MATLAB classes with numbers, besides integers; "" stands for data of other programs
+# MATLAB classes with numbers, besides integers. "" stands for data of other programs.
 NUMBER_CLASSES = ("", "double", "single", "logical")
 
 

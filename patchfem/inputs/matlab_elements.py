@@ -85,7 +85,7 @@ def check_elements(data: bytes) -> None:
         if array_class in UNREAD_CLASSES:
             continue
 
-        # Numbers follow flags, dimensions and name; a sparse matrix has two arrays of places before them.
+        # Numbers follow flags, dimensions and name. A sparse matrix has two arrays of places before them.
         count = 4 + 2 * (array_class == SPARSE_CLASS) + bool(flags & COMPLEX_FLAG)
         allowed = NUMBER_TYPES
         if array_class in NESTED_CLASSES:

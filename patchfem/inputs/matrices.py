@@ -291,7 +291,7 @@ def _make_matrix(path: Path, values) -> Matrix:
     # A small file may state any number of rows, for each of which a sparse matrix needs memory.
     if max(values.shape, default=0) > MAX_ROWS:
         raise PatchfemError(f"{path}: a matrix of {MAX_ROWS} rows and columns at most can be read")
-    # SciPy checks the indices of these formats only on demand; wrong ones end the process.
+    # SciPy checks the indices of these formats only on demand. Wrong ones end the process.
     if sparse.issparse(values) and values.format in ("csr", "csc", "bsr"):
         values.check_format(full_check=True)
     return Matrix(sparse.csr_array(values))

@@ -59,7 +59,7 @@ def read_datasets(path) -> list[Dataset]:
             "reading universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
 
-    # Only these three kinds of datasets are read; files of other programs contain many more
+    # Only these three kinds of datasets are read. Files of other programs contain many more.
     path = Path(path)
     check_file(path, "export fewer channels or a part of the record")
     with refuse_damage(f"{path}: cannot be read as a universal file"):
