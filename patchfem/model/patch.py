@@ -178,7 +178,7 @@ class PatchInterface:
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
-    - skin: pressure law of the asperities on the faces, None if the faces are smooth.
+    - skin: pressure law of the asperities on the faces, or None if the faces are smooth.
     """
 
     skin: Asperities | None
