@@ -336,7 +336,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
             (free, free_velocity), response, h, case, now, numbers, memory, j
         )
         turns = v * end < 0
-        # A law takes the net increment of a reversal inside the step as its path; one of the velocity may jump there.
+        # A law takes the net increment of a reversal inside the step as its path. One of the velocity may jump there.
         if numbers[0, j] == Law.TANH:
             turns = turns and min(abs(v), abs(end)) > STEEP_TURN * numbers[2, j]
         if not is_shortest:
@@ -666,7 +666,7 @@ def observe_harmonics(time, h, omega, start, now, seen):
     v = now[Now.VELOCITY]
     bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
 
-    # Gauss points: the slide is the cubic Hermite polynomial of the step; cos 3x = 4 cos^3 x - 3 cos x
+    # Gauss points: the slide is the cubic Hermite polynomial of the step, with cos 3x = 4 cos^3 x - 3 cos x
     for k in range(3):
         s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
         weight = h * (4 / 9 if k == 1 else 5 / 18)
@@ -706,7 +706,7 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
     sticks = first < 0.5
     part = 1.0 if sticks else 0.0
     if sticks != (last < 0.5):
-        # The irreversible part is a parabola of the path; that of a law with a corner jumps where this gives the mean.
+        # The irreversible part is a parabola of the path. That of a law with a corner jumps where this gives the mean.
         rise = 0.5 - first
         bend = 6 * mean - 3 * (first + last)
         slope = last - first + bend

@@ -523,7 +523,7 @@ def find_step(system, level):
     ports = system.ports
     points = system.points
     n = ports.vector.size
-    # Newton's step; a second attempt replaces the slopes of forces that fall with the slide by 0
+    # Newton's step. A second attempt replaces the slopes of forces that fall with the slide by 0.
     for attempt in range(2):
         write_matrix(system, level)
         for i in range(n):
@@ -856,8 +856,8 @@ def find_event(system, drive, is_shortest):
     if not is_any_held:
         return False
 
-    # Of the points whose limit is exceeded, that with the largest ratio is released; row 2 of the state is that at the end
-    # of the trial step.
+    # Of the points whose limit is exceeded, that with the largest ratio is released. Row 2 of the state is that at the
+    # end of the trial step.
     find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
@@ -887,7 +887,7 @@ def commit(system, h):
     flank = system.flank
     count = points.port.size
 
-    # Slides and memory of the points; a port that was at rest before stays at its place.
+    # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
     for j in range(count):
         p = points.port[j]
@@ -971,7 +971,7 @@ def relax_pieces(system):
     for k in range(r):
         shear[Shear.TRIAL, k] = 0.0
 
-    # Newton's method for the increments; `gain` is the change of energy of pieces and points without slip.
+    # Newton's method for the increments. `gain` is the change of energy of pieces and points without slip.
     gain = 0.0
     for iteration in range(MAX_RELAXATIONS):
         largest = 0.0
@@ -1005,7 +1005,7 @@ def relax_pieces(system):
         for k in range(r):
             shear[Shear.TRIAL, k] -= ports.vector[k]
 
-    # Where forces fall with the slide the method may fail; the pieces then relax after a later step.
+    # Where forces fall with the slide the method may fail. The pieces then relax after a later step.
     if gain > 0.0:
         return
 
@@ -1047,7 +1047,7 @@ def commit_list(system, j, h):
         v1 = system.ports.values[Port.END_VELOCITY, points.port[j]]
         values[Point.SPEED, j] = v1
     else:
-        # Mean speeds hold in the middle of a step; a line through the last two gives the speed at the end of this one.
+        # Mean speeds hold in the middle of a step. A line through the last two gives the speed at the end of this one.
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
     if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
@@ -1473,7 +1473,7 @@ def add_work(system, sample, first_column, part):
     ports = system.ports
     points = system.points
 
-    # Work is mean force times increment; that of a port at rest is taken back, and counts for the drive.
+    # Work is mean force times increment. That of a port at rest is taken back, and counts for the drive.
     work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:

@@ -613,7 +613,7 @@ def slip_share(numbers, memory, j, load, velocity):
         share = abs(state) ** numbers[3, j]
         return share if direction * state > 0 else (1 - 2 * numbers[4, j]) * share
 
-    # The sliders that slip carry B - x B' of the limit, see `_first_loading`; none of them does after a reversal.
+    # The sliders that slip carry B - x B' of the limit, see `_first_loading`. None of them does after a reversal.
     if law == Law.MASING:
         if direction * memory[Masing.DIRECTION, j] < 0:
             return 0.0
