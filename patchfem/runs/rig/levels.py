@@ -253,7 +253,7 @@ def _join_histories(histories, shifts: list[float]) -> Response:
     parts = []
     start = np.zeros((4, 1))
     for part, shift in zip(histories, shifts):
-        # Work, dissipated and created energy go on from run to run; the stored energy does not add up.
+        # Work, dissipated and created energy go on from run to run. The stored energy does not add up.
         ledger = part.extra["ledger"] + start
         start = ledger[:, -1:].copy()
         start[1] = 0.0
