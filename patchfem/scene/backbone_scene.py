@@ -17,7 +17,7 @@ from .keys.values import TomlTable
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive that a rig must have in a scene; no result of a backbone depends on it
+# Drive that a rig must have in a scene. No result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 # Names of modes that are given without names

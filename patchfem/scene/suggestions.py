@@ -21,7 +21,7 @@ from .keys.types import (
 from .keys.values import TomlTable, TomlValue
 from .lines import split_key
 
-# Rating of a table whose name is similar to an unknown key; a table that knows all keys inside has 1
+# Rating of a table whose name is similar to an unknown key. A table that knows all keys inside has 1.
 SIMILAR_NAME_RATING = 0.75
 # Rating of a table with the name of an unknown key, above all other ratings
 SAME_NAME_RATING = 2.0
@@ -39,7 +39,7 @@ def require_key(key: str, value: TomlValue = "") -> Key:
     """Find a dotted key, and return its description.
 
     ValueError is raised if no scene has it. The error names the nearest known key. `Key.inner` is the class of the table
-    at a key, None for a value.
+    at a key, or None for a value.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class Joint(TableFacts):
     table_key : str
         Dotted key of the law: "friction", or that of an interface between masses.
     law : Friction or None
-        Table of the friction law, None if it could not be read.
+        Table of the friction law, or None if it could not be read.
     contact : Contact or None
         Patch of the joint.
     kind : str
