@@ -119,7 +119,7 @@ def build_basis(
         If an array is missing or wrong; the message names it.
     """
 
-    # Mass and stiffness must be there; interfaces and drive must name coordinates that exist
+    # Mass and stiffness must be there. Interfaces and drive must name coordinates that exist.
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")

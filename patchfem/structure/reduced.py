@@ -267,7 +267,7 @@ def _compute_craig_bampton_shapes(
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
 
     `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of fixed-interface modes,
-    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
+    and `load` (n,) [kg] is the load per unit acceleration of the base, or None if the base stands still.
     """
     n = K.shape[0]
     n_boundary = boundary.size
@@ -313,7 +313,7 @@ def _compute_free_interface_shapes(
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
 
     `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of free-interface modes,
-    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
+    and `load` (n,) [kg] is the load per unit acceleration of the base, or None if the base stands still.
     """
     n = K.shape[0]
     shift = 0.0
