@@ -11,7 +11,7 @@ SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
 SPIKE_WINDOW = 5  # side of the square of the median
 # The measured points of a scan lie in one line, which determines no plane, if the smallest singular value of their
-# coordinates (1, x, y) is below this fraction of the largest one; such a value is round-off
+# coordinates (1, x, y) is below this fraction of the largest one. Such a value is round-off.
 PLACES_RANK_TOL = 1e-6
 
 

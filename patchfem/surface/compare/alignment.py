@@ -19,7 +19,7 @@ from .statistics import (
     subtract_local_level,
 )
 
-# Largest number of points to which the place is fitted; more would hardly improve it
+# Largest number of points to which the place is fitted. More would hardly improve it.
 MAX_FIT_POINTS = 40_000
 # Smallest part of the own surface that both surfaces must show
 MIN_COMMON = 0.2

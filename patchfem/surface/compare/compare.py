@@ -46,7 +46,7 @@ MIN_GROWN_LINE = 0.5
 WORN_MARGIN_SIDE = 7
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
 MAX_TRACK_FRACTION = 0.8
-# Smallest fraction of worn heights in a track as wide as the whole surface; where only tops are worn, it is smaller
+# Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
 MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW_RATIO = 3.0

@@ -103,7 +103,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             at = (own.middle - own.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
             best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
-        # Mirrored scans are tried only if this side does not fit clearly; traces are always tried both ways.
+        # Mirrored scans are tried only if this side does not fit clearly. Traces are always tried both ways.
         if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
             break
     return best

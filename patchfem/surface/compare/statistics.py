@@ -7,7 +7,7 @@ from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
-BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
+BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight, 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.

@@ -195,8 +195,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     levels = np.array([values, values + level, values - level])
     deviance = _fit_flanks(part, levels, places, depths.errors.correlation)
 
-    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form; the
-    # interval of the end reaches over all of them
+    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form. The interval
+    # of the end reaches over all of them.
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE

@@ -149,7 +149,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     if cutoff is None:
         return {}, None
 
-    # Each region is cut into sections of one cut-off, whose parameters scatter; their means have intervals
+    # Each region is cut into sections of one cut-off, whose parameters scatter. Their means have intervals.
     regions = {}
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():

@@ -23,7 +23,7 @@ COMMENT_SIGNS = ("#", "%", "//")
 # Pattern of a number with a decimal comma, such as -1,25e-6
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 # Cells that stand for a height that was not measured: nan with or without a sign, stars such as ***, bad, and an empty
-# cell; capital letters do not matter
+# cell. Capital letters do not matter.
 MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
 _COLUMN = re.compile(
@@ -91,7 +91,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         cells, delimiter = split_cells(text)
         is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
 
-        # A row of numbers ends the header; its columns are those of the last line of as many names
+        # A row of numbers ends the header. Its columns are those of the last line of as many names.
         start, columns = named.get(len(cells), (number, []))
         if is_row and cells[0] and not is_comment:
             return Header(columns, facts, len(cells), start), chain([(number, line)], lines)

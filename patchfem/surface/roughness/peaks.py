@@ -21,7 +21,7 @@ from .filter import filter_surface
 from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
-# Nayak's spectral width alpha of an isotropic surface whose waves all have the same length; no surface has less
+# Nayak's spectral width alpha of an isotropic surface whose waves all have the same length. No surface has less.
 MIN_ALPHA = 1.5
 # Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
 PERSSON = (0.4, 0.5)
