@@ -208,7 +208,7 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
     if not scale > 0:
         return (0.0,) * n_corners
 
-    # The unknowns are the depths at the corners; four of them lie on a plane if the sums over the diagonals are equal.
+    # The unknowns are the depths at the corners. Four of them lie on a plane if the sums over the diagonals are equal.
     plane = linprog(
         np.full(n_corners, -1 / n_corners),
         weights,
