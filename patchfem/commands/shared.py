@@ -247,7 +247,9 @@ def _print_remark(text: str) -> None:
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):
-    """Load the scene in a file with --set strings; raise SceneError with every mistake.
+    """Load the scene in a file with --set strings.
+
+    SceneError is raised with every mistake.
 
     Parameters
     ----------
