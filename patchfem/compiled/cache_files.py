@@ -16,7 +16,10 @@ class CheckedContent(bytes):
 
 
 def load_checked(checksum: bytes, content: bytes):
-    """Return the object that `content` contains; raise UnpicklingError if its hash is not `checksum`."""
+    """Return the object that `content` contains.
+
+    UnpicklingError is raised if its hash is not `checksum`.
+    """
     if checksum != sha256(content).digest():
         raise pickle.UnpicklingError("the checksum does not match")
     return pickle.loads(content)

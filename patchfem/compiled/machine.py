@@ -137,9 +137,9 @@ class LoadedFunction:
         self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
 
     def __call__(self, words: bytes):
-        """Call the function and return its result; raise RuntimeError if it raised an exception.
+        """Call the function and return its result.
 
-        `words` are the machine words of all arguments.
+        RuntimeError is raised if the function raised an exception. `words` are the machine words of all arguments.
         """
         buffer = bytearray(self.header + words)
         self.call(ctypes.addressof(ctypes.c_char.from_buffer(buffer)))
