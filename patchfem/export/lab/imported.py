@@ -211,7 +211,10 @@ def _write_modes(
 
 
 def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
-    """Return the tables [structure] and [[structure.mode]] of a scene as text; `source` is the name of the measured file."""
+    """Return the tables [structure] and [[structure.mode]] of a scene as text.
+
+    `source` is the name of the measured file.
+    """
 
     def printable(text: str) -> str:
         """Return a text as one line for a comment."""
@@ -238,7 +241,10 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
 
 
 def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
-    """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
+    """Return measured records by quantity with notes.
+
+    PatchfemError is raised if none of them is a response.
+    """
     file_records = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS
     if file_records.channel_list and not file_records.values.keys() & responses.keys():

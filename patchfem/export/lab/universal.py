@@ -132,7 +132,10 @@ def write_histories(
 
 
 def write_datasets(path: Path, datasets: list[dict]) -> None:
-    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts; Missing without pyuff."""
+    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts.
+
+    Missing is raised if pyuff is not installed.
+    """
     try:
         import pyuff
     except ImportError:
