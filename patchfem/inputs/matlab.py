@@ -184,6 +184,9 @@ def _read_sparse(group) -> sparse.csc_array:
 
 
 def _check_sparse(matrix: sparse.csc_array) -> sparse.csc_array:
-    """Return a sparse matrix; raise ValueError if its indices do not fit its shape, with which SciPy would crash."""
+    """Return a sparse matrix.
+
+    ValueError is raised if its indices do not fit its shape, with which SciPy would crash.
+    """
     matrix.check_format(full_check=True)
     return matrix
