@@ -233,10 +233,11 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
 
 
 def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
-    """Orient cells counterclockwise; raise PatchfemError if one is degenerate.
+    """Orient cells counterclockwise.
 
-    `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their numbers in elements of a `kind` such as
-    "quad8". Returns the cells with the order of the nodes reversed where they turned clockwise.
+    PatchfemError is raised if one is degenerate. `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their
+    numbers in elements of a `kind` such as "quad8". Returns the cells with the order of the nodes reversed where they
+    turned clockwise.
     """
     n = ELEMENTS[kind].n_corners
     is_clockwise = signed_areas(points[cells[:, :n]]) < 0
