@@ -691,5 +691,8 @@ def set_final_floors(measures: Measures, tolerance: float) -> Measures:
 
 
 def find_definition(name: str) -> MeasureDefinition:
-    """Return the definition of a measure of any interface; KeyError for an unknown name."""
+    """Return the definition of a measure of any interface.
+
+    KeyError is raised for an unknown name.
+    """
     return TABLE[remove_interface_number(name)]
