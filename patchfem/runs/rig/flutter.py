@@ -109,8 +109,7 @@ class LimitCycles(NamedTuple):
 
     - cycles: limit cycles by increasing amplitude.
     - reason: reason why no unstable one is known.
-    - smallest_amplitude: smallest output amplitude of the search [m]; 0 if it covered all
-      amplitudes.
+    - smallest_amplitude: smallest output amplitude of the search [m], or 0 if it covered all amplitudes.
     """
 
     cycles: "list[limit_cycles.LimitCycle]"

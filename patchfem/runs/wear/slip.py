@@ -160,8 +160,8 @@ def choose_frame_count(tolerance: float) -> int:
 def slips_uniformly(model) -> bool:
     """Return whether all points of a patch, or of each of its strips, slip by equal distances.
 
-    This holds if the patch has no partial slip and the upper piece carries the shapes. A lower piece with shapes moves
-    under the pressure, so that its points slip by different distances.
+    This holds if the patch has no partial slip and its pressure moves with the upper piece. A pressure that rests on the
+    lower piece passes over the points of the upper one, so that they do not slip alike.
     """
     return not model.partial_slip and model.side == "upper"
 
