@@ -87,7 +87,10 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
 
 
 def _parse_ratio(value) -> float:
-    """Parse a damping ratio or a slide; raise ValueError if it is not a number."""
+    """Parse a damping ratio or a slide.
+
+    ValueError is raised if it is not a number.
+    """
     try:
         return float(read_percentage(value))
     except ValueError:

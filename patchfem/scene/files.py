@@ -54,7 +54,10 @@ def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
 
 
 def require_files(scene: Any) -> Any:
-    """Return the scene itself; raise an error if a file that it names does not exist."""
+    """Return the scene itself.
+
+    An error is raised if a file that it names does not exist.
+    """
     absent = list_absent_files(scene, scene.path.parent)
     if absent:
         draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})

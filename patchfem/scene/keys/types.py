@@ -180,7 +180,10 @@ def array(kind: KeyType, least: int = 1, most: int | None = None) -> KeyType:
 
 
 def _require_printable(value: str) -> str:
-    """Return a text; raise ValueError for characters that results files cannot hold."""
+    """Return a text.
+
+    ValueError is raised for characters that results files cannot hold.
+    """
     for sign in value:
         if category(sign) in ("Cc", "Cs") and sign not in "\n\t":
             raise ValueError(
