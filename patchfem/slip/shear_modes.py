@@ -265,7 +265,10 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Yie
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of c (n, n); raise PatchfemError if c is not positive definite."""
+    """Return the lower Cholesky factor of c (n, n).
+
+    PatchfemError is raised if c is not positive definite.
+    """
     factor, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
