@@ -186,7 +186,9 @@ def _is_even(values: np.ndarray) -> bool:
 def _read_rows(
     path, lines: Iterator[tuple[int, str]], roles: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read all rows of numbers of a text file; a million rows of two columns take three seconds.
+    """Read all rows of numbers of a text file.
+
+    A million rows of two columns take three seconds.
 
     Parameters
     ----------
@@ -195,7 +197,7 @@ def _read_rows(
     lines : iterator of (int, str)
         Numbers and texts of the lines below the header. The first row shows the delimiter of all.
     roles : list of str
-        Role of each column; a height "z" may be missing, and an "index" is not read.
+        Role of each column. A height "z" may be missing, and an "index" is not read.
 
     Returns
     -------
@@ -244,9 +246,10 @@ def _read_rows(
 
 
 def _parse_cell(place: str, role: str, cell: str) -> float:
-    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text.
+    """Return the number in a cell, or NaN for a missing height.
 
-    `place` is file and line for the message, and `role` is the name of the column.
+    PatchfemError is raised for other text. `place` is file and line for the message, and `role` is the name of the
+    column.
     """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
