@@ -460,7 +460,7 @@ def cost(
 def _save(make_answer: Callable[[Path], Any], out: str | Path) -> Any:
     """Write the answer of a study with its page into the folder `out`, and return it.
 
-    `make_answer` computes the answer; it is called with the path of the folder while that is being written.
+    `make_answer` computes the answer. It is called with the path of the folder while that is being written.
     """
     with Folder(Path(out)) as folder:
         answer = make_answer(folder.path)
@@ -510,7 +510,7 @@ def backbone(
     Returns
     -------
     xarray.Dataset
-        Variables and amplitudes of each method; those with the prefix "band" are limits of the recommended curve. The
+        Variables and amplitudes of each method. Those with the prefix "band" are limits of the recommended curve. The
         attributes, where they are known, are:
 
         - `free_frequency`, `stuck_frequency`: frequency without the contact and with a sticking contact [Hz].
@@ -519,7 +519,7 @@ def backbone(
         - `method`: name of the recommended method.
         - `advice`: text on where each method is valid.
         - `missing`: reason why a method has no curve.
-        - `notes`: list of sentences; xarray reads a list with one sentence from a netCDF file as a string.
+        - `notes`: list of sentences. xarray reads a list with one sentence from a netCDF file as a string.
 
     Raises
     ------
@@ -540,7 +540,7 @@ def backbone(
     def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
         """Build the model of the scene with the tables of a backbone.
 
-        `sets` are `key=value` strings of a case; None stands for the scene as written, without other values.
+        `sets` are `key=value` strings of a case. None stands for the scene as written, without other values.
         """
         if isinstance(scene, Model):
             return build(scene, **changes)
@@ -1297,7 +1297,10 @@ def _require_path(value: Any, name: str) -> Path:
 
 
 def _require_paths(value: Any, name: str) -> list:
-    """Return one or several paths, `value`, as a list of Path; `name` is that of the argument."""
+    """Return one or several paths, `value`, as a list of Path.
+
+    `name` is that of the argument.
+    """
     is_collection = isinstance(value, Iterable) and not isinstance(value, str)
     return [_require_path(path, name) for path in (value if is_collection else [value])]
 
@@ -1320,7 +1323,10 @@ def _parse_length(value: Any, name: str) -> float | None:
 
 
 def _require_string(value: Any, name: str) -> str:
-    """Return a value that is a string; raise PatchfemError, which names the argument, for other types."""
+    """Return a value that is a string.
+
+    PatchfemError, which names the argument, is raised for other types.
+    """
     if not isinstance(value, str):
         raise PatchfemError(f"{name}: a text is needed, not {value!r:.60}")
     return value
@@ -1375,7 +1381,10 @@ class Measures(Mapping):
         self._measures = dict(measures)
 
     def __getitem__(self, name: str) -> Measure:
-        """Return a measure by its name; the KeyError for another name suggests a similar one."""
+        """Return a measure by its name.
+
+        The KeyError for another name suggests a similar one.
+        """
         if name in self._measures:
             return self._measures[name]
         similar_names = get_close_matches(str(name), self._measures, 1, 0.6)

@@ -167,7 +167,7 @@ class ContactState:
 class StuckMode(NamedTuple):
     """Natural mode of a rig with stuck interfaces.
 
-    - omega: circular frequency [rad/s]; None if an interface is rigid.
+    - omega: circular frequency [rad/s], or None if an interface is rigid.
     - shape (n,): shape, which is 1 at one coordinate.
     """
 

@@ -440,7 +440,7 @@ def find_waveform(drive) -> Waveform:
 
 
 def law_has_trait(law: str | None, trait: str) -> bool:
-    """Return whether a friction law has a trait, such as "bonds"; False for an unknown law."""
+    """Return whether a friction law has a trait, such as "bonds", or False for an unknown law."""
     return law in LAWS and trait in LAWS[law].traits.split()
 
 

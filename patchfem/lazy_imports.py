@@ -52,7 +52,10 @@ def make_getattr(folder: str, path: list[str]):
     """
 
     def get_module(name: str) -> LazyModule:
-        """Return a LazyModule for a module of the folder; raise AttributeError if there is none."""
+        """Return a LazyModule for a module of the folder.
+
+        AttributeError is raised if there is none.
+        """
         full_name = f"{folder}.{name}"
         if (
             name.startswith("__")

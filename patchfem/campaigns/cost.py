@@ -168,7 +168,7 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
 def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
     """Return the cost of a setting from the timings and the result of its run.
 
-    A timing is a pair of CPU time and elapsed time [s]; the shortest counts.
+    A timing is a pair of CPU time and elapsed time [s]. The shortest counts.
     """
     advice = [finding.advice for finding in result.findings if finding.advice is not None]
     seconds, wall_seconds = min(timings)

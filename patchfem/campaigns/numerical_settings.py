@@ -93,7 +93,10 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
 
 
 def _change_setting(model: Model, name: str, value: float | None) -> Model:
-    """Return a model with another value of the numerical setting `name`; None lets the tolerance set it."""
+    """Return a model with another value of the numerical setting `name`.
+
+    None lets the tolerance set it.
+    """
     if name == "element_size":
         return replace(model, patch=model.patch.with_element_size(value))
     if name == "jumps":

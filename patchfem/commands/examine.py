@@ -43,7 +43,7 @@ class Finding(NamedTuple):
     - name: what was checked.
     - fine: whether the check passed.
     - found: what was found.
-    - cure: remedy; "" if none is needed.
+    - cure: remedy, or "" if none is needed.
     """
 
     name: str

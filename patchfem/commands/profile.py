@@ -100,11 +100,10 @@ def profile(
 def _print_split(
     trace: Path, scene_path: Path, cutoff: float | None, out: Path | None, *, json_: bool
 ):
-    """Print the tables that divide a trace between the mesh and a layer of asperities; write the new scene.
+    """Print the tables that divide a trace between the mesh and a layer of asperities, and write the new scene.
 
-    The trace is a file, `scene_path` the scene of the patch, and `cutoff` [m] the wavelength between both, None for
-    the shortest wave that mesh and load resolve. The new scene is written to `out`, unless it is None; `json_` prints
-    JSON.
+    The trace is a file, `scene_path` the scene of the patch, and `cutoff` [m] the wavelength between both, or None for the
+    shortest wave that mesh and load resolve. The new scene is written to `out`, unless it is None. `json_` prints JSON.
     """
     target = scene_path if out is None else out
     refuse_existing(out)
@@ -153,7 +152,10 @@ def _write_split(text: str, tables: str, scene_path: Path, out: Path) -> None:
 
 
 def _window(text: str) -> tuple[float, ...]:
-    """Read the positions [m] of a window from a text; raise UsageError unless there are two or four."""
+    """Read the positions [m] of a window from a text.
+
+    UsageError is raised unless there are two or four.
+    """
     positions = text.split(",")
     if len(positions) not in (2, 4) or not all(map(str.strip, positions)):
         raise UsageError(

@@ -91,7 +91,10 @@ def _report_complete_run(target: Path, output: Output) -> None:
 
 
 def _end_run(answer, is_quiet: bool) -> None:
-    """End with exit code 3 if the run of an answer did not converge; a quiet run prints its warnings."""
+    """End with exit code 3 if the run of an answer did not converge.
+
+    A quiet run prints its warnings.
+    """
     if answer.details["outcome"] != "not_converged":
         return
     for text in answer.remarks.warnings if is_quiet else ():

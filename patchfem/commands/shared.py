@@ -34,7 +34,7 @@ def flag_option(text: str, *names: str) -> type:
     text : str
         Help text.
     *names : str
-        Spellings of the option, such as "--quiet" and "-q"; by default, the name of the parameter.
+        Spellings of the option, such as "--quiet" and "-q". The default is the name of the parameter.
     """
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
@@ -224,7 +224,7 @@ class UsageError(Exception):
 
 
 def print_message(text: str) -> None:
-    """Print a line of text on stderr; do nothing if the stream cannot be written."""
+    """Print a line of text on stderr, or do nothing if the stream cannot be written."""
     try:
         print(text, file=sys.stderr, flush=True)
     except (OSError, ValueError):
@@ -247,7 +247,9 @@ def _print_remark(text: str) -> None:
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):
-    """Load the scene in a file with --set strings; raise SceneError with every mistake.
+    """Load the scene in a file with --set strings.
+
+    SceneError is raised with every mistake.
 
     Parameters
     ----------
@@ -264,9 +266,9 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
 
 
 def load_model(path: Path, sets):
-    """Build the model of the scene in the file `path`; raise SceneError with every mistake.
+    """Build the model of the scene in the file `path`.
 
-    `sets` are the `table.key=value` strings of --set.
+    SceneError is raised with every mistake. `sets` are the `table.key=value` strings of --set.
     """
     return model.build(load_scene(path, sets))
 
@@ -335,7 +337,7 @@ class Progress:
             wait *= 2
 
     def _print(self, text: str) -> None:
-        """Print a line of text; on a terminal in place of the last one."""
+        """Print a line of text, on a terminal in place of the last one."""
         self.shown_at = self.clock()
         if self.on_terminal:
             print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)

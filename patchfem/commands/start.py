@@ -55,7 +55,7 @@ def new(
 
 
 def _write_scene(text: str, out: Path | None, description: list[str], verb: str) -> None:
-    """Write the text of a scene to the file `out`; print its description and the next command.
+    """Write the text of a scene to the file `out`, and print its description and the next command.
 
     The next command has this verb. Without a file, the text is printed.
     """
@@ -69,14 +69,16 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
-    """Write the scene of a joint that follows from two answers; ask the user for an answer that is "".
+    """Write the scene of a joint that follows from what is known and what is wanted.
+
+    The user is asked for each of both that is "".
 
     Parameters
     ----------
     kind : str
-        Kind of scene that the user asks for; only "joint" is possible.
+        Kind of scene that the user asks for. Only "joint" is possible.
     out : Path or None
-        File; None prints the scene.
+        File. None prints the scene.
     known, wanted : str
         Words on what is known of the joint, and on what is to be computed, separated by commas.
     """

@@ -66,7 +66,10 @@ class CaseOptions:
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
 
     def request(self):
-        """Return the request for cases; raise UsageError if the options are incompatible."""
+        """Return the request for cases.
+
+        UsageError is raised if the options are incompatible.
+        """
         if self.random and self.sobol:
             raise UsageError("--random and --sobol: use only one of them")
         if (self.random or self.sobol) and not self.over:

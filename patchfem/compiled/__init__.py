@@ -179,7 +179,10 @@ class KernelModule:
         self._functions = {}
 
     def __getattr__(self, name: str):
-        """Return a constant or a KernelFunction of the module; the module itself is imported for other names."""
+        """Return a constant or a KernelFunction of the module.
+
+        The module itself is imported for other names.
+        """
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
         if name not in self._functions:
@@ -241,7 +244,7 @@ def lock_exclusively(path: Path):
         yield
         return
     try:
-        # Ask again and again; a lock that waits by itself could not be given up.
+        # Ask again and again. A lock that waits by itself could not be given up.
         end = monotonic() + MAX_LOCK_WAIT
         while monotonic() < end:
             try:
@@ -304,7 +307,7 @@ class KernelFunction:
     ):
         """Call the function with first arguments, and with last ones that `bind_arguments` has converted.
 
-        `bound` has the type codes and the words of the last arguments, and these themselves; without codes numba
+        `bound` has the type codes and the words of the last arguments, and these themselves. Without codes numba
         converts them.
         """
         last_codes, last_words, last = bound
@@ -570,13 +573,13 @@ def _list_code_folders(machine_folder: Path | None = None) -> list[Path]:
 
 
 def _load_prebuilt(path: Path) -> machine.LoadedFunction | None:
-    """Load the code from the file in the wheel with the name of `path`; return None if there is none."""
+    """Load the code from the file in the wheel with the name of `path`, or return None if there is none."""
     folder = prebuilt.find_folder(hash_sources)
     return folder and machine.load_file(folder / "code" / path.name)
 
 
 def _read_bytes(path: Path) -> bytes | None:
-    """Return the content of the file `path`; None if it cannot be read."""
+    """Return the content of the file `path`, or None if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError:

@@ -16,7 +16,10 @@ class CheckedContent(bytes):
 
 
 def load_checked(checksum: bytes, content: bytes):
-    """Return the object that `content` contains; raise UnpicklingError if its hash is not `checksum`."""
+    """Return the object that `content` contains.
+
+    UnpicklingError is raised if its hash is not `checksum`.
+    """
     if checksum != sha256(content).digest():
         raise pickle.UnpicklingError("the checksum does not match")
     return pickle.loads(content)
@@ -38,7 +41,7 @@ class FaultTolerantCache(FunctionCache):
         self._cache_file.__class__ = ChecksummedFiles
 
     def load_overload(self, sig, target_context):
-        """Load the code for a signature (`sig`); return None if there is none or its file is damaged.
+        """Load the code for a signature (`sig`), or return None if there is none or its file is damaged.
 
         The index of a damaged file is removed, so numba compiles the function again.
 
@@ -58,7 +61,7 @@ class FaultTolerantCache(FunctionCache):
 
 
 def store_on_disk(function):
-    """Make a numba dispatcher, `function`, store its machine code in the cache folder; return it."""
+    """Make a numba dispatcher, `function`, store its machine code in the cache folder, and return it."""
     from . import _set_cache_folder
 
     _set_cache_folder()

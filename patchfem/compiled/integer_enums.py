@@ -23,8 +23,8 @@ class IntegerMember(AttributeTemplate):
 def _lower_member(context, builder, enum_class, value, name: str):
     """Return the member `name` of an IntEnum class as a constant of LLVM.
 
-    numba calls this function for `enum_class.name`, with the target `context`; the LLVM `builder` and the `value` of
-    the class itself are not needed.
+    numba calls this function for `enum_class.name`, with the target `context`. The LLVM `builder` and the `value` of the
+    class itself are not needed.
     """
     return context.get_constant(types.intp, int(enum_class.instance_class[name]))
 

@@ -137,9 +137,9 @@ class LoadedFunction:
         self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
 
     def __call__(self, words: bytes):
-        """Call the function and return its result; raise RuntimeError if it raised an exception.
+        """Call the function and return its result.
 
-        `words` are the machine words of all arguments.
+        RuntimeError is raised if the function raised an exception. `words` are the machine words of all arguments.
         """
         buffer = bytearray(self.header + words)
         self.call(ctypes.addressof(ctypes.c_char.from_buffer(buffer)))
@@ -173,7 +173,7 @@ def _build_result(result_format, values):
 
 
 def load_file(path: Path) -> LoadedFunction | None:
-    """Load the function in the file `path`; return None if there is no usable file.
+    """Load the function in the file `path`, or return None if there is no usable file.
 
     The file may be missing or damaged, or contain code that this machine cannot run.
     """

@@ -56,7 +56,7 @@ class FieldTyping(AttributeTemplate):
     key = ReferencedTuple
 
     def generic_resolve(self, kind, name):
-        """Return the type of a field by its name, in a tuple of the type `kind`; None if it has none."""
+        """Return the type of a field by its name, in a tuple of the type `kind`, or None if it has none."""
         fields = kind.tuple_type.fields
         if name not in fields:
             return None
@@ -81,7 +81,7 @@ def load_field(context, builder, kind, value, name):
     Returns
     -------
     LLVM value
-        Value of the field; its address if it is a tuple itself.
+        Value of the field, or its address if it is a tuple itself.
     """
     field_types = kind.tuple_type.types
     index = kind.tuple_type.fields.index(name)

@@ -229,7 +229,7 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
     An empty set gets the nodes of the smallest gap. Where a set does not reach to both sides of the load line of a free
     rotation, the node of the smallest gap on each side is added.
 
-    `problem` gives the gap and the load lines; the array `active` (n,) of bool itself is not changed.
+    `problem` gives the gap and the load lines. The array `active` (n,) of bool itself is not changed.
     """
     if not problem.free_rotations:
         return problem.gap <= problem.gap.min()

@@ -27,7 +27,7 @@ class LinearAsperities:
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m] at the separations s (m,) [m]; 0 where the layer is not compressed."""
+        """Stiffness -dP/ds (m,) [Pa/m] at the separations s (m,) [m], or 0 where the layer is not compressed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 

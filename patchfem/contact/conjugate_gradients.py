@@ -36,15 +36,15 @@ class _QuadraticProgram(NamedTuple):
 def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram:
     """Formulate the contact problem as a quadratic program.
 
-    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node; the
-    program then has n + 2 forces.
+    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node. The program
+    then has n + 2 forces.
 
     Parameters
     ----------
     compliance : StripCompliance
         Compliance [m/N] of the n nodes.
     problem : ContactProblem
-        Gap [m], motions, loads and springs; at most one spring is not 0.
+        Gap [m], motions, loads and springs. At most one spring is not 0.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
         rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
         target[k] = (target[k] - target[0] * middle) / half_length[k]
 
-    # Without a spring these are all forces; a spring adds two, which turn the piece in opposite directions
+    # Without a spring these are all forces. A spring adds two, which turn the piece in opposite directions.
     spring_indices = np.flatnonzero(problem.springs)
     if not spring_indices.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)
@@ -128,7 +128,7 @@ def project_forces(
 def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> float:
     """Find the step t > 0 at which change . max(0, start + t change) has the value `target_value`.
 
-    The left-hand side is piecewise linear in t; all entries have the unit that the caller gives them.
+    The left-hand side is piecewise linear in t. All entries have the unit that the caller gives them.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> 
     Returns
     -------
     float
-        Step t; 0 if the sum stays below the value.
+        Step t, or 0 if the sum stays below the value.
     """
     # Terms that are positive just after t = 0, and the steps at which a term appears or vanishes
     is_positive = (start > 0) | ((start == 0) & (change > 0))
@@ -243,16 +243,18 @@ def solve_by_gradients(
 
 
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
-    """Return nodal forces [N] as an initial guess; they need not balance the prescribed load and moment.
+    """Return nodal forces [N] as an initial guess.
+
+    They need not balance the prescribed load and moment.
 
     Parameters
     ----------
     program : _QuadraticProgram
         Contact problem.
     start : (n_nodes,) array or None
-        Forces of the nodes [N] from which the solution starts; the springs of the holder then begin without force.
+        Forces of the nodes [N] from which the solution starts. The springs of the holder then begin without force.
     n_nodes : int
-        Number of nodes; the other forces are those of the springs of the holder.
+        Number of nodes. The other forces are those of the springs of the holder.
     eigenvalue_bound : float
         Upper bound of the eigenvalues of the compliance [m/N].
     """

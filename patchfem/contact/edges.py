@@ -71,7 +71,7 @@ def edge_offset(
 def _find_ends(active: np.ndarray) -> list[tuple[int, int]]:
     """Return (node, side) of each end of the contact set (m,) inside the interface.
 
-    The node is the last one in contact; the side is 1 where the contact ends towards +x, else -1.
+    The node is the last one in contact. The side is 1 where the contact ends towards +x, else -1.
     """
     return [
         (int(change), 1) if active[change] else (int(change) + 1, -1)
@@ -116,7 +116,7 @@ class SetFactor:
     def solve(self, motions) -> np.ndarray:
         """Return the forces (m, r) [N] of the nodes in contact that cause given displacements (m, r) [m] of them.
 
-        Each of the r columns of `motions` is solved by itself; entries of other nodes are ignored and get no force.
+        Each of the r columns of `motions` is solved by itself. Entries of other nodes are ignored and get no force.
         """
         out = np.zeros(motions.shape)
         out[self.index] = self.solve_on_set(motions[self.index])

@@ -80,7 +80,7 @@ def pivot(sets, k):
     """Exchange force and gap of node k in the tableau (a principal pivot), in place.
 
     The tableau gives the unknowns of all nodes: the force [N] of a node in contact, the gap [m] of another one. Its
-    first m columns are the coefficients of the other variable of each node, which is 0 in the solution; the last three
+    first m columns are the coefficients of the other variable of each node, which is 0 in the solution. The last three
     are those of 1, of the closing d and of the rotation t. Node k enters or leaves the contact set. Cost: m^2
     multiplications.
 
@@ -152,14 +152,14 @@ def _multiply(line, vector):
 def _refine_column(sets, column):
     """Improve one of the last three columns of the tableau by a step of iterative refinement.
 
-    The column gives the forces [N] of the nodes in contact and the gaps [m] of the others per unit of 1, of the
-    closing d or of the rotation t. The gaps that these forces leave in contact are computed anew from the compliance;
-    they should be 0.
+    The column gives the forces [N] of the nodes in contact and the gaps [m] of the others per unit of 1, of the closing
+    d or of the rotation t. The gaps that these forces leave in contact are computed anew from the compliance. They
+    should be 0.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
-        `tableau.values` (m, m + 3) is changed; `forces` and `residuals` (m,) of the tableau are workspaces.
+        `tableau.values` (m, m + 3) is changed. `forces` and `residuals` (m,) of the tableau are workspaces.
     column : int
         0, 1 or 2 for the column of 1, d or t.
 
@@ -218,8 +218,7 @@ def refine_columns(sets):
 def take_slot(sets):
     """Return a free slot of the stored contact sets, or that of the oldest set other than the present one.
 
-    A slot is a row of the arrays of `sets.stored`; a set that loses its slot also leaves the list of sets of equal
-    hash.
+    A slot is a row of the arrays of `sets.stored`. A set that loses its slot also leaves the list of sets of equal hash.
     """
     stored = sets.stored
     n_slots = stored.names.size
@@ -538,8 +537,8 @@ def compute_energy(sets, slot, heave, rotation):
 def press_state(sets, slot, d, t, force):
     """Compute load, moment, energy and forces of a contact at a rigid displacement.
 
-    The forces follow from the coefficients of 1, d and t that are stored with the set; load and moment from the slopes
-    of the energy.
+    The forces follow from the coefficients of 1, d and t that are stored with the set, and load and moment from the
+    slopes of the energy.
 
     Parameters
     ----------

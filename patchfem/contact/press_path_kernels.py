@@ -34,7 +34,7 @@ class HolderMotion(NamedTuple):
 def find_first_violation(sets, slot, motion, change, bounds):
     """Return the fraction of an increment after which a node first violates its condition.
 
-    The force of a node in contact and the gap of another one are linear in the heave -d and the rotation t; the
+    The force of a node in contact and the gap of another one are linear in the heave -d and the rotation t. The
     coefficients of 1, d and t are stored with the set.
 
     Parameters
@@ -119,7 +119,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     is itself the gradient of a convex function.
 
     The increment crosses several contact sets. On each, the energy is a quadratic function of the displacement, whose
-    coefficients are stored (`EnergyTerm`); so the increment is divided where the set changes (`find_border`), and
+    coefficients are stored (`EnergyTerm`), so that the increment is divided where the set changes (`find_border`), and
     `find_set` returns the slot of the set beyond. `compute_energy` returns the energy [J] and its slopes by heave [N]
     and rotation [N m].
 
@@ -176,7 +176,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             out[PathMean.ROTATION_BY_HEAVE] = out[PathMean.HEAVE_BY_ROTATION]
             return slot
 
-        # The set beyond the border; it may be stored in the slot of the set before the border
+        # The set beyond the border. It may be stored in the slot of the set before the border.
         name = sets.stored.names[slot]
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)

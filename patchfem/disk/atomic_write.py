@@ -179,7 +179,10 @@ class LossyFile:
 
 @contextmanager
 def open_lossy(path) -> Iterator[LossyFile]:
-    """Open the file `path` for `h5py.File(file, "w")`; the first OSError is raised after closing it."""
+    """Open the file `path` for `h5py.File(file, "w")`.
+
+    The first OSError is raised after closing it.
+    """
     with open(path, "w+b", buffering=0) as file:
         lossy = LossyFile(file)
         yield lossy

@@ -35,7 +35,10 @@ class FolderLock:
         self.file = -1  # descriptor of the open file of the owner
 
     def acquire(self) -> None:
-        """Acquire the lock; raise Missing if another writer holds it, or if the file cannot be written."""
+        """Acquire the lock.
+
+        Missing is raised if another writer holds it, or if the file cannot be written.
+        """
         try:
             while self.file < 0:
                 flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)

@@ -12,7 +12,10 @@ PIPE_TIMEOUT = 5.0  # time to wait for the first data of a pipe [s]
 
 
 def open_for_reading(path: str | Path) -> BinaryIO:
-    """Open a file or pipe, `path`, for reading bytes; raise TimeoutError if a pipe has no data."""
+    """Open a file or pipe, `path`, for reading bytes.
+
+    TimeoutError is raised if a pipe has no data.
+    """
     if not hasattr(os, "O_NONBLOCK"):  # on Windows, where pipes are not files
         return open(path, "rb")
     file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))

@@ -73,9 +73,9 @@ def make_process_folder() -> Path:
 
 
 def write_cache_file(path: Path, data: bytes) -> bool:
-    """Write the cache file `path` atomically and make its folder; return False if this fails.
+    """Write the content of a cache file, and return whether this succeeded.
 
-    `data` is its content.
+    The folder is made if it does not exist. The file is replaced at once, so that no process reads a part of it.
     """
     partial = path.with_name(f".{path.name[:100]}.{os.getpid()}.partial")
     try:

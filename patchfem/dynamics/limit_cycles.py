@@ -264,7 +264,7 @@ def trace_relay_backbone(
     modal_rate = float(modes.damping_matrix[mode, mode])
 
     def solve_cycle(log_rate: float) -> LimitCycle:
-        """Return the cycle under a damping of all coordinates; NotConverged if the interface would stick."""
+        """Return the cycle under a damping of all coordinates, or raise NotConverged if the interface would stick."""
         added = (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size)
         sustained = replace(modes, damping=modes.damping_matrix - added)
         cycles = _Relay(sustained, row, *forces).find_cycles(mode)
@@ -354,7 +354,7 @@ def _find_mode_cycles(
     mode : int
         Index of the coordinate of the mode.
     size : float
-        Estimated amplitude of the coordinate [m]; the examined range of amplitudes is relative to it.
+        Estimated amplitude of the coordinate [m]. The examined range of amplitudes is relative to it.
     """
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])

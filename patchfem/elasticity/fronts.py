@@ -151,7 +151,7 @@ class _Stiffness(NamedTuple):
     """Stiffness of a part of a piece.
 
     - nodes (k,): nodes of the part.
-    - matrix (2 k + 2, 2 k + 2): stiffness [N/m per m]; its last two rows and columns are zero.
+    - matrix (2 k + 2, 2 k + 2): stiffness [N/m per m]. Its last two rows and columns are zero.
     """
 
     nodes: np.ndarray
@@ -253,8 +253,8 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
 def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
     """Return cells in which the fixed displacements are decoupled, with a stiffness of 1 on the diagonal.
 
-    `is_fixed` (N, 2) tells which displacements are 0; the rows and columns of these in the stiffness of each cell of
-    the `block` become 0.
+    `is_fixed` (N, 2) tells which displacements are 0. The rows and columns of these in the stiffness of each cell of the
+    `block` become 0.
     """
     is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
     cells = np.flatnonzero(is_fixed.any(axis=1))
@@ -297,13 +297,20 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
 
 
 def _unite(parts) -> np.ndarray:
-    """Return the different nodes of several arrays of nodes, sorted; `np.unique` takes several times as long for few."""
+    """Return the different nodes of several arrays of nodes, sorted.
+
+    `np.unique` takes several times as long for few nodes.
+    """
     nodes = np.sort(np.concatenate(parts, axis=None))
     return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
 
 
 def _assemble_cells(blocks, order, position) -> np.ndarray:
-    """Return the stiffness (2 k, 2 k) of cells (CellBlock) for k nodes `order`; `position` is a workspace."""
+    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
+
+    `blocks` are the cells by element, `order` (k,) are the nodes, and `position` (N + 1,) is a workspace for the places
+    of all N nodes in `order`.
+    """
     position[order] = np.arange(order.size)
     size = 2 * order.size
     total = 0.0
@@ -315,7 +322,11 @@ def _assemble_cells(blocks, order, position) -> np.ndarray:
 
 
 def _add_stiffnesses(terms, order, position) -> np.ndarray:
-    """Return the sum (2 k, 2 k) of the stiffnesses of two halves for k nodes `order`; `position` is a workspace."""
+    """Return the sum (2 k, 2 k) [N/m per m] of the stiffnesses of two halves for k nodes.
+
+    `terms` are the `_Stiffness` of the halves, `order` (k,) are the nodes of the sum, and `position` (N + 1,) is a
+    workspace for the places of all N nodes in a term.
+    """
     total = None
     for nodes, matrix in terms:
         # Nodes that the term does not contain take the zeros in its last rows and columns

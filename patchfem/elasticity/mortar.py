@@ -125,7 +125,7 @@ def transfer_matrix(x, piece_x) -> np.ndarray:
 def _hat_functions(x, cell, positions) -> np.ndarray:
     """Return the values (2, k) of both hat functions in cells (k,) at positions (k,) [m] in these cells.
 
-    They belong to the left and the right node of the cell; x (m,) [m] are the nodes.
+    They belong to the left and the right node of the cell, and x (m,) [m] are the nodes.
     """
     width = x[cell + 1] - x[cell]
     return np.stack([(x[cell + 1] - positions) / width, (positions - x[cell]) / width])

@@ -132,7 +132,7 @@ class Patches(NamedTuple):
 def collect_patches(point, cell) -> Patches:
     """Group pairs of a point and a cell near it by point, each pair once.
 
-    `point` and `cell` (e,) are the numbers of both; all weights are 1.
+    `point` and `cell` (e,) are the numbers of both. All weights are 1.
     """
     keys = np.unique(np.asarray(point, np.int64) << 32 | cell)
     return Patches(keys >> 32, keys & 0xFFFFFFFF, np.ones(keys.size))

@@ -14,7 +14,7 @@ import numpy as np
 class Definition(NamedTuple):
     """Definition of a quantity.
 
-    - unit: SI unit; "1" for a ratio
+    - unit: SI unit, or "1" for a ratio
     - text: meaning
     - digits: number of digits that are displayed of a value without an error
     """

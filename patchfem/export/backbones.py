@@ -280,7 +280,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
     """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
     axis = cases.axis
     verdict, measures = _compare_ends(cases)
-    # The page compares the ends of the values; the file has measures and curves of each value
+    # The page compares the ends of the values. The file has measures and curves of each value.
     return Answer(
         kind="backbone",
         title=cases.source.title,

@@ -14,7 +14,7 @@ from . import quantities
 from .answer import Answer, Quantity, Variable
 from .charts.table import CSV_FILES, CSV_UNITS, TABLES, Column, CsvFile, parse_columns
 
-# cells of a column of a CSV file by its heading; a missing cell is None or ""
+# cells of a column of a CSV file by its heading. A missing cell is None or "".
 Lists = dict[str, list[str | float | None]]
 # cells of a row by column
 Cells = dict[str, Quantity | str | float]
@@ -60,7 +60,7 @@ def list_rows(answer: Answer, source: str) -> list[Cells]:
 
 
 def list_cells(variable: Variable) -> list[str | float]:
-    """Return the elements of a variable of one dimension; codes as their meanings."""
+    """Return the elements of a variable of one dimension, with codes as their meanings."""
     cells = np.asarray(variable.values).tolist()
     return [variable.meanings[code] for code in cells] if variable.meanings else cells
 
@@ -172,7 +172,10 @@ def _find_heading(answer: Answer, column: Column) -> str:
 
 
 def _format_cell(row: Cells, column: Column) -> str:
-    """Return a cell of a table as text; a missing value is a dash."""
+    """Return a cell of a table as text.
+
+    A missing value is a dash.
+    """
     cell = row.get(column.name)
     if cell is not None and column.style == "quantity":
         cell = make_quantity(row)

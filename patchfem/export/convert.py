@@ -67,7 +67,7 @@ def export_results(
 def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> None:
     """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options.
 
-    `frame` is the number of the only frame, None for the default, and `histories` tells whether --histories is given.
+    `frame` is the number of the only frame, or None for the default, and `histories` tells whether --histories is given.
     """
     if histories:
         raise PatchfemError(

@@ -108,7 +108,7 @@ class Folder:
     def __exit__(self, kind, value, trace) -> None:
         """Put the results in place, or give the partial folder up after an error.
 
-        The lock is released in any case. The arguments are the type of the error, the error and its traceback; they are
+        The lock is released in any case. The arguments are the type of the error, the error and its traceback. They are
         None without an error.
         """
         with defer_signals():

@@ -174,7 +174,7 @@ def _find_uncertainty(quantity: Quantity) -> float:
 def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
     """Return a quantity as text, with its change from the first answer if it differs by more than both errors.
 
-    The change is in percent, or a factor if it is large; there is none from a value that may be 0.
+    The change is in percent, or a factor if it is large. There is none from a value that may be 0.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
 
 
 def list_scene_differences(answers: Answers) -> list[Table]:
-    """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does; [] without any."""
+    """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does, or [] without any."""
     scenes = {
         name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
         for name, answer in answers.items()
@@ -215,7 +215,10 @@ def list_scene_differences(answers: Answers) -> list[Table]:
 
 
 def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
-    """Return nested tables of a scene as dotted keys; tables of a list are named by their name or number."""
+    """Return nested tables of a scene as dotted keys.
+
+    Tables of a list are named by their name or number.
+    """
     if isinstance(table, dict):
         pairs = table.items()
     elif isinstance(table, list) and table and isinstance(table[0], dict):

@@ -306,7 +306,10 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
 
 
 def _find_ffmpeg(out: Path) -> str:
-    """Return the path of the program ffmpeg, or else of that in imageio-ffmpeg; Missing without both."""
+    """Return the path of the program ffmpeg, or else of that in imageio-ffmpeg.
+
+    Missing is raised if there is neither.
+    """
     program = shutil.which("ffmpeg")
     if program is None and find_spec("imageio_ffmpeg"):
         from imageio_ffmpeg import get_ffmpeg_exe

@@ -35,10 +35,10 @@ FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a
 class Row(NamedTuple):
     """Variable of a run.
 
-    - dims: its dimensions; an array with fewer dimensions has the last ones of them.
-    - unit: SI unit; "" for codes and names.
+    - dims: its dimensions. An array with fewer dimensions has the last ones of them.
+    - unit: SI unit, or "" for codes and names.
     - text: description.
-    - places: where a Result has the variable, as dotted names of attributes, keys and indices; the first that exists is
+    - places: where a Result has the variable, as dotted names of attributes, keys and indices. The first that exists is
       used.
     """
 

@@ -27,7 +27,7 @@ class WrittenRun(NamedTuple):
 
     - answer: answer of the run.
     - result: result of the run.
-    - page_fault: why the page was not drawn; None if it was.
+    - page_fault: why the page was not drawn, or None if it was.
     """
 
     answer: Answer

@@ -87,14 +87,14 @@ def make_origin(source, verb: str) -> JsonObject:
 
 
 def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence[str] = ()) -> str:
-    """Return the command line that repeats a verb; "" for a scene without a file, which Python gave as text or dict.
+    """Return the command line that repeats a verb, or "" for a scene without a file, which Python gave as text or dict.
 
     Parameters
     ----------
     verb : str
         Command, such as "run".
     path : Path
-        Scene file; it is named without its folder.
+        Scene file. It is named without its folder.
     sets : tuple of str
         ``table.key=value`` strings.
     options : sequence of str, optional

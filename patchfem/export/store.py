@@ -55,7 +55,10 @@ def data_file(kind: str) -> str:
 
 
 def write(answer: Answer, folder: Path) -> None:
-    """Write all files of an answer except its page into an existing folder; OSError or WriteError without success."""
+    """Write all files of an answer except its page into an existing folder.
+
+    OSError or WriteError is raised if this fails.
+    """
     if answer.origin.get("resolved"):
         write_text(folder / SCENE, answer.origin["resolved"])
     if answer.data:
@@ -69,7 +72,10 @@ def write(answer: Answer, folder: Path) -> None:
 
 
 def write_json(content: JsonObject, path: Path) -> None:
-    """Write an object as strict JSON; ValueError for a number that is not finite."""
+    """Write an object as strict JSON.
+
+    ValueError is raised for a number that is not finite.
+    """
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_text(path, text + "\n")
 
@@ -98,7 +104,10 @@ def make_summary(answer: Answer) -> JsonObject:
 
 
 def read(folder: Path) -> Answer:
-    """Read an answer from the files in a folder; PatchfemError if it has no complete result or a damaged file."""
+    """Read an answer from the files in a folder.
+
+    PatchfemError is raised if it has no complete result or a damaged file.
+    """
     folder = Path(folder)
     summary = read_summary(folder)
     # the details of a run are the other keys of its summary, those of another verb are a file

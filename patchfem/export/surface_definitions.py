@@ -19,7 +19,7 @@ def _collect_definitions() -> dict[str, Definition]:
     meanings = WAVES | DEFINITIONS
     for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):
         for name, (unit, text) in PROFILE.items():
-            # material ratios of a roughness profile have no letter; of a trace as a whole there is Pt in place of Pz
+            # material ratios of a roughness profile have no letter. Of a trace as a whole there is Pt in place of Pz.
             is_used = name != "z" if letter == "P" else name.startswith("Mr") == (not letter)
             if is_used:
                 meanings.setdefault(letter + name, (unit, f"{text}, of the {profile}"))

@@ -73,10 +73,10 @@ REPEAT_TOL = (
 
 @njit(**NJIT_KERNEL)
 def update_scales(rig, state):
-    """Raise the scales of the errors to the magnitudes of a state; those of `rig.scales` are the smallest.
+    """Raise the scales of the errors to the magnitudes of a state.
 
-    The error of a mode counts by what it adds to the slides and to the output, relative to their magnitudes, and to the
-    friction force of laws without states.
+    Those of `rig.scales` are the smallest. The error of a mode counts by what it adds to the slides and to the output,
+    relative to their magnitudes, and to the friction force of laws without states.
     """
     n = rig.modes.shape[1]
     y = state.y

@@ -29,7 +29,7 @@ class StepEvent(NamedTuple):
     """First event of a step.
 
     - fraction: of the step, 0 to 1, at the event
-    - face: number of its interface; -1 without an event
+    - face: number of its interface, or -1 without an event
     - which: `Margin` that vanishes there
     """
 

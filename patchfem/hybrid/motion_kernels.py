@@ -24,7 +24,10 @@ N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance lea
 
 @njit(**NJIT_KERNEL)
 def copy_values(source, target):
-    """Copy an array of one dimension; an assignment of a slice would need reference counts."""
+    """Copy an array of one dimension.
+
+    An assignment of a slice would need reference counts.
+    """
     for k in range(source.size):
         target[k] = source[k]
 
@@ -307,8 +310,8 @@ def update_grip(rig, state):
     """Invert the compliance of the resting interfaces by the Gauss-Jordan method."""
     n = rig.faces.shape[0]
     grip = state.grip
-    # Compliance [1/kg] between resting interfaces; the others have a unit row. More interfaces than modes
-    # would make it singular, so that the diagonal is a little larger.
+    # Compliance [1/kg] between resting interfaces. The others have a unit row. More interfaces than modes would make it
+    # singular, so that the diagonal is a little larger.
     for i in range(n):
         for k in range(n):
             grip[i, k] = 1.0 if i == k else 0.0
@@ -318,7 +321,7 @@ def update_grip(rig, state):
             grip[i, i] *= 1 + SHARED_GRIP
 
     for i in range(n):
-        # Row i is divided by its pivot, and subtracted from the other rows; the inverse takes the place of the matrix.
+        # Row i is divided by its pivot, and subtracted from the other rows. The inverse takes the place of the matrix.
         pivot = 1 / grip[i, i]
         grip[i, i] = 1.0
         for k in range(n):

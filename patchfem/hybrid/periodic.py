@@ -19,7 +19,7 @@ MIN_DIFFERENCE = (
 )
 MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
-N_RELAXED = 6  # cycles without a correction after the first one that did not help; twice as many after the next
+N_RELAXED = 6  # cycles without a correction after the first one that did not help, and twice as many after the next
 MAX_RELAXED = 200  # largest number of these cycles
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
@@ -238,8 +238,8 @@ class _Shooting:
                 self.map = None
                 continue
 
-            # A correction that did not help is given up for some periods of the motion itself; they are
-            # many for an interface that hardly slips, where the steps of a stuck one lead far away.
+            # A correction that did not help is given up for some periods of the motion itself. They are many for an
+            # interface that hardly slips, where the steps of a stuck one lead far away.
             if change > best:
                 self.relax(n_relaxed)
                 n_relaxed = min(2 * n_relaxed, MAX_RELAXED)

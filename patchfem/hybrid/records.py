@@ -97,7 +97,7 @@ class Setting(IntEnum):
     - BASE_MOVES: whether the drive is the acceleration of the base
     - IS_BENCH: whether the drive is a prescribed slide (bench)
     - RTOL: relative tolerance of a step
-    - REPEAT: number of cycles after which the drive repeats; 0 if it never does
+    - REPEAT: number of cycles after which the drive repeats, or 0 if it never does
     - MAX_STEPS: largest number of steps
     - HAS_RIGID: whether an interface has a rigid law
     """
@@ -171,14 +171,16 @@ class Memory(IntEnum):
 
 
 class Margin(IntEnum):
-    """Margins of the present regime of a law; the regime ends when one of them becomes negative.
+    """Margins of the present regime of a law.
+
+    The regime ends when one of them becomes negative.
 
     - MOTION: direction of the motion, or rest of a rigid law
     - BRANCH: branch of the law between two limits of its own
     - CONTACT: contact or lift-off
     - LIMIT: a further limit of the law
-    - SPEED: speed beside which the force changes steeply; steps below it are short
-    - AFTER: no margin; it marks the row after an event at which the force of a rigid law may jump
+    - SPEED: speed beside which the force changes steeply. Steps below it are short
+    - AFTER: no margin. It marks the row after an event at which the force of a rigid law may jump
     """
 
     MOTION = 0
@@ -291,7 +293,7 @@ class Probe(IntEnum):
 
     - SPEED: velocity of the output [m/s]
     - TRAVEL: largest displacement of the output, less its present magnitude [m]
-    - SLIPPING: |slip rate| - |velocity|/2 [m/s] of the first interface, negative in stick; others precede it
+    - SLIPPING: |slip rate| - |velocity|/2 [m/s] of the first interface, negative in stick. Others precede it
     """
 
     GAUGE = 0
@@ -313,7 +315,7 @@ class Cycle(IntEnum):
     """Columns of `Record.cycles`. The first two are given, the others are measured in each cycle.
 
     - END: time at the end [s]
-    - WINDOW: 0 in the window; below 0 outside of it (`cases.make_schedule`)
+    - WINDOW: 0 in the window, below 0 outside of it (`cases.make_schedule`)
     - MIN, MAX: smallest and largest output [m]
     - COS, SIN: integrals of the output times the cosine and the sine of the cycle [m s]
     - SLIDE: integral of the slide of the first interface over time [m s]
@@ -358,7 +360,7 @@ class Window(IntEnum):
     - STUCK, OPEN: time of stick and time without contact [s]
     - STARTS: number of starts of slip
     - COS_START, SIN_START: sums of the cosine and the sine of twice the phases of the cycle at these starts
-    - STICKS: duration of the stick at the end [s]; -1 if the interface slips there
+    - STICKS: duration of the stick at the end [s], or -1 if the interface slips there
     """
 
     STUCK = 0
@@ -373,12 +375,12 @@ class Record(NamedTuple):
     """What a run records.
 
     - cycles (C, 12): see `Cycle`
-    - extremes (2 + 4 M, 2), integrals (2 + 4 M, 4): of the quantities of `Probe` over the window, the last cycles; see
+    - extremes (2 + 4 M, 2), integrals (2 + 4 M, 4): of the quantities of `Probe` over the window, the last cycles, see
       `Extreme` and `Integral`
     - faces (M, 6): further measures of the window, see `Window`
     - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
-      of an event; the first column of the samples is given. Force and load of an event are those before it, the
-      directions of slip those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it
+      of an event. The first column of the samples is given. Force and load of an event are those before it, the
+      directions of slip those after it. A rigid law has a second row, `Margin.AFTER`, with the force after it
     """
 
     cycles: np.ndarray

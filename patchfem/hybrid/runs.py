@@ -215,7 +215,7 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
 
 
 def describe_end(case: Case, status: Status) -> str:
-    """Return why a run of a case ended early; "" for the end of its last cycle."""
+    """Return why a run of a case ended early, or "" for the end of its last cycle."""
     return MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS])
 
 

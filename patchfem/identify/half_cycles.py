@@ -26,7 +26,7 @@ MAX_MIDPOINT_ITERATIONS = 4  # largest number of iterations for the midpoint of 
 MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
 N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
 N_FIRST_CYCLES = 1.2  # cycles at the beginning of a decay to which the first sinusoid is fitted
-# Smallest place of the middle of the first half cycle, in half periods; one half less the error of the fit
+# Smallest place of the middle of the first half cycle, in half periods, one half less the error of the fit
 MIN_FIRST_MIDDLE = 0.48
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].

@@ -100,9 +100,9 @@ def _find_quantity(name: str, names: list[str], exported_names: Mapping) -> str:
 
 
 def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
-    """Read the numeric columns of the table `path` as channels; columns of text are left out.
+    """Read the numeric columns of the table `path` as channels.
 
-    `exported_names` has the names that patchfem gives to columns of its own exports.
+    Columns of text are left out. `exported_names` has the names that patchfem gives to columns of its own exports.
     """
     table = read_text(path, "a measured table")
     names = table.names

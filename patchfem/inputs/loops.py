@@ -23,7 +23,7 @@ class Loop:
     """A measured friction loop.
 
     - path: file.
-    - time (k,): [s]; None if it was not measured.
+    - time (k,): [s], or None if it was not measured.
     - displacement (k,): [m], 0 in the first row.
     - reading (k,): force [N] or friction ratio [1].
     - quantity: "force" or "friction_ratio".
@@ -46,7 +46,7 @@ class Loop:
         Parameters
         ----------
         condition : str
-            Option such as "cycle=1,2"; the column is one of `labels`.
+            Option such as "cycle=1,2". The column is one of `labels`.
 
         Returns
         -------

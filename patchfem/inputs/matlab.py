@@ -21,7 +21,7 @@ MAX_NESTING = 8  # largest depth of nested structures
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMBER_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
 Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
-# MATLAB classes with numbers, besides integers; "" stands for data of other programs
+# MATLAB classes with numbers, besides integers. "" stands for data of other programs.
 NUMBER_CLASSES = ("", "double", "single", "logical")
 
 
@@ -106,11 +106,11 @@ def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
     arrays : dict of str to array
         Arrays by name, which are extended.
     name : str
-        Name of the variable; fields of a structure are named NAME.FIELD.
+        Name of the variable. Fields of a structure are named NAME.FIELD.
     value
         What SciPy has read.
     depth : int
-        Number of structures that contain the value; below MAX_NESTING, structures are opened.
+        Number of structures that contain the value. Below MAX_NESTING, structures are opened.
     """
     if sparse.issparse(value):
         arrays[name] = _check_sparse(sparse.csc_array(value))
@@ -159,7 +159,7 @@ def _find_class(item) -> str:
 def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
     """Add the numbers of a dataset of an HDF5 file to the arrays, by name.
 
-    Other programs than MATLAB may write fewer than two dimensions; the array has two.
+    Other programs than MATLAB may write fewer than two dimensions. The array has two.
     """
     values = np.asarray(dataset[()])
     if "MATLAB_empty" in dataset.attrs:  # such a dataset contains the shape
@@ -183,6 +183,9 @@ def _read_sparse(group) -> sparse.csc_array:
 
 
 def _check_sparse(matrix: sparse.csc_array) -> sparse.csc_array:
-    """Return a sparse matrix; raise ValueError if its indices do not fit its shape, with which SciPy would crash."""
+    """Return a sparse matrix.
+
+    ValueError is raised if its indices do not fit its shape, with which SciPy would crash.
+    """
     matrix.check_format(full_check=True)
     return matrix

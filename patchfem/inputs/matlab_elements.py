@@ -50,7 +50,7 @@ def count_unpacked_bytes(data: bytes) -> int:
 def check_elements(data: bytes) -> None:
     """Raise ValueError if an element inside a variable of a file has a wrong type or length.
 
-    SciPy 1.17 ends the process there. `data` is the content of the file; nothing is checked in another version. Raises
+    SciPy 1.17 ends the process there. `data` is the content of the file. Nothing is checked in another version. Raises
     zlib.error for compressed variables that are damaged or cut off.
     """
     order = VERSION_5_MARKS.get(data[124:128])
@@ -80,7 +80,7 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
         flags = int.from_bytes(data[parts[0].start : parts[0].start + 4], order)
         array_class = flags & 0xFF
 
-        # Numbers follow flags, dimensions and name; a sparse matrix has two arrays of places before them.
+        # Numbers follow flags, dimensions and name. A sparse matrix has two arrays of places before them.
         count = 4 + 2 * (array_class == SPARSE_CLASS) + bool(flags & COMPLEX_FLAG)
         allowed = NUMBER_TYPES
         if array_class in NESTED_CLASSES:
@@ -97,7 +97,7 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
 
 
 def _list_variables(data: bytes) -> Iterator[Element]:
-    """Iterate over the variables of a file with a content; nothing for another version."""
+    """Iterate over the variables of a file with a content, or over nothing for another version."""
     order = VERSION_5_MARKS.get(data[124:128])
     place = HEADER_BYTES if order else len(data)
     while place + 8 <= len(data):

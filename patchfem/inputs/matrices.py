@@ -34,8 +34,8 @@ class Matrix(NamedTuple):
     """Sparse matrix that was read from a file.
 
     - values (n, n): sparse array.
-    - places (n, 2): node and direction 1 to 6 of each row; None if the file does not state them.
-    - has_size: whether the file states its size; else the matrix ends with the last row that has an entry.
+    - places (n, 2): node and direction 1 to 6 of each row, or None if the file does not state them.
+    - has_size: whether the file states its size. Otherwise the matrix ends with the last row that has an entry.
     """
 
     values: sparse.csr_array
@@ -69,7 +69,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
     Returns
     -------
     list of Matrix
-        In the same order; a row that a matrix lacks is empty.
+        In the same order. A row that a matrix lacks is empty.
     """
     with_places = [matrix for matrix in matrices if matrix.places is not None]
     if with_places and len(with_places) < len(matrices):
@@ -119,7 +119,7 @@ def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
 def _find_matrix_name(path, names, matrix_name: str) -> str:
     """Return the name of the requested matrix among the names in a file: a usual one, or the only one.
 
-    `matrix_name` is "stiffness", "mass" or "damping", whose usual names are in `MATRIX_NAMES`; `path` is for the
+    `matrix_name` is "stiffness", "mass" or "damping", whose usual names are in `MATRIX_NAMES`. `path` is for the
     message.
     """
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
@@ -143,10 +143,11 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
 
 
 def _read_market(path: Path, matrix_name: str) -> Matrix:
-    """Read the Matrix Market file `path`; a file without its header is read as Abaqus text.
+    """Read the Matrix Market file `path`.
 
-    `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
-    numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal 11).
+    A file without its header is read as Abaqus text. `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged
+    number "1E-" as 1 and missing numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal
+    11).
 
     `matrix_name` is "stiffness", "mass" or "damping", for messages.
     """
@@ -290,7 +291,7 @@ def _make_matrix(path: Path, values) -> Matrix:
     # A small file may state any number of rows, for each of which a sparse matrix needs memory.
     if max(values.shape, default=0) > MAX_ROWS:
         raise PatchfemError(f"{path}: a matrix of {MAX_ROWS} rows and columns at most can be read")
-    # SciPy checks the indices of these formats only on demand; wrong ones end the process.
+    # SciPy checks the indices of these formats only on demand. Wrong ones end the process.
     if sparse.issparse(values) and values.format in ("csr", "csc", "bsr"):
         values.check_format(full_check=True)
     return Matrix(sparse.csr_array(values))

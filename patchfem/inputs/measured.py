@@ -30,12 +30,14 @@ FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRow:
-    """One measured condition in SI; a missing value is None.
+    """One measured condition in SI.
+
+    A missing value is None.
 
     - frequency: frequency of the drive [Hz], >= 0.
     - input: amplitude of the drive [m s-2], >= 0.
     - acceleration, displacement: measured amplitudes [m s-2] and [m], >= 0.
-    - flag: letters of `FLAG_MEANINGS`; may be empty.
+    - flag: letters of `FLAG_MEANINGS`, which may be empty.
     """
 
     frequency: float

@@ -24,7 +24,7 @@ class Channel(NamedTuple):
     - quantity: key of `units.CHANNEL_UNITS`, or "" if the file does not state it.
     - unit: unit as written in the file, or "".
     - values (k,): in this unit.
-    - time (k,): [s]; None if time is a channel of its own.
+    - time (k,): [s], or None if time is a channel of its own.
     - factor: factor to SI if the file states it apart from the unit, else None.
     """
 
@@ -42,7 +42,7 @@ class RequestedChannel(NamedTuple):
 
     - quantity: what the channel is, such as "force".
     - source: name of the channel, its number from 1, or its place.
-    - unit: unit of the values; "" for that of the file.
+    - unit: unit of the values, or "" for that of the file.
     """
 
     quantity: str
@@ -283,7 +283,7 @@ def make_records(
 def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Subtract the first row from time [s] and displacement [m], as a prescribed displacement requires.
 
-    `values` are arrays (k,) by quantity; other quantities are not changed.
+    `values` are arrays (k,) by quantity. Other quantities are not changed.
     """
     return {
         name: column - column[0] if name in ("time", "displacement") else column
@@ -310,7 +310,7 @@ def _find_shared_time(
 ) -> np.ndarray | None:
     """Return the time [s] of the selected channels, or of the only channel that contains times.
 
-    `path` and `channel_list`, all channels in words, are for messages; `channels` are all of the file. The selected
+    `path` and `channel_list`, all channels in words, are for messages. `channels` are all of the file. The selected
     channels must have the same times. The result is None if no channel contains times, or more than one does.
     """
     times = [channel.time for channel in selected if channel.time is not None]

@@ -35,7 +35,7 @@ def to_real(values, subject: str):
     if not np.iscomplexobj(numbers):
         return values
 
-    # Imaginary parts that are exactly 0 are dropped; any others are refused, with a remedy for structural damping
+    # Imaginary parts that are exactly 0 are dropped. Any others are refused, with a remedy for structural damping.
     largest = max(float(np.abs(numbers.real).max(initial=0.0)), 1e-300)
     ratio = float(np.abs(numbers.imag).max(initial=0.0)) / largest
     if ratio == 0.0:

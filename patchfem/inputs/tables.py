@@ -33,8 +33,9 @@ _NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "e
 class TableFormat(NamedTuple):
     """Columns that a table may have, and the words for them in error messages.
 
-    - units: factors to SI by unit, for each column of numbers by its name; the unit "" stands for a column without a unit.
-    - required: columns that must be there; "displacement slide" accepts either name.
+    - units: factors to SI by unit, for each column of numbers by its name. The unit "" stands for a column without a
+      unit.
+    - required: columns that must be there. "displacement slide" accepts either name.
     - example: header of such a table.
     - contents: what the file is, such as "a drive".
     - remedy: end of the message if there is no file.
@@ -65,7 +66,7 @@ class TextTable(NamedTuple):
     """Text of a table.
 
     - path: file.
-    - names, units: name and unit of each column; the unit is None if there is none.
+    - names, units: name and unit of each column. The unit is None if there is none.
     - separator: sign between the cells.
     - lines: lines below the header, without blank ones at the end.
     """
@@ -96,9 +97,10 @@ class TextTable(NamedTuple):
 
 
 def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
-    """Read the lines of the text file `path`; the last one is empty after a final line break.
+    """Read the lines of the text file `path`.
 
-    `contents` says in messages what the file is, and `remedy` what to do if there is no such file.
+    The last one is empty after a final line break. `contents` says in messages what the file is, and `remedy` what to do
+    if there is no such file.
     """
     try:
         with open_for_reading(path) as file:

@@ -16,8 +16,8 @@ RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
 SLIDE_UNITS = {"time": UNIT_FACTORS["time"], "displacement": UNIT_FACTORS["length"]}
 # Factors to SI by unit, for each column that a friction loop may be read from
 FORCE_UNITS = {"force": UNIT_FACTORS["force"], "friction_ratio": RATIO_UNITS}
-# Factors to SI by unit, for each quantity that a record may contain besides time; a reader ignores those that it does
-# not need
+# Factors to SI by unit, for each quantity that a record may contain besides time. A reader ignores those that it does
+# not need.
 RECORD_UNITS = {
     "displacement": UNIT_FACTORS["length"],
     "velocity": UNIT_FACTORS["velocity"],

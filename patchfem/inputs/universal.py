@@ -59,7 +59,7 @@ def read_datasets(path) -> list[Dataset]:
             "reading universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
 
-    # Only these three kinds of datasets are read; files of other programs contain many more
+    # Only these three kinds of datasets are read. Files of other programs contain many more.
     path = Path(path)
     check_file(path, "export fewer channels or a part of the record")
     with refuse_damage(f"{path}: cannot be read as a universal file"):
@@ -110,7 +110,7 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
 
 
 def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
-    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit; None without.
+    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit, or None without it.
 
     `path` names the file in the message.
     """

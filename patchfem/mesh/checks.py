@@ -233,10 +233,11 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
 
 
 def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
-    """Orient cells counterclockwise; raise PatchfemError if one is degenerate.
+    """Orient cells counterclockwise.
 
-    `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their numbers in elements of a `kind` such as
-    "quad8". Returns the cells with the order of the nodes reversed where they turned clockwise.
+    PatchfemError is raised if one is degenerate. `points` (N, 2) are x and depth [m] of the nodes, `cells` (t, k) their
+    numbers in elements of a `kind` such as "quad8". Returns the cells with the order of the nodes reversed where they
+    turned clockwise.
     """
     n = ELEMENTS[kind].n_corners
     is_clockwise = signed_areas(points[cells[:, :n]]) < 0
@@ -266,7 +267,7 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
 def _check_middles(points, edges: CellEdges, side: str) -> None:
     """Raise PatchfemError unless the nodes between corners lie in the middles of their edges.
 
-    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`; `side` names
+    `points` (N, 2) are x and depth [m]. An edge without such a node has the entry -1 in `edges.middles`. `side` names
     the piece in the message.
     """
     is_quadratic = edges.middles >= 0
@@ -342,8 +343,8 @@ def _check_interface(points, nodes, side: str) -> None:
 def _check_connections(mesh: PieceMesh, side: str) -> None:
     """Raise PatchfemError unless the cells of a piece are connected through common edges.
 
-    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface; `side`
-    ("lower" or "upper") names the piece in a message.
+    The nodes of the far face must lie on the border, and the `mesh` must have no hole in its interface. `side` ("lower"
+    or "upper") names the piece in a message.
     """
     edges = mesh.edges
     border = edges.ends[edges.is_border]
@@ -383,7 +384,7 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
 def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
     """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
 
-    The rows of `border` (e, 2) are the nodes of the boundary edges; `side` names the piece in the message.
+    The rows of `border` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
     """
     # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)

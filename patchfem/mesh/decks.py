@@ -39,7 +39,7 @@ class Deck:
     - sets: numbers by name, for node sets and element sets
     - surfaces: data lines by name
 
-    The text of the deck is read block by block when the object is made; names of sets and surfaces are in lower case.
+    The text of the deck is read block by block when the object is made. Names of sets and surfaces are in lower case.
     """
 
     def __init__(self, text: str):
@@ -86,10 +86,10 @@ class Deck:
         kind: str,
         parameters: dict[str, str],
     ) -> None:
-        """Add numbered nodes or elements to the known ones; raise PatchfemError for a number given twice.
+        """Add numbered nodes or elements to the known ones.
 
-        `new` lists number and content. If the `parameters` of the block name a set of this `kind` ("NSET" or "ELSET"),
-        the numbers become members of it.
+        PatchfemError is raised for a number given twice. `new` lists number and content. If the `parameters` of the
+        block name a set of this `kind` ("NSET" or "ELSET"), the numbers become members of it.
         """
         for number, content in new:
             if number in known:
@@ -101,10 +101,11 @@ class Deck:
             members += [number for number, _ in new]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
-        """Return the node or element numbers of a set, which may contain other sets.
+        """Return the numbers of the nodes or elements in a set, which may contain other sets.
 
-        `kind` is "NSET" or "ELSET", and `lines` are the words of the data lines: numbers and names, or first, last and
-        step of a range if `is_range`.
+        `kind` is "NSET" for nodes or "ELSET" for elements, and `lines` are the words of the data lines. A line lists
+        numbers and names of other sets. If `is_range`, it has the first number, the last one, and optionally the step
+        between them. PatchfemError is raised for a set with more than `max_members` members.
         """
         members = []
         for words in lines:

@@ -68,10 +68,10 @@ class Element(NamedTuple):
 
 
 def _make_element(corners, powers, rule, has_centre: bool = False) -> Element:
-    """Return an element from its corners; with more monomials than corners it has mid-edge nodes.
+    """Return an element from its corners.
 
-    `powers` (k, 2) are the exponents of the monomials, `rule` the points and weights of the integration, and an
-    element with `has_centre` has one more node at the origin.
+    With more monomials than corners it has mid-edge nodes. `powers` (k, 2) are the exponents of the monomials, `rule`
+    the points and weights of the integration, and an element with `has_centre` has one more node at the origin.
     """
     nodes = np.array(corners, float)
     if len(powers) > len(corners):

@@ -175,9 +175,10 @@ class _Tags(NamedTuple):
 
 
 def _read_tags(path: Path, mesh) -> _Tags:
-    """Return the tags of a meshio mesh; where a file has them depends on its format.
+    """Return the tags of a meshio mesh.
 
-    These are physical names in .msh, groups in .med, and the array `tag` in .vtu, by the suffix of `path`.
+    Where a file has them depends on its format. These are physical names in .msh, groups in .med, and the array `tag` in
+    .vtu, by the suffix of `path`.
     """
     if path.suffix == ".msh":
         names = {
@@ -230,7 +231,7 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
 def _read_with_meshio(path: Path):
     """Return the `meshio.Mesh` of the file `path`.
 
-    What meshio prints is hidden; any failure, also sys.exit, becomes a PatchfemError.
+    What meshio prints is hidden. Any failure, also sys.exit, becomes a PatchfemError.
     """
     import meshio
 

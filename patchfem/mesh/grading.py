@@ -59,7 +59,7 @@ class Layout:
 
 
 def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
-    """Return the distances (k,) [m] of positions x (k,) [m] from the interval `low` to `high`; 0 inside it."""
+    """Return the distances (k,) [m] of positions x (k,) [m] from the interval `low` to `high`, or 0 inside it."""
     if low == high:
         return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))

@@ -311,7 +311,7 @@ def merge_levels(levels) -> np.ndarray:
 def split_levels(levels) -> np.ndarray:
     """Insert a grid line into each cell so that geometric growth of the cells is preserved.
 
-    `levels` (k,) [m] are ascending grid lines; the result has 2 k - 1 of them.
+    `levels` (k,) [m] are ascending grid lines. The result has 2 k - 1 of them.
     """
     if levels.size < 2:
         return levels

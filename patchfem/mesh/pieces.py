@@ -204,7 +204,10 @@ def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
 
 
 def _tag_inner_points(tagged: list[np.ndarray], n_points: int) -> list[np.ndarray]:
-    """Extend `tagged`, a bool (N,) per tag, to `n_points`; the new points are inside and have no tag."""
+    """Extend `tagged`, a bool (N,) per tag, to `n_points`.
+
+    The new points are inside and have no tag.
+    """
     return [np.append(part, np.zeros(n_points - part.size, bool)) for part in tagged]
 
 

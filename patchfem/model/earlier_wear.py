@@ -95,7 +95,7 @@ class EarlierWear:
     def measure_error(self, name: str, value: float) -> float | None:
         """Return the error of a wear measure at the end of the earlier run, or None if it is not known.
 
-        `name` is that of the measure, and `value` its value on the mesh of this run; its difference from that of the
+        `name` is that of the measure, and `value` its value on the mesh of this run. Its difference from that of the
         earlier run is added to the error of the latter.
         """
         measure = self.measures.get(name, {"error": None})
@@ -158,9 +158,9 @@ def read_end_state(path: Path) -> EarlierWear:
 
 
 def _read_state(path: Path) -> EarlierWear:
-    """Read the last state in the result.nc file `path`; the values are not checked.
+    """Read the last state in the result.nc file `path`.
 
-    Depth and gap are per node of the earlier mesh; the gap is that of the unworn pieces.
+    The values are not checked. Depth and gap are per node of the earlier mesh. The gap is that of the unworn pieces.
     """
     import h5py
 

@@ -20,12 +20,18 @@ def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
 
     @lru_cache(MAX_CACHED_FILES)
     def call_cached(paths, _versions, *arguments):
-        """Call the function; its result is cached for these paths, versions of the files and arguments."""
+        """Call the function.
+
+        Its result is cached for these paths, versions of the files and arguments.
+        """
         return function(paths, *arguments)
 
     @wraps(function)
     def read_cached(paths, *arguments):
-        """Call the function for a path or a tuple of `paths`; it runs again if a file has changed."""
+        """Call the function for a path or a tuple of `paths`.
+
+        It runs again if a file has changed.
+        """
         versions = map(_find_version, paths if isinstance(paths, tuple) else (paths,))
         return call_cached(paths, tuple(versions), *arguments)
 
@@ -33,7 +39,7 @@ def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
 
 
 def _find_version(path: Path) -> tuple[int, int] | None:
-    """Return time of modification [ns] and size [bytes] of the file `path`; None if there is none."""
+    """Return time of modification [ns] and size [bytes] of the file `path`, or None if there is none."""
     if not path.exists():
         return None
     stat = path.stat()

@@ -118,8 +118,7 @@ def _check_reduction(tables, folder: Path) -> list[Fault]:
 def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
     """Check a mesh file by reading it, and compare its sizes with those of the scene.
 
-    `path` is the mesh file, and `tables` are those of the scene; they are compared only if `is_valid`, without
-    mistakes.
+    `path` is the mesh file, and `tables` are those of the scene. They are compared only if `is_valid`, without mistakes.
     """
     if not is_valid:
         files.read_pieces(path)
@@ -130,7 +129,7 @@ def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
-    """Check that the trace in the file `path` covers the interface; return notes about it.
+    """Check that the trace in the file `path` covers the interface, and return notes about it.
 
     `tables` are those of the scene. Unless they are valid (`is_valid`), or if the scene has a mesh file, the trace is
     only read.
@@ -159,7 +158,7 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
 def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
     """Check the file of a prescribed slide by reading it.
 
-    `path` is the file; the arguments `tables` and `is_valid` of all checks have no effect here.
+    `path` is the file. The arguments `tables` and `is_valid` of all checks have no effect here.
     """
     slide.read_path_file(path)
 
@@ -178,8 +177,8 @@ def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
 def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
     """Check structure.file: compute modes from matrices, but only read a universal file.
 
-    `path` is the file, and `tables` are those of the scene; unless they are valid (`is_valid`), matrices are only
-    read, too.
+    `path` is the file, and `tables` are those of the scene. Unless they are valid (`is_valid`), matrices are only read,
+    too.
     """
     if structure_files.is_universal(path) or not is_valid:
         structure_files.read_content(path)
@@ -199,7 +198,7 @@ def _make_matrix_check(key: str):
         path : Path
             File of the matrix.
         tables, is_valid
-            Tables of the scene, and whether they are free of mistakes; both have no effect.
+            Tables of the scene, and whether they are free of mistakes. Both have no effect.
         """
         structure_reduced.read_matrix(path, key)
 
@@ -215,7 +214,7 @@ def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
-    """Check the result.nc file `path` of an earlier run; return a note about its worn depth.
+    """Check the result.nc file `path` of an earlier run, and return a note about its worn depth.
 
     If the `tables` of this scene are valid (`is_valid`), the pieces must be those of the earlier run.
     """

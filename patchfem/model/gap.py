@@ -99,7 +99,7 @@ class Gap:
     def _values(self, quantity: str) -> list[tuple[Table, Any]]:
         """Return (table of the shape, value) for every shape of the gap that has a property.
 
-        `quantity` names the property, such as "edge"; its value is what the function of this name in `gaps` returns.
+        `quantity` names the property, such as "edge". Its value is what the function of this name in `gaps` returns.
         """
         pairs = []
         for name, keys in self.shapes:

@@ -191,7 +191,7 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
 
 
 def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
-    """Build the patch of interface `number`, from 0, of a scene; None for an interface without one.
+    """Build the patch of interface `number`, from 0, of a scene, or None for an interface without one.
 
     A PatchfemError names the key of the file that cannot be used.
     """

@@ -109,7 +109,7 @@ class PointLoad:
 
 
 def build_grooves(scene) -> grooves.Grooves | None:
-    """Build the grooves of [contact] or [normal] in a scene; None if there are none or they are flat."""
+    """Build the grooves of [contact] or [normal] in a scene, or None if there are none or they are flat."""
     key = find_climbed_grooves(scene).strip("[]")
     if not key:
         return None
@@ -118,7 +118,7 @@ def build_grooves(scene) -> grooves.Grooves | None:
 
 
 def build_point_load(scene) -> PointLoad | None:
-    """Build the load of [normal] or of the first interface of a scene; None if neither gives one."""
+    """Build the load of [normal] or of the first interface of a scene, or None if neither gives one."""
     if scene.structure is not None and scene.structure.interface:
         return PointLoad(scene.structure.interface[0].normal_load)
     keys = scene.normal

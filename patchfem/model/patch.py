@@ -178,7 +178,7 @@ class PatchInterface:
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
-    - skin: pressure law of the asperities on the faces, None if the faces are smooth.
+    - skin: pressure law of the asperities on the faces, or None if the faces are smooth.
     """
 
     skin: Asperities | None
@@ -219,7 +219,7 @@ class PatchMesh:
     - file: mesh file of the two pieces.
     - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse; the upper one is None if it is
+    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse. The upper one is None if it is
       like the lower one.
     - slip: slide whose partial slip the mesh has to resolve.
     - n_finer: halvings of the elements beyond those that the static measures need.

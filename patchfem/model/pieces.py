@@ -74,8 +74,8 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
 def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     """Return where the flat part and the contact of rounded pieces end.
 
-    The contact is that of a rounded punch on a half plane under the nominal load without tilt
-    (`closed_forms.contact`); the faces are as stiff as their coatings.
+    The contact is that of a rounded punch on a half plane under the nominal load without tilt (`closed_forms.contact`).
+    The faces are as stiff as their coatings.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     Returns
     -------
     RoundedEdges
-        Positions x [m]; empty if no piece is rounded or there is no load.
+        Positions x [m], or empty if no piece is rounded or there is no load.
     """
     pieces = patch.pieces.both
     half_length = patch.pieces.length / 2

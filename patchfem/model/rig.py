@@ -191,14 +191,14 @@ class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
     - scene: the scene with this joint, in words.
-    - stiffness: stiffness [N/m] of the joint, or of each joint, that was subtracted from the modes; () as long as
-      a patch has to be solved for it.
-    - build_rig: function of the stiffness [N/m] of a joint with a patch that returns the rig without this joint;
-      None if the stiffness follows from the friction laws alone.
+    - stiffness: stiffness [N/m] of the joint, or of each joint, that was subtracted from the modes, or () as long as a
+      patch has to be solved for it.
+    - build_rig: function of the stiffness [N/m] of a joint with a patch that returns the rig without this joint, or None
+      if the stiffness follows from the friction laws alone.
     - build_stiffer_rig: the same for a joint that is stiffer by the error of its stiffness, if this stiffness determines
-      the slide of the modes; else None.
-    - model: Model of the scene with this joint; None if it is the model of the rig itself.
-    - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick; None without one.
+      the slide of the modes, or None.
+    - model: Model of the scene with this joint, or None if it is the model of the rig itself.
+    - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick, or None without one.
     """
 
     scene: str
@@ -243,7 +243,7 @@ class Rig:
 
     - modes: modes without the contact.
     - drive: drive signal and how it acts.
-    - start: initial motion; None at rest.
+    - start: initial motion, or None at rest.
     - friction: laws and loads of the interfaces.
     - springs: springs in addition to the contact, and the limit of the motion.
     - first_mode: first elastic mode of the scene.
@@ -323,7 +323,7 @@ def _build(
     own_modes : ModalBasis
         Modes without the spring of the bonded joint.
     interfaces : tuple of InterfaceLaw
-        Friction laws of the interfaces; () without friction.
+        Friction laws of the interfaces, or () without friction.
     joint : float, optional
         Stiffness [N/m] of a pressed patch that was subtracted from measured modes.
 

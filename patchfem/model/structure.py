@@ -194,7 +194,10 @@ def _build_given_modes(scene) -> ModalBasis:
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Return modes with a relative displacement for each strip if one of them yaws the patch of a scene."""
+    """Return the modes of a scene with a relative displacement for each strip of its patch.
+
+    The modes are returned unchanged if none of them yaws the patch. The displacement of a strip is that at its middle.
+    """
     if not needs_strip_displacements(scene):
         return modes
     n_strips = scene.contact.strips.count
@@ -216,7 +219,7 @@ def _find_driven_mass(scene) -> int:
 
 
 def build_start(scene, modes: ModalBasis) -> InitialState | None:
-    """Build the initial state of the rig of a scene in its modes; None if it starts at rest.
+    """Build the initial state of the rig of a scene in its modes, or None if it starts at rest.
 
     Raises
     ------
@@ -276,7 +279,7 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring; 0 for rigid-body modes.
+    """Return the natural frequencies (n,) [Hz] with the bonded spring, or 0 for rigid-body modes.
 
     `structure` is the table [structure], and `modes` are the modes with the spring.
     """

@@ -21,7 +21,10 @@ class FileModes(NamedTuple):
 
 
 def read_scene_modes(scene) -> FileModes:
-    """Read the modes from structure.file of a scene; an error has the key at fault."""
+    """Read the modes from structure.file of a scene.
+
+    An error has the key at fault.
+    """
     path = scene.resolve_path(scene.structure.file)
     return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
 

@@ -39,7 +39,7 @@ class _ReducedFiles(NamedTuple):
 
     - values: matrices by key.
     - boundary (b,): rows of the boundary coordinates.
-    - moved (n,): motion of the coordinates for a unit motion of the base; None if the base does not move.
+    - moved (n,): motion of the coordinates for a unit motion of the base, or None if the base does not move.
     - notes: sentences on the files.
     """
 
@@ -95,9 +95,9 @@ def list_slide_pairs(structure) -> list[tuple[int, int]]:
 
 
 def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
-    """Describe what a reduction keeps; the frequencies help the user notice wrong units.
+    """Describe what a reduction keeps.
 
-    `modes` are the reduced modes, and `table` is [structure.reduced].
+    The frequencies help the user notice wrong units. `modes` are the reduced modes, and `table` is [structure.reduced].
     """
     n_modes = min(table.modes, reduction.modes.omega.size)
     n_boundary = len(reduction.boundary)
@@ -127,9 +127,9 @@ def _find_files(table, locate) -> dict[str, Path]:
 
 @cache_by_file
 def read_matrix(path: Path, key: str) -> matrices.Matrix:
-    """Read the matrix file `path`; the key of a PatchfemError is the key of the file.
+    """Read the matrix file `path`.
 
-    `key` is "stiffness", "mass" or "damping".
+    The key of a PatchfemError is the key of the file. `key` is "stiffness", "mass" or "damping".
     """
     with name_key(f"structure.reduced.{key}"):
         return matrices.read_matrix(path, key)
@@ -137,10 +137,10 @@ def read_matrix(path: Path, key: str) -> matrices.Matrix:
 
 @cache_by_file
 def _reduce(paths: tuple[Path, ...], keys: tuple[str, ...], table, is_base_driven: bool):
-    """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes.
+    """Reduce the matrices in files, and return the `structure.reduced.Reduction` and notes.
 
-    `_read_files` returns the matrices by key, the rows of the boundary and the motion of all coordinates with the
-    base; `table.unit` is the length [m] of the unit in which the files are written.
+    `_read_files` returns the matrices by key, the rows of the boundary and the motion of all coordinates with the base.
+    `table.unit` is the length [m] of the unit in which the files are written.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
     Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. As the slide is
     nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K h (v0 - v1)/12 with
-    the secant K = D/dq of the elastic force; so steps without a kink of the law are of order 4.
+    the secant K = D/dq of the elastic force, so that steps without a kink of the law are of order 4.
 
     Parameters
     ----------
@@ -116,9 +116,9 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
@@ -203,9 +203,9 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
@@ -252,7 +252,7 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
 
 @njit(**NJIT_KERNEL)
 def count_halvings(part):
-    """Return after how many halvings a step is shorter than a part of it; at least 1."""
+    """Return after how many halvings a step is shorter than a part of it, which is at least 1."""
     count = 1
     while part < 0.5 and count < LEVELS:
         part *= 2
@@ -264,8 +264,8 @@ def count_halvings(part):
 def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memory, j):
     """Advance a case by a step and return 0, or return how often a step that contains an event has to be halved.
 
-    `waves` are the sines of the drive at the start, in the middle and at the end; `max_bend` [N] is the largest difference
-    of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
+    `waves` are the sines of the drive at the start, in the middle and at the end. `max_bend` [N] is the largest
+    difference of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
 
     Parameters
     ----------
@@ -278,14 +278,14 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     is_shortest : bool
         Whether the step cannot be halved.
     max_bend : float
-        Largest difference [N] of the mean force from the mean of the forces at both ends; above it the law has a
-        corner in the step.
+        Largest difference [N] of the mean force from the mean of the forces at both ends. Above it the law has a corner
+        in the step.
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
@@ -336,7 +336,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
             (free, free_velocity), response, h, case, now, numbers, memory, j
         )
         turns = v * end < 0
-        # A law takes the net increment of a reversal inside the step as its path; one of the velocity may jump there.
+        # A law takes the net increment of a reversal inside the step as its path. One of the velocity may jump there.
         if numbers[0, j] == Law.TANH:
             turns = turns and min(abs(v), abs(end)) > STEEP_TURN * numbers[2, j]
         if not is_shortest:
@@ -386,9 +386,9 @@ def find_force(wave, case, now, numbers, memory, j):
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
@@ -463,7 +463,9 @@ def find_work(h, law, start, now):
 
 @njit(**NJIT_KERNEL)
 def add_energies(waves, h, work, case, start, now):
-    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule.
+    """Add the energies per mass of a step.
+
+    They are integrals of the velocity by Simpson's rule.
 
     Parameters
     ----------
@@ -478,7 +480,7 @@ def add_energies(waves, h, work, case, start, now):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     """
     middle = find_middle(h, start, now).velocity
     end = now[Now.VELOCITY]
@@ -495,7 +497,9 @@ def add_energies(waves, h, work, case, start, now):
 
 @njit(**NJIT_KERNEL)
 def find_turn(h, value, rate, last_value, last):
-    """Return the extreme of a cubic in a step, where its rate, a parabola, is 0; the rates at both ends differ in sign.
+    """Return the extreme of a cubic in a step, where its rate, a parabola, is 0.
+
+    The rates at both ends differ in sign.
 
     Parameters
     ----------
@@ -531,9 +535,9 @@ def observe_extremes(h, start, now, seen, observes):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     observes : bool
         Whether the cycle is measured.
     """
@@ -620,9 +624,9 @@ def observe_acceleration(waves, h, is_steep, case, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -656,16 +660,16 @@ def observe_harmonics(time, h, omega, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     # Force: parabola through both ends with the mean of the step
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
     bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
 
-    # Gauss points: the slide is the cubic Hermite polynomial of the step; cos 3x = 4 cos^3 x - 3 cos x
+    # Gauss points: the slide is the cubic Hermite polynomial of the step, with cos 3x = 4 cos^3 x - 3 cos x
     for k in range(3):
         s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
         weight = h * (4 / 9 if k == 1 else 5 / 18)
@@ -698,14 +702,14 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
     first, last, mean : float
         Irreversible part of the motion at the start and at the end of the piece, and its mean.
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     first = abs(first)
     last = abs(last)
     sticks = first < 0.5
     part = 1.0 if sticks else 0.0
     if sticks != (last < 0.5):
-        # The irreversible part is a parabola of the path; that of a law with a corner jumps where this gives the mean.
+        # The irreversible part is a parabola of the path. That of a law with a corner jumps where this gives the mean.
         rise = 0.5 - first
         bend = 6 * mean - 3 * (first + last)
         slope = last - first + bend
@@ -741,7 +745,7 @@ def observe_stick(angle, turn, share, start, now, seen):
     now : (20,) array
         State of the case, in the order of `case_rows.Now`.
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     first = seen[Seen.SHARE]
     seen[Seen.SHARE] = share
@@ -768,7 +772,7 @@ def find_largest_force(h, start, now, numbers, j, load):
     """Return the largest magnitude of the force in a step.
 
     The force is smooth in the step if it follows the velocity, or holds a rigid point at rest, which is released at the
-    static limit; other laws have their largest force where a step ends.
+    static limit. Other laws have their largest force where a step ends.
 
     Parameters
     ----------
@@ -777,9 +781,9 @@ def find_largest_force(h, start, now, numbers, j, load):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     j : int
         Number of the point.
     load : float
@@ -813,15 +817,15 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     j : int
         Number of the point.
     load : float
         Normal load [N].
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
@@ -854,11 +858,11 @@ def end_cycle(now, seen, history):
     Parameters
     ----------
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     history : (4,) array
-        Smallest and largest slide [m] and the integrals for its phasor; output.
+        Smallest and largest slide [m] and the integrals for its phasor (output).
     """
     history[0] = now[Now.MIN]
     history[1] = now[Now.MAX]
@@ -894,15 +898,15 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     now : (20,) array
-        State of the case, in the order of `case_rows.Now`; changed in place.
+        State of the case, in the order of `case_rows.Now` (changed in place).
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     seen : (29,) array
-        What was observed, in the order of `case_rows.Seen`; changed in place.
+        What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -971,15 +975,15 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
     parameters : (c, 12) array
         Numbers of the cases, in the order of `case_rows.Number`.
     numbers : (k, c) array
-        Numbers of the laws; row 0 is the `Law`.
+        Numbers of the laws. Row 0 is the `Law`.
     memory : (l, c) array
-        Memory of the laws; changed in place.
+        Memory of the laws (changed in place).
     nows : (c, 20) array
-        States of the cases, in the order of `case_rows.Now`; output.
+        States of the cases, in the order of `case_rows.Now` (output).
     seens : (c, 29) array
-        What was observed, in the order of `case_rows.Seen`; output.
+        What was observed, in the order of `case_rows.Seen` (output).
     histories : (c, n, 4) array
-        Extremes and phasor of every cycle; output.
+        Extremes and phasor of every cycle (output).
     table : (LEVELS + 1, 2, 5) array
         Workspace.
     """

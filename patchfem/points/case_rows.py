@@ -10,9 +10,10 @@ SAME_CASE_CYCLE = 1e-8
 
 
 class Number(IntEnum):
-    """Columns of `Cases.parameters`; kernels get the row of one case.
+    """Columns of `Cases.parameters`.
 
-    The slide q [m] obeys q'' + DAMPING q' + STIFFNESS q = DRIVE sin(OMEGA t) - MOBILITY F with the friction force F [N].
+    Kernels get the row of one case. The slide q [m] obeys q'' + DAMPING q' + STIFFNESS q = DRIVE sin(OMEGA t) - MOBILITY
+    F with the friction force F [N].
 
     - DAMPING: [1/s]
     - STIFFNESS: squared circular frequency [1/s2]
@@ -42,7 +43,9 @@ class Number(IntEnum):
 
 
 class Now(IntEnum):
-    """Columns of the state (c, 20) of c cases; kernels get the row of one case.
+    """Columns of the state (c, 20) of c cases.
+
+    Kernels get the row of one case.
 
     - SLIDE, VELOCITY: at the end of the last step [m], [m/s]
     - MEAN: friction force [N] as a mean over the path of the last step
@@ -56,11 +59,11 @@ class Now(IntEnum):
     - FRICTION: friction work per mass [J/kg]
     - STORED: largest kinetic and elastic energy per mass so far [J/kg]
     - EVENT: fraction of the last step at which the velocity changes its sign, or at which a rigid point stops or is
-      released; -1 without such an event
+      released, or -1 without such an event
     - ELASTIC: elastic energy of the friction law at the end of the run [J]
     - TIME_MEAN: friction force [N] as a mean over the time of the last step
     - SHARE_BEFORE, SHARE_AFTER: irreversible part of the motion just before and after `EVENT`
-    - TURN_FORCE: friction force [N] at `EVENT`; NaN of a rigid point that stops
+    - TURN_FORCE: friction force [N] at `EVENT`, or NaN of a rigid point that stops
     """
 
     SLIDE = 0
@@ -86,7 +89,9 @@ class Now(IntEnum):
 
 
 class Seen(IntEnum):
-    """Columns of what is observed (c, 29) in the window of c cases; kernels get the row of one case.
+    """Columns of what is observed (c, 29) in the window of c cases.
+
+    Kernels get the row of one case.
 
     - MAX_ACCELERATION: largest magnitude of the acceleration of the output [m s-2]
     - MAX_FORCE: largest magnitude of the friction force [N]
@@ -103,7 +108,7 @@ class Seen(IntEnum):
     - FIRST_MEAN, LAST_MEAN: integrals of the slide over the first and over the last cycle [m s]
     - RANGE: sum over the cycles of the range of the slide [m]
     - SECANT, N_SECANTS: sum of the secant stiffnesses of the cycles [N/m], and their number
-    - FORCE_AT_MIN, FORCE_AT_MAX: friction force [N] at the smallest and largest slide of the cycle; NaN if unknown
+    - FORCE_AT_MIN, FORCE_AT_MAX: friction force [N] at the smallest and largest slide of the cycle, or NaN if unknown
     - START_SLIDE, START_VELOCITY: at the start of the window [m], [m/s]
     - SPAN: duration [s]
     - N_CYCLES: number of cycles

@@ -9,16 +9,16 @@ for the shear coordinates b of the pieces. These are the conditions of the minim
 
     (dq - free)^T C^-1 (dq - free)/2 + sum of the work of the points + kappa (b db + db^2/4),
 
-which Newton's method with a line search finds; it is convex unless the force of a point falls with its slide. Normal
-contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts
-half before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave
-them out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change
-of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
+which Newton's method with a line search finds. It is convex unless the force of a point falls with its slide. Normal
+contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts half
+before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave them
+out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change of db
+instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
 point at rest is released, is halved up to the last level. The constant force of a step lets a held port move and come
-back; the work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
-(rigid or tanh) would also gain energy where a port reverses and moves back in one step; such a step is halved too, so
+back. The work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
+(rigid or tanh) would also gain energy where a port reverses and moves back in one step. Such a step is halved too, so
 that no law creates energy.
 """
 
@@ -523,7 +523,7 @@ def find_step(system, level):
     ports = system.ports
     points = system.points
     n = ports.vector.size
-    # Newton's step; a second attempt replaces the slopes of forces that fall with the slide by 0
+    # Newton's step. A second attempt replaces the slopes of forces that fall with the slide by 0.
     for attempt in range(2):
         write_matrix(system, level)
         for i in range(n):
@@ -856,8 +856,8 @@ def find_event(system, drive, is_shortest):
     if not is_any_held:
         return False
 
-    # Of the points whose limit is exceeded, that with the largest ratio is released; row 2 of the state is that at the end
-    # of the trial step.
+    # Of the points whose limit is exceeded, that with the largest ratio is released. Row 2 of the state is that at the
+    # end of the trial step.
     find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
@@ -887,7 +887,7 @@ def commit(system, h):
     flank = system.flank
     count = points.port.size
 
-    # Slides and memory of the points; a port that was at rest before stays at its place.
+    # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
     for j in range(count):
         p = points.port[j]
@@ -971,7 +971,7 @@ def relax_pieces(system):
     for k in range(r):
         shear[Shear.TRIAL, k] = 0.0
 
-    # Newton's method for the increments; `gain` is the change of energy of pieces and points without slip.
+    # Newton's method for the increments. `gain` is the change of energy of pieces and points without slip.
     gain = 0.0
     for iteration in range(MAX_RELAXATIONS):
         largest = 0.0
@@ -1005,7 +1005,7 @@ def relax_pieces(system):
         for k in range(r):
             shear[Shear.TRIAL, k] -= ports.vector[k]
 
-    # Where forces fall with the slide the method may fail; the pieces then relax after a later step.
+    # Where forces fall with the slide the method may fail. The pieces then relax after a later step.
     if gain > 0.0:
         return
 
@@ -1047,7 +1047,7 @@ def commit_list(system, j, h):
         v1 = system.ports.values[Port.END_VELOCITY, points.port[j]]
         values[Point.SPEED, j] = v1
     else:
-        # Mean speeds hold in the middle of a step; a line through the last two gives the speed at the end of this one.
+        # Mean speeds hold in the middle of a step. A line through the last two gives the speed at the end of this one.
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
     if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
@@ -1192,8 +1192,8 @@ def try_step(system, level, row, begin, end, drive):
     -------
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
-        halved; then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact set
-        was found, in which case the counter `PRESENT_SLOT` is -1.
+        halved. Then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact
+        set was found, in which case the counter `PRESENT_SLOT` is -1.
     """
     points = system.points
     shear = points.shear
@@ -1385,7 +1385,7 @@ def write_sample(system, row, sample):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(system, steps, samples):
-    """March over a number of whole steps; 0 steps press the points to the normal contact of the present state.
+    """March over a number of whole steps, or press the points to the normal contact of the present state for 0 steps.
 
     Parameters
     ----------
@@ -1394,7 +1394,7 @@ def march(system, steps, samples):
     steps : int
         Number of steps.
     samples : (steps + 1, k) array
-        Samples before each step and at the end; output.
+        Samples before each step and at the end (output).
 
     Returns
     -------
@@ -1476,7 +1476,7 @@ def add_work(system, sample, first_column, part):
     ports = system.ports
     points = system.points
 
-    # Work is mean force times increment; that of a port at rest is taken back, and counts for the drive.
+    # Work is mean force times increment. That of a port at rest is taken back, and counts for the drive.
     work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:

@@ -275,10 +275,10 @@ class System(NamedTuple):
 
     - structure: modes in steps of several lengths
     - ports, points, lists: places where forces act on the modes, contact points at them, and their lists of bonds
-    - flank: grooves, see `Flank`; (0,) without grooves
+    - flank: grooves, see `Flank`, or (0,) without grooves
     - sets: contact sets of a patch
-    - state (3, 2 n): modal coordinates and velocities; row 0 at the start of a step, row 1 at its end without forces, row 2
-      at its end in the present trial
+    - state (3, 2 n): modal coordinates and velocities, with row 0 at the start of a step, row 1 at its end without
+      forces, row 2 at its end in the present trial
     - totals: energies and counts since the start, see `Total`
     - options: numbers of the march
     """

@@ -70,8 +70,8 @@ class MeanForce(NamedTuple):
     - force: mean over the path of the step [N]
     - by_increment, by_velocity: its derivatives by the increment [N/m] and by the velocity at the end [N s/m]
     - end: force at the end [N]. For a step that is long for the law "tanh" it is that at the start, as if it did not change
-    - bend: for the law "tanh", the mean force less the mean of the forces at both ends [N]; for the LuGre law, the change of
-      the elastic force [N]
+    - bend: for the law "tanh", the mean force less the mean of the forces at both ends [N], and for the LuGre law, the
+      change of the elastic force [N]
     """
 
     force: float
@@ -585,7 +585,7 @@ def slip_share(numbers, memory, j, load, velocity):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
+        Numbers of the laws of m points. Row 0 is the `Law`.
     memory : (l, m) array
         Memory of the laws of m points, a column for each.
     j : int
@@ -593,7 +593,7 @@ def slip_share(numbers, memory, j, load, velocity):
     load : float
         Normal load [N].
     velocity : float
-        Velocity [m/s]; its sign is the direction of the motion.
+        Velocity [m/s]. Its sign is the direction of the motion.
     """
     law = numbers[0, j]
     state = memory[0, j]
@@ -613,7 +613,7 @@ def slip_share(numbers, memory, j, load, velocity):
         share = abs(state) ** numbers[3, j]
         return share if direction * state > 0 else (1 - 2 * numbers[4, j]) * share
 
-    # The sliders that slip carry B - x B' of the limit, see `_first_loading`; none of them does after a reversal.
+    # The sliders that slip carry B - x B' of the limit, see `_first_loading`. None of them does after a reversal.
     if law == Law.MASING:
         if direction * memory[Masing.DIRECTION, j] < 0:
             return 0.0

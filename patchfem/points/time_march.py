@@ -1027,7 +1027,8 @@ class Record:
     - energies (3,): energies up to the last sample [J]
     - snapshots: of the last cycle
     - stride: distance of the samples of earlier cycles
-    - before: state and memory at the end of the part before the last, if both have whole cycles; else (0,)
+    - before: state and memory at the end of the part before the last, if both have whole cycles, or (0,) without such a
+      part
     """
 
     def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):

@@ -77,7 +77,10 @@ class DecayCurve(NamedTuple):
         return DecayCurve(*(column[selection] for column in self))
 
     def interpolate(self, name: str, amplitudes) -> np.ndarray:
-        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m]; NaN outside the range of the curve."""
+        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m].
+
+        The result is NaN outside the range of the curve.
+        """
         knots, indices = np.unique(np.log(self.amplitude), return_index=True)
         if not knots.size:
             return np.full(len(amplitudes), np.nan)
@@ -287,7 +290,7 @@ def fit_slopes(values, noise) -> Slopes:
     # Slopes of the least-squares lines over 2 m + 1 values and their standard deviations, one row for each span.
     count = values.size - 2
     spans = np.array([m for m in SPAN_LENGTHS if 2 * m < values.size])
-    # The last row is that of a span that exists nowhere; it follows the longest span and precedes the shortest one.
+    # The last row is that of a span that exists nowhere. It follows the longest span and precedes the shortest one.
     slopes, noises = np.full((2, spans.size + 1, count), np.nan)
     for k, m in enumerate(spans):
         offsets = np.arange(-m, m + 1)

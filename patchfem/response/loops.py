@@ -26,7 +26,7 @@ class Reversal(NamedTuple):
     """A reversal of the relative displacement.
 
     - slide: relative displacement [m]
-    - force: friction force [N]; None if it is unknown, e.g. if the interface is at rest at an end of the window
+    - force: friction force [N], or None if it is unknown, e.g. if the interface is at rest at an end of the window
     """
 
     slide: float
@@ -145,7 +145,7 @@ def _force_at_reversal(
     """Return the friction force [N] at the largest relative displacement, or None if it is unknown.
 
     `slide` (k,) [m] and `force` (k,) [N] are samples. The largest displacement `value` lies in the step after a sample,
-    at the fraction `fraction` of the step; the rule is as in `find_reversals`.
+    at the fraction `fraction` of the step. The rule is as in `find_reversals`.
     """
     if rule == "rate":
         return float(

@@ -139,7 +139,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     if slip.size < 2 or 2 * amplitude <= slip_round_off(window):
         return {"slip_amplitude": amplitude, "stick_fraction": 1.0}
 
-    # Excess of the ratio slip/displacement of each step; a step at rest counts as a step without slip.
+    # Excess of the ratio slip/displacement of each step. A step at rest counts as a step without slip.
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     last_cycles = slice(-min(slip.size, cycles * steps_per_cycle + 1), None)
     slip_steps = np.abs(np.diff(slip[last_cycles]))

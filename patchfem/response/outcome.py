@@ -124,7 +124,7 @@ def judge_outcome(
     if (is_periodic or drive.segments) and _has_drift(measures, tolerance, drift):
         outcome = Outcome.TRANSIENT if outcome is Outcome.STEADY else outcome
     if not is_periodic:
-        # A released motion grows only if a mode gains energy; under a step it may grow.
+        # A released motion grows only if a mode gains energy. Under a step it may grow.
         is_released = drive.segments and not drive.segments[-1].constant
         if outcome is Outcome.GROWS and is_released and min_decay_rate >= 0:
             outcome = Outcome.TRANSIENT

@@ -114,7 +114,7 @@ class LastCycles:
 
     @cached_property
     def acceleration_measures(self) -> Values:
-        """Harmonic measures of the acceleration as a dict; empty without a complete cycle.
+        """Harmonic measures of the acceleration as a dict, which is empty without a complete cycle.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
@@ -138,7 +138,7 @@ class LastCycles:
         )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure; None if it has none, as one of a sine under another drive."""
+        """Return the value of a measure, or None if it has none, as one of a sine under another drive."""
         if row.has("sine") and not self.is_sine:
             return None
         if isinstance(row.function, str):
@@ -202,7 +202,7 @@ def _random_rows(
     Parameters
     ----------
     name : str
-        Name of the measure; the scatter is named NAME_scatter.
+        Name of the measure. The scatter is named NAME_scatter.
     unit : str
         SI unit of both.
     floor : float
@@ -691,5 +691,8 @@ def set_final_floors(measures: Measures, tolerance: float) -> Measures:
 
 
 def find_definition(name: str) -> MeasureDefinition:
-    """Return the definition of a measure of any interface; KeyError for an unknown name."""
+    """Return the definition of a measure of any interface.
+
+    KeyError is raised for an unknown name.
+    """
     return TABLE[remove_interface_number(name)]

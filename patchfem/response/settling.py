@@ -31,7 +31,7 @@ class MotionEnds(NamedTuple):
     """How n motions under periodic drives end.
 
     - classes (n,): indices of CLASSES.
-    - steady (2, n): steady amplitudes and their errors [m]; NaN if unknown.
+    - steady (2, n): steady amplitudes and their errors [m], or NaN if unknown.
     """
 
     classes: np.ndarray
@@ -108,7 +108,7 @@ def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> 
     Returns
     -------
     (2, n) array
-        Amplitudes and their errors [m]; NaN where they are no measures.
+        Amplitudes and their errors [m], or NaN where they are no measures.
     """
     value, error = steady
     change = np.abs(value - amplitude) + error
@@ -192,7 +192,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
     Returns
     -------
     (2, n) array
-        Steady amplitudes and their errors [m]; NaN if no bounded limit can be estimated.
+        Steady amplitudes and their errors [m], or NaN if no bounded limit can be estimated.
     """
     magnitude = np.abs(phasors)
     is_moving = np.all(magnitude > 0, axis=1)
@@ -269,7 +269,7 @@ def plane_map_remainders(p) -> np.ndarray:
 
 
 class Windows(NamedTuple):
-    """Ranges of the output in successive windows, oldest first; (..., w) each.
+    """Ranges of the output in successive windows, oldest first, (..., w) each.
 
     - low, high: smallest and largest output in each window [m].
     - cycle_amplitude: mean amplitude of the cycles of each window [m].
@@ -307,7 +307,7 @@ def measure_windows(extremes, window: int) -> Windows:
     extremes : (..., c, 2)
         Smallest and largest output of each cycle [m].
     window : int
-        Number of cycles per window; an incomplete window at the start is ignored, unless it is the only one.
+        Number of cycles per window. An incomplete window at the start is ignored, unless it is the only one.
     """
     extremes = np.asarray(extremes, float)
     n_cycles = extremes.shape[-2]
@@ -377,7 +377,7 @@ def remaining_ringing(windows: Windows, decay):
     windows : Windows
         Ranges of the output.
     decay : (...)
-        Logarithmic decay of the slowest mode over a window [1]; a negative one counts as 0.
+        Logarithmic decay of the slowest mode over a window [1]. A negative one counts as 0.
     """
     change = np.abs(np.diff(windows.amplitude[..., -2:])).sum(axis=-1)
     return np.maximum(remaining_free_motion(windows, np.maximum(decay, 0.0)), change)
@@ -398,7 +398,7 @@ def beat_mean_amplitudes(windows: Windows) -> np.ndarray:
     Returns
     -------
     (2, n) array
-        Amplitudes and their errors; NaN if there is no estimate.
+        Amplitudes and their errors, or NaN if there is no estimate.
     """
     count, n_windows = windows.low.shape
     n_third = n_windows // 3

@@ -16,7 +16,7 @@ LOAD_TOL = 1e-6
 # Largest residual of the energy of a bench relative to the exchanged energy. All terms are integrated by the same rule,
 # so that the residual falls with the number of steps.
 BENCH_TOL = 0.01
-# The same of a march, whose energies differ by round-off only; a billion steps have less.
+# The same of a march, whose energies differ by round-off only. A billion steps have less.
 MARCH_TOL = 1e-8
 
 

@@ -171,7 +171,7 @@ def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
 def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
     """Return the stresses (f, k) [Pa] between coating and substrate at x (k,) [m], {} without a coating.
 
-    Compression is positive; the shear stress is that on the lower one of both along +x. `side`, "lower" or "upper", is
+    Compression is positive. The shear stress is that on the lower one of both along +x. `side`, "lower" or "upper", is
     at the end of the names of the stresses.
     """
     traction = coating_traction.compute_coating_traction(piece.cells, piece.u)

@@ -207,7 +207,9 @@ def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:
 
 
 def read_positive_values(text: str, name: str, kind: str = "length") -> list[float]:
-    """Return the values of a range ``a..b:n`` or of a list in rising order; all are above 0.
+    """Return the values of a range ``a..b:n`` or of a list in rising order.
+
+    All are above 0.
 
     Raises PatchfemError, whose message begins with `name`, for any other text.
 
@@ -364,7 +366,7 @@ class _ValueReader:
         return spread.format_values(k / (spread.count - 1) for k in range(spread.count))
 
     def parse_range(self, piece: str) -> Range | None:
-        """Parse a text `piece` as a range such as ``1..9 mm:5``; return None for any other text."""
+        """Parse a text `piece` as a range such as ``1..9 mm:5``, or return None for any other text."""
         match = _RANGE_PATTERN.fullmatch(piece) if self.is_number else None
         if match is None:
             return None
@@ -391,7 +393,7 @@ class _ValueReader:
     def check_range(self, spread: Range, form: Form) -> None:
         """Raise ValueError for a range, `spread`, in which the key cannot vary.
 
-        `form` is what the option accepts; without lists of values the range gives a lower and an upper bound.
+        `form` is what the option accepts. Without lists of values the range gives a lower and an upper bound.
         """
         if not self.takes_float:
             raise ValueError(
@@ -411,9 +413,10 @@ class _ValueReader:
 
 
 def _find_value_key(key: str, texts: Sequence[str]) -> Key:
-    """Find a key; raise ValueError, with suggestions, if it is not known or is a table without a value.
+    """Find a key.
 
-    `texts` are the values that are assigned to it, as written.
+    ValueError, with suggestions, is raised if it is not known or is a table without a value. `texts` are the values that
+    are assigned to it, as written.
     """
     first = texts[0].partition("..")[0] if texts else ""
     known = require_key(key, read_set_value("", first))
@@ -437,8 +440,8 @@ def _find_value_key(key: str, texts: Sequence[str]) -> Key:
 def _is_log(low: float, high: float, spacing: str | None) -> bool:
     """Return whether the values of a range are spaced logarithmically.
 
-    `low` and `high` are the ends, and `spacing` is the word behind the range, such as "log", or None; without it a
-    range over a large ratio is logarithmic.
+    `low` and `high` are the ends, and `spacing` is the word behind the range, such as "log", or None. Without it a range
+    over a large ratio is logarithmic.
     """
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:

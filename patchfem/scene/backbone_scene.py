@@ -17,7 +17,7 @@ from .keys.values import TomlTable
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive that a rig must have in a scene; no result of a backbone depends on it
+# Drive that a rig must have in a scene. No result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 # Names of modes that are given without names
@@ -70,10 +70,10 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Parse frequency, damping ratio and slide of a mode; raise ValueError if one has the wrong unit.
+    """Parse frequency, damping ratio and slide of a mode.
 
-    Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5"; the slide is the participation of the
-    interface.
+    ValueError is raised if one has the wrong unit. Each is a number in SI or a text, such as "120 Hz", "1 %" and "0.5".
+    The slide is the participation of the interface.
     """
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
@@ -87,7 +87,10 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
 
 
 def _parse_ratio(value) -> float:
-    """Parse a damping ratio or a slide; raise ValueError if it is not a number."""
+    """Parse a damping ratio or a slide.
+
+    ValueError is raised if it is not a number.
+    """
     try:
         return float(read_percentage(value))
     except ValueError:

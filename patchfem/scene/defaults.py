@@ -73,7 +73,7 @@ def _list_defaults(table: Table) -> dict[str, KeyValue]:
 def _list_idle_keys(table: Table) -> list[str]:
     """Return the keys of a table that have no effect because of its other keys.
 
-    Keys that a selector such as `law` leaves unused are not listed; `find_choices` finds these.
+    Keys that a selector such as `law` leaves unused are not listed. `find_choices` finds these.
     """
     if isinstance(table, tables.Friction):
         return find_unused_law_keys(table)
@@ -83,7 +83,7 @@ def _list_idle_keys(table: Table) -> list[str]:
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
     """Return a mode whose participations are filled in.
 
-    `index` counts the modes from 0; the participations of the first mode have other defaults.
+    `index` counts the modes from 0. The participations of the first mode have other defaults.
     """
     output = default_output(index) if mode.output is None else mode.output
     defaults = {

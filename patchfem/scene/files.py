@@ -31,7 +31,10 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a path is that of an existing file; one that the system does not accept is not."""
+    """Return whether a path is that of an existing file.
+
+    One that the system does not accept is not.
+    """
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -51,7 +54,10 @@ def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
 
 
 def require_files(scene: Any) -> Any:
-    """Return the scene itself; raise an error if a file that it names does not exist."""
+    """Return the scene itself.
+
+    An error is raised if a file that it names does not exist.
+    """
     absent = list_absent_files(scene, scene.path.parent)
     if absent:
         draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})

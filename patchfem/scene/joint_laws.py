@@ -109,9 +109,10 @@ def choose_law(known: str, wanted: str) -> Choice:
     wanted_words = parse_choice(wanted, WISHES, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
-        """Return the costs of the law in a row of the table; the law with the smallest tuple is chosen.
+        """Return the costs of the law in a row of the table.
 
-        They are minus the number of answered wishes, the number of missing inputs and that of assumed keys.
+        The law with the smallest tuple is chosen. They are minus the number of answered wishes, the number of missing
+        inputs and that of assumed keys.
         """
         # A friction coefficient can be taken from tables; the other inputs must be measured.
         missing = set(row.known).difference(known_words, {"coefficient"})

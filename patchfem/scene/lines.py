@@ -43,7 +43,10 @@ def split_key(key: str) -> list[str]:
 
 
 def split_assignment(text: str) -> tuple[str, str]:
-    """Split a text ``table.key=values`` into key and values; these are "" without an equals sign."""
+    """Split a text ``table.key=values`` into key and values.
+
+    These are "" without an equals sign.
+    """
     key, _, values = text.partition("=")
     return key.strip(), values.strip()
 
@@ -54,7 +57,7 @@ def list_item_names(items: Sequence[KeyValue | TomlValue]) -> list[str | None]:
 
 
 def find_item(items: Sequence[KeyValue | TomlValue], piece: str) -> int | None:
-    """Return the index of the item that `piece` of a dotted key names; None if there is none.
+    """Return the index of the item that `piece` of a dotted key names, or None if there is none.
 
     An item of an array of tables is named by its key `name`, or by its number counted from 0.
     """
@@ -203,7 +206,7 @@ def _record_header(
     lines : dict of str to int
         Lines by dotted key, which are extended.
     last_item : dict of str to int
-        Index of the last item of each array of tables, by its dotted key; it is updated.
+        Index of the last item of each array of tables, by its dotted key. It is updated.
     parts : list of str
         Names in the header, such as ["structure", "interface"].
     line : int
@@ -229,5 +232,8 @@ def _split_written_key(key: str) -> list[str]:
 
 
 def _join_path(path: str, name: str) -> str:
-    """Return the dotted key of `name` in the table `path`; the outermost table has the path ""."""
+    """Return the dotted key of `name` in the table `path`.
+
+    The outermost table has the path "".
+    """
     return f"{path}.{name}" if path else name

@@ -147,10 +147,10 @@ class PlainNumbers:
         return bool(np.all((values > 0) & (values < list(self.limits.values()))))
 
     def make_scene(self, values: Sequence, sets: Sequence[str]) -> Scene:
-        """Create a scene with given values; it is neither parsed nor checked.
+        """Create a scene with given values.
 
-        `values` [SI] are those of the keys; `are_plain` must hold for them. `sets` are the same values as
-        ``key=value`` strings.
+        It is neither parsed nor checked. `values` [SI] are those of the keys. `are_plain` must hold for them. `sets` are
+        the same values as ``key=value`` strings.
         """
         numbers = dict(zip(self.limits, values))
         if "friction.static" in numbers and self.scene.friction.kinetic is not None:

@@ -51,13 +51,13 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: TomlTable, table_key
     Parameters
     ----------
     draft : SceneDraft
-        Scene that is being read; it collects the mistakes.
+        Scene that is being read. It collects the mistakes.
     model : type of Table
         Class of the table, whose attributes are the keys.
     raw : dict
         Values of the keys as TOML has them.
     table_key : str
-        Dotted key of the table; "" for the whole scene.
+        Dotted key of the table, or "" for the whole scene.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: TomlTable, table_key
 def _read_inner(
     draft: SceneDraft, key: Key, value: TomlValue, path: str
 ) -> Table | tuple[Table, ...] | None:
-    """Read a table or an array of tables inside a table; return None after a mistake.
+    """Read a table or an array of tables inside a table, or return None after a mistake.
 
     `key` is the key of the inner table, `value` are its plain values, and `path` is its dotted key in the scene. The
     mistakes are added to the `draft`.
@@ -118,7 +118,7 @@ def _read_inner(
 def _validate_values(
     draft: SceneDraft, model: type[Table], values: TomlTable, table_key: str
 ) -> dict[str, KeyValue]:
-    """Return the valid values of a table by attribute; report the first mistake of every other key.
+    """Return the valid values of a table by attribute, and report the first mistake of every other key.
 
     `model` is the class of the table, `table_key` its dotted key, and mistakes are added to the `draft`.
     """
@@ -246,7 +246,7 @@ def _find_item(draft: SceneDraft, items: list[TomlValue], path: str) -> int | No
 
 
 def read_set_value(key: str, text: str) -> TomlValue:
-    """Parse the text of a value in a --set option as TOML; return the text if it is not valid TOML.
+    """Parse the text of a value in a --set option as TOML, and return the text if it is not valid TOML.
 
     A `key` that takes text keeps a number as text.
     """

@@ -41,7 +41,7 @@ def make_schema() -> dict[str, Any]:
 
 
 def _describe_table(model: type[Table]) -> dict[str, Any]:
-    """Return the schema of a table class, `model`: meaning and default of each key; no null."""
+    """Return the schema of a table class, `model`: meaning and default of each key, without null."""
     raw = model.model_json_schema(by_alias=True)
     properties = raw.get("properties", {})
     schema = {
@@ -80,7 +80,7 @@ def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
 def _describe_selection(model: type[Table], key: str) -> str:
     """Return which keys each value of a selector needs, or which values need a key, or "".
 
-    A selector is a key, such as `law`, whose value decides which others the table needs; `model` is the class of the
+    A selector is a key, such as `law`, whose value decides which others the table needs. `model` is the class of the
     table.
     """
     clauses = []

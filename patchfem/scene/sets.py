@@ -32,9 +32,9 @@ def format_assignments(sets: dict[str, PythonValue]) -> tuple[str, ...]:
 
 
 def format_scene(tables: dict[str, PythonValue]) -> str:
-    """Return a dict of tables as the text of a scene; raise SceneError for a value that it cannot contain.
+    """Return a dict of tables as the text of a scene.
 
-    Texts are as in a scene, numbers are in SI.
+    SceneError is raised for a value that it cannot contain. Texts are as in a scene, numbers are in SI.
     """
     return "".join(f"{name} = {write_value(str(name), table)}\n" for name, table in tables.items())
 
@@ -60,7 +60,9 @@ def format_values(key: str, values: PythonValue, separator: str = ",") -> str:
 
 
 def require_units(scene: Any, values: dict[str, PythonValue]) -> Any:
-    """Return a scene; raise SceneError if lengths were given as numbers without unit that cannot be metres.
+    """Return a scene.
+
+    SceneError is raised if lengths were given as numbers without unit that cannot be metres.
 
     Parameters
     ----------

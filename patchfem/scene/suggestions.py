@@ -21,7 +21,7 @@ from .keys.types import (
 from .keys.values import TomlTable, TomlValue
 from .lines import split_key
 
-# Rating of a table whose name is similar to an unknown key; a table that knows all keys inside has 1
+# Rating of a table whose name is similar to an unknown key. A table that knows all keys inside has 1.
 SIMILAR_NAME_RATING = 0.75
 # Rating of a table with the name of an unknown key, above all other ratings
 SAME_NAME_RATING = 2.0
@@ -36,16 +36,17 @@ class UnknownKey(NamedTuple):
 
 
 def require_key(key: str, value: TomlValue = "") -> Key:
-    """Find a dotted key, and return its description; raise ValueError if no scene has it.
+    """Find a dotted key, and return its description.
 
-    The error names the nearest known key. `Key.inner` is the class of the table at a key, None for a value.
+    ValueError is raised if no scene has it. The error names the nearest known key. `Key.inner` is the class of the table
+    at a key, or None for a value.
 
     Parameters
     ----------
     key : str
         Dotted key.
     value
-        Value that the key is given; a key that accepts it is suggested first.
+        Value that the key is given. A key that accepts it is suggested first.
     """
     known = find_key(key)
     if known is not None:
@@ -152,7 +153,7 @@ def _suggest_name(
     raw : dict
         Values of this table as TOML has them.
     table_key : str
-        Dotted key of this table; "" for the whole scene.
+        Dotted key of this table, or "" for the whole scene.
     key : str
         The unknown key.
     sets : collection of str
@@ -194,7 +195,7 @@ def _suggest_name(
 
 
 def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
-    """Return the inner table that an unknown key probably means; "" for none.
+    """Return the inner table that an unknown key probably means, or "" for none.
 
     It has the same or a similar name, or knows most of the keys inside the `value`, a table or an array of tables.
     `model` is the class of the table with the unknown key.

@@ -39,7 +39,10 @@ class ParsedText(NamedTuple):
 
 
 def read_text(path: str | Path) -> str:
-    """Return the text of the scene file `path`; raise SceneError if it cannot be read."""
+    """Return the text of the scene file `path`.
+
+    SceneError is raised if it cannot be read.
+    """
     try:
         with open_for_reading(path) as file:
             content = file.read(MAX_BYTES + 1)
@@ -67,9 +70,9 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML.
+    """Return the values of a TOML text and the lines of its keys.
 
-    `path` names the file in the message.
+    `path` names the file in the message of the SceneError that is raised if the text is not TOML.
     """
     try:
         values = tomllib.loads(text)
@@ -96,7 +99,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 
 def _advise_spelling(text: str, line: int) -> str:
-    """Return how to write the value in a `line` of a text that lacks quotes or a digit; "" for others."""
+    """Return how to write the value in a `line` of a text that lacks quotes or a digit, or "" for others."""
     match = _BARE_VALUE_PATTERN.match([*text.split("\n"), ""][line - 1])
     if match is None:
         return ""

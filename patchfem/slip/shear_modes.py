@@ -265,7 +265,10 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Yie
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of c (n, n); raise PatchfemError if c is not positive definite."""
+    """Return the lower Cholesky factor of c (n, n).
+
+    PatchfemError is raised if c is not positive definite.
+    """
     factor, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
@@ -336,7 +339,9 @@ def shear_modes(
 
 
 def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) -> ShearModes:
-    """Return all modes of the nodes that carry load; `shear_modes` selects from them.
+    """Return all modes of the nodes that carry load.
+
+    `shear_modes` selects from them.
 
     Parameters
     ----------

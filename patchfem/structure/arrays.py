@@ -119,7 +119,7 @@ def build_basis(
         If an array is missing or wrong; the message names it.
     """
 
-    # Mass and stiffness must be there; interfaces and drive must name coordinates that exist
+    # Mass and stiffness must be there. Interfaces and drive must name coordinates that exist.
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
@@ -176,7 +176,7 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
 
 
 def _to_matrix(values, name: str):
-    """Convert a single number to a matrix (1, 1); return matrices and None unchanged.
+    """Convert a single number to a matrix (1, 1), and return matrices and None unchanged.
 
     Raises PatchfemError, which names the array `name`, for other `values`.
     """

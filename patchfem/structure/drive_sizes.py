@@ -111,7 +111,7 @@ def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
     It is the largest of the acceleration over omega, the initial velocities, and the initial
     displacements times omega.
 
-    `drive` is a drive signal, and `start` the initial state, None for a start at rest.
+    `drive` is a drive signal, and `start` the initial state, or None for a start at rest.
     """
     omega = find_drive_omega(drive)
     speed = find_max_acceleration(drive) / omega

@@ -32,7 +32,7 @@ class DriveSignal(Protocol):
 
     - period: duration [s] of a cycle.
     - moving: whether the displacements are relative to a moving base.
-    - segments: pieces of constants and sines of which the signal consists; () for other signals.
+    - segments: pieces of constants and sines of which the signal consists, or () for other signals.
     """
 
     period: float
@@ -48,10 +48,10 @@ class PiecewiseDrive:
     """Drive signal that consists of successive constant and sinusoidal segments.
 
     - period: duration [s] of a cycle.
-    - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
-      as a sine need not state it.
+    - is_periodic: whether the segments repeat after each period until the run ends. A drive that ends as a sine need not
+      state it.
 
-    `segments` are the pieces in the order of time; `moving` tells whether the base moves, as for a drive by its
+    `segments` are the pieces in the order of time. `moving` tells whether the base moves, as for a drive by its
     acceleration.
     """
 

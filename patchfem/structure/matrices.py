@@ -190,7 +190,7 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) for a stiffness K [N/m].
 
     `root` is the Cholesky factor (n, n) of the mass matrix, or its diagonal (n,). The columns of the shapes are
-    eigenvectors y of L^-1 K L^-T; L^-T y is the mode shape of unit modal mass.
+    eigenvectors y of L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
     """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
@@ -206,7 +206,10 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _require_finite(per_mass) -> np.ndarray:
-    """Return the stiffness `per_mass` (n, n) [1/s2]; raise PatchfemError if it has overflowed."""
+    """Return the stiffness `per_mass` (n, n) [1/s2].
+
+    PatchfemError is raised if it has overflowed.
+    """
     if not np.isfinite(per_mass).all():
         raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
     return per_mass
@@ -249,9 +252,10 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
-    """Return a symmetric matrix as a dense array; raise PatchfemError if it is not symmetric.
+    """Return a symmetric matrix as a dense array.
 
-    `name`, such as "K", stands in the message; `shape` is that of the mass matrix, with which it must agree.
+    PatchfemError is raised if it is not symmetric. `name`, such as "K", stands in the message. `shape` is that of the
+    mass matrix, with which it must agree.
     """
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
@@ -264,9 +268,10 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
 
 
 def _project_damping_matrix(phi, C) -> np.ndarray:
-    """Project a damping matrix C [N s/m] on mode shapes phi; raise PatchfemError if C adds energy.
+    """Project a damping matrix C [N s/m] on mode shapes phi.
 
-    The columns of phi (n, n) are shapes of unit modal mass, so the result (n, n) is in 1/s.
+    PatchfemError is raised if C adds energy. The columns of phi (n, n) are shapes of unit modal mass, so the result (n,
+    n) is in 1/s.
     """
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
@@ -313,9 +318,10 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_row(row, n: int, name: str) -> np.ndarray:
-    """Check that a row of numbers has n finite real entries; `slide` may have several rows.
+    """Return a row of numbers as an array (n,), after checking that it has n finite real entries.
 
-    `name` is that of the row, such as "output", for the message.
+    A column is returned as a row. If `name`, the name of the row in the error message, is "slide", the result may have
+    several rows (k, n).
     """
     if name == "slide":
         return read_numbers(row, name, (n,), (None, n))
@@ -326,10 +332,8 @@ def _check_row(row, n: int, name: str) -> np.ndarray:
 def _find_shape_signs(phi, output) -> np.ndarray:
     """Return the sign (n,) of each mode shape that makes the output move in the positive direction.
 
-    At a node of the shape the largest entry is made positive instead.
-
-    The columns of phi (n, n) are the shapes, and `output` (n,) is the motion of the output per unit of each
-    coordinate.
+    At a node of the shape the largest entry is made positive instead. The columns of phi (n, n) are the shapes, and
+    `output` (n,) is the motion of the output per unit of each coordinate.
     """
     motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]

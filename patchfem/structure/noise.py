@@ -117,7 +117,7 @@ def _cut_spectrum(
     frequency, density : (k,) array
         Frequencies [Hz] and densities of the spectrum.
     low, high : float or None
-        Ends of the range [Hz]; None for an end of the spectrum.
+        Ends of the range [Hz], or None for an end of the spectrum.
 
     Returns
     -------

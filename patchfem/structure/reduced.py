@@ -227,8 +227,8 @@ def _compute_lowest_modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the `count` lowest modes of a structure, normalized to unit modal mass.
 
-    K (n, n) [N/m] and M [kg] are sparse; `factor` is that of K + shift M, with the shift in 1/s^2. Returns the
-    circular frequencies (m,) [rad/s] and shapes (n, m).
+    K (n, n) [N/m] and M [kg] are sparse. `factor` is that of K + shift M, with the shift in 1/s^2. Returns the circular
+    frequencies (m,) [rad/s] and shapes (n, m).
     """
     n = K.shape[0]
     count = min(count, n)
@@ -267,7 +267,7 @@ def _compute_craig_bampton_shapes(
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
 
     `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of fixed-interface modes,
-    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
+    and `load` (n,) [kg] is the load per unit acceleration of the base, or None if the base stands still.
     """
     n = K.shape[0]
     n_boundary = boundary.size
@@ -313,7 +313,7 @@ def _compute_free_interface_shapes(
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
 
     `boundary` (b,) are the indices of the coordinates that are kept, `count` is the number of free-interface modes,
-    and `load` (n,) [kg] is the load per unit acceleration of the base, None if the base stands still.
+    and `load` (n,) [kg] is the load per unit acceleration of the base, or None if the base stands still.
     """
     n = K.shape[0]
     shift = 0.0

@@ -10,8 +10,8 @@ from .profile import Profile, robust_deviation
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
 SPIKE_WINDOW = 5  # side of the square of the median
-# Singular value of the places of heights, relative to the largest one, below which it is round-off and they lie in one
-# line
+# The measured points of a scan lie in one line, which determines no plane, if the smallest singular value of their
+# coordinates (1, x, y) is below this fraction of the largest one. Such a value is round-off.
 PLACES_RANK_TOL = 1e-6
 
 
@@ -20,7 +20,7 @@ class Areal:
     """Areal scan of a surface.
 
     - x (n,), y (m,): increasing positions along rows and along columns [m].
-    - z (m, n): heights [m]; NaN where one is missing.
+    - z (m, n): heights [m], or NaN where one is missing.
     - source: name of the scan for messages.
     - notes: sentences on its treatment.
     """

@@ -32,7 +32,7 @@ class Profile:
     """Trace of a surface, which is straight between its samples.
 
     - x (n,): increasing positions [m].
-    - z (n,): heights [m]; NaN where one was not measured.
+    - z (n,): heights [m], or NaN where one was not measured.
     - source: name of the trace for messages.
     - notes: sentences on its treatment.
     """

@@ -16,8 +16,8 @@ SIDE = 1.959964  # half-width of a normal interval of LEVEL, in standard deviati
 class Quantity(NamedTuple):
     """Value of a measured quantity with interval, unit and definition.
 
-    - value: value; None if it is not known.
-    - low, high: ends of the interval of probability LEVEL; None if it is not known.
+    - value: value, or None if it is not known.
+    - low, high: ends of the interval of probability LEVEL, or None if it is not known.
     - unit: SI unit, such as "m".
     - text: definition.
     - reason: code of the reason why there is no value, or no interval.

@@ -24,7 +24,7 @@ ELEMENTS_PER_CURVE = (
 class WaveSpectrum(NamedTuple):
     """Spectrum of a trace.
 
-    - waves (n,): wavelengths [m], longest first; the first one is twice the length of the trace.
+    - waves (n,): wavelengths [m], longest first. The first one is twice the length of the trace.
     - power (n,): mean square [m2] of each wave.
     """
 

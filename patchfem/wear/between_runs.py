@@ -208,7 +208,7 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
     if not scale > 0:
         return (0.0,) * n_corners
 
-    # The unknowns are the depths at the corners; four of them lie on a plane if the sums over the diagonals are equal.
+    # The unknowns are the depths at the corners. Four of them lie on a plane if the sums over the diagonals are equal.
     plane = linprog(
         np.full(n_corners, -1 / n_corners),
         weights,
@@ -220,7 +220,7 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
 
 
 def _weigh_ends(positions) -> np.ndarray:
-    """Return the weights (k, 2) of both ends in a linear interpolation to positions (k,); (1, 1) without two of them."""
+    """Return the weights (k, 2) of both ends in a linear interpolation to positions (k,), or (1, 1) without two of them."""
     if positions is None or len(positions) == 1:
         return np.ones((1, 1))
     fraction = (positions - positions[0]) / (positions[-1] - positions[0])

@@ -86,7 +86,7 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
     problem : WearProblem
         Contact, slip path and wear law.
     depth : (m,) array, optional
-        Depth [m] that was worn before; by default, none.
+        Depth [m] that was worn before, by default none.
 
     Returns
     -------

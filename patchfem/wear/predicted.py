@@ -266,7 +266,7 @@ def _suspect_units(ratio: float, axis: str) -> str:
 def _require_similar(width: float | None, bins: Bins, history: WearHistory, best: Place) -> None:
     """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run.
 
-    `width` is that of the measured track, None without one, and `bins` have the measured depth. `history` is the
+    `width` is that of the measured track, or None without one, and `bins` have the measured depth. `history` is the
     computed depth over the cycles, and `best` its fitted place.
     """
     if not history.work[1] <= best.ratio <= MAX_COEFFICIENT_RATIO:

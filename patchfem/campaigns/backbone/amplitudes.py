@@ -83,7 +83,7 @@ def _max_amplitude(joint: JointMode) -> float:
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
-    """Return the curve of a joint by the first method that has one, without errors; None without one.
+    """Return the curve of a joint by the first method that has one, without errors, or None without one.
 
     `amplitudes` (k,) [m] are those at the output. The methods are harmonic balance with few harmonics, then
     quasi-static loops.

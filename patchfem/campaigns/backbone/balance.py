@@ -328,8 +328,8 @@ def _sustain_linear_motion(
 
     Both are None if the mode does not oscillate, or if no such motion of the mode is found. excitation: E (n, n).
 
-    E is the distribution of a negative damping that sustains the motion of the mode of the `joint`; D and Omega are
-    the damping matrix and the natural frequencies.
+    E is the distribution of a negative damping that sustains the motion of the mode of the `joint`. D and Omega are the
+    damping matrix and the natural frequencies.
     """
     rate = 0.0
     for _ in range(N_LINEAR_STEPS):

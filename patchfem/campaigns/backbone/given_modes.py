@@ -105,9 +105,10 @@ def _attach_stiffer_rig(model: Model, stiffer_rig) -> Model:
 
 
 def _find_sticking_stiffness(model: Model) -> tuple[float, float] | tuple[None, None]:
-    """Return the stiffness [N/m] of the sticking contact of a model, and the same with its error added.
+    """Return the stiffness [N/m] of the sticking contact of a model, and its upper bound.
 
-    Both are None if the contact is rigid, or if there is not exactly one interface.
+    The upper bound is the stiffness plus its error, which only a patch has. Both are None if the contact is rigid, if
+    its stiffness cannot be computed, or if there is not exactly one interface.
     """
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
@@ -125,9 +126,10 @@ def _find_sticking_stiffness(model: Model) -> tuple[float, float] | tuple[None, 
 def _assume_slides(
     modes: tuple[GivenMode, ...], stiffness_per_mass: float
 ) -> tuple[GivenMode, ...]:
-    """Return the modes; a missing `slide` is set according to the assumed joint stiffness.
+    """Return the modes, with a `slide` for those that were given without it.
 
-    `stiffness_per_mass` [1/s2] is the stiffness of the sticking contact divided by the modal mass.
+    It follows from the assumed contribution of the joint to the stiffness of the mode. `stiffness_per_mass` [1/s2] is
+    the stiffness of the sticking contact divided by the modal mass.
     """
     fraction = _assumed_fraction(len(modes))
     completed = []
@@ -150,7 +152,7 @@ def _note_modes(
 ) -> tuple[str, ...]:
     """Return notes on modes that are not given in the scene.
 
-    The modes stand for a scene without mode if `is_assumed`, else they were given beside it; `is_stuck` tells whether
+    The modes stand for a scene without mode if `is_assumed`, else they were given beside it. `is_stuck` tells whether
     their frequencies are those with a stuck contact.
     """
     names = ", ".join(_describe_mode(mode) for mode in modes)

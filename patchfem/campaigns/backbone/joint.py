@@ -36,7 +36,7 @@ NO_CLOSED_FORM = (
 class StuckMode(NamedTuple):
     """Structural mode with its contact stuck.
 
-    - omega: circular frequency [rad/s]; None if nothing is elastic.
+    - omega: circular frequency [rad/s], or None if nothing is elastic.
     - shape (n,): modal coordinates of the mode.
     """
 
@@ -362,7 +362,10 @@ def _check_mode(joint: JointMode) -> None:
 
 
 def _find_mode(rig, name: str) -> int:
-    """Return the index of the coordinate of the mode `name` of a rig; "" is the first mode."""
+    """Return the index of the coordinate of the mode `name` of a rig.
+
+    "" is the first mode.
+    """
     modes = rig.modes
     names = list(rig.modes.names)
     count = modes.omega.size

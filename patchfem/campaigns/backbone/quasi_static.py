@@ -23,7 +23,7 @@ MIN_FLOOR = 1e-10
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
     """Compute the quasi-static backbone of the mode of a joint at amplitudes (k,) [m].
 
-    It follows from the steady friction loops of the contact; loops without a closed form are computed on a bench, that
+    It follows from the steady friction loops of the contact. Loops without a closed form are computed on a bench, that
     is, under a prescribed slide. Raises NotConverged or PatchfemError if there is no curve.
     """
     if joint.is_linear:

@@ -111,10 +111,10 @@ class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a sticking contact.
 
     - free: frequency without the contact.
-    - stuck: frequency with a sticking contact; None without a motion or without friction.
-    - stuck_error: error of `stuck`; None if it is not known.
+    - stuck: frequency with a sticking contact, or None without a motion or without friction.
+    - stuck_error: error of `stuck`, or None if it is not known.
     - free_error: error of `free` due to a joint that was subtracted from the modes.
-    - reason: why there is no `stuck`; "" if there is one.
+    - reason: why there is no `stuck`, or "" if there is one.
     """
 
     free: float

@@ -41,7 +41,7 @@ class BackboneRequest(NamedTuple):
 class BackboneCases(NamedTuple):
     """Backbones of a scene for the values of a key, or a single one.
 
-    - axis: the key with its values; None for a single backbone.
+    - axis: the key with its values, or None for a single backbone.
     - backbones: a backbone for each value.
     - source: source of the first one.
     """

@@ -366,7 +366,7 @@ def fit_curve(
         again = curves.solve(measured, method, start=first.values)
         first = again.count_earlier_search(first)
 
-    # The search by the reference method begins at this result; the other method takes its place where it has no curve
+    # The search by the reference method begins at this result. The other method takes its place where it has no curve.
     reference = METHODS[0]
     try:
         fit = curves.solve(measured, reference, kind="series", start=first.values)

@@ -171,7 +171,7 @@ class BenchModel:
     def measure_step_error(self, values: np.ndarray) -> float:
         """Return the largest change of the computed reading when the time steps are halved.
 
-        `values` (n,) are those of the free keys; the change is 0 if the steps have no effect.
+        `values` (n,) are those of the free keys. The change is 0 if the steps have no effect.
         """
         if self.is_exact:
             return 0.0

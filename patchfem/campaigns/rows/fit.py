@@ -125,7 +125,7 @@ def fit_rows(
         If all descents of a search fail.
     """
 
-    # Measured readings; some rows are held out, and groups of the others are left out in turn
+    # Measured readings. Some rows are held out, and groups of the others are left out in turn.
     cells = read_response_table(measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:

@@ -53,7 +53,7 @@ class ModelReadings:
     def predict(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
         """Predict the readings (2, c) for values of the free keys with motions that start from rest.
 
-        `conditions` are the indices of those that are computed; others are NaN.
+        `conditions` are the indices of those that are computed, and the others are NaN.
         """
         self.reset_motions()
         return self(values, conditions)
@@ -61,7 +61,8 @@ class ModelReadings:
     def __call__(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
         """Return acceleration [m s-2] and displacement [m] readings (2, c) for values of the free keys.
 
-        `conditions` are the indices of those that are computed; others are NaN. Readings of the last values are kept.
+        `conditions` are the indices of those that are computed, and the others are NaN. Readings of the last values are
+        kept.
         """
         # the gains do not change the motion
         key_values = tuple(float(values[k]) for k in self.models.model_parameters)

@@ -183,8 +183,8 @@ class SweepScene:
 class _SweepBase(NamedTuple):
     """Base from which the scenes and models of all cases of a sweep are derived.
 
-    - scene: the scene; None if it is invalid without the values of a case.
-    - models: base models by the swept keys; None if no models can be derived from them.
+    - scene: the scene, or None if it is invalid without the values of a case.
+    - models: base models by the swept keys, or None if no models can be derived from them.
     """
 
     scene: BaseScene | None

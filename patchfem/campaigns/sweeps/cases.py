@@ -145,7 +145,7 @@ class Cases:
 def _describe_values(axis: Axis, folder: Path) -> list[str]:
     """Return key and value as JSON for each value of a swept key, an axis.
 
-    A value that names files has their hashes; the names are relative to the folder.
+    A value that names files has their hashes. The names are relative to the folder.
     """
     texts = []
     for value in axis.values:
@@ -170,9 +170,9 @@ def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
 
 
 def combine_cases(parts: Sequence[Cases]) -> Cases:
-    """Return the Cartesian product of several sets of cases, `parts`; the last one varies fastest.
+    """Return the Cartesian product of several sets of cases, `parts`.
 
-    The result is a table if one of the sets is a table.
+    The last one varies fastest. The result is a table if one of the sets is a table.
     """
     if len(parts) == 1:
         return parts[0]

@@ -24,8 +24,8 @@ class MeasureRange(NamedTuple):
     low_case, high_case : int
         Indices of the cases with the smallest and the largest value.
     relative : float
-        Difference of both values over |value of case 0|, or over the larger magnitude of both if case 0 does
-        not count; infinite if this reference does not exceed the error floor of case 0.
+        Difference of both values over |value of case 0|, or over the larger magnitude of both if case 0 does not count,
+        or infinite if this reference does not exceed the error floor of case 0.
     """
 
     measure: str
@@ -63,7 +63,10 @@ class SweepAnalysis:
 
 
 def analyse(table: SweepTable) -> SweepAnalysis:
-    """Analyse the table of results of a sweep; a single settled case has no range and no limit."""
+    """Analyse the table of results of a sweep.
+
+    A single settled case has no range and no limit.
+    """
     ranges = []
     is_comparable = np.count_nonzero(table.has_settled) != 1
     for name in MAIN_MEASURES if is_comparable else ():
@@ -81,7 +84,7 @@ def analyse(table: SweepTable) -> SweepAnalysis:
 
 
 def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
-    """Return the range of the measure `name` in a table; [] if it varies no more than its errors."""
+    """Return the range of the measure `name` in a table, or [] if it varies no more than its errors."""
     values = table.select_trusted(name)
     if not np.isfinite(values).any():
         return []

@@ -104,7 +104,7 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
 
 
 def _choose_axis(table: SweepTable) -> int | None:
-    """Return the index of the numerical key with the most values in a table; None if there is none.
+    """Return the index of the numerical key with the most values in a table, or None if there is none.
 
     The cases must be a grid, and the key must be one that can have a limit.
     """

@@ -13,7 +13,7 @@ from scipy.interpolate import PPoly, make_interp_spline
 from .sweep_table import SweepTable
 
 FREQUENCY_KEY = "drive.frequency"
-# Measures in which a resonance peak is sought; the first one that a sweep has is used
+# Measures in which a resonance peak is sought. The first one that a sweep has is used.
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
 DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating curves

@@ -37,7 +37,7 @@ SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
 N_FOLDS = 3  # parts of the cases, each of which checks a surface through the others
 MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
 MIN_EXPLAINED = 0.5  # fraction of the variance of the other half that a usable surface explains
-# Smallest fraction of cases with a value; the others may be no random sample.
+# Smallest fraction of cases with a value. The others may be no random sample.
 MIN_KNOWN_FRACTION = 0.9
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
@@ -154,7 +154,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
-        """Return the response surface through some of the cases; with smoothing it may miss them."""
+        """Return the response surface through some of the cases, or near them with smoothing."""
         return RBFInterpolator(
             coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
         )

@@ -213,7 +213,7 @@ class ChunkQueue:
         return [self.remaining.popleft() for _ in range(size)]
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
-        """Record that the worker of a chunk died; return the cases to abandon.
+        """Record that the worker of a chunk died, and return the cases to abandon.
 
         `numbers` are those of the chunk. A chunk of several cases is queued to be repeated case by case.
         """

@@ -79,7 +79,10 @@ class MeasureColumn:
 
     @classmethod
     def blank(cls, unit: str, count: int) -> "MeasureColumn":
-        """Return the column of `count` cases without a value; the unit is that of the measure."""
+        """Return the column of `count` cases without a value.
+
+        The unit is that of the measure.
+        """
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
 
@@ -158,7 +161,10 @@ class SweepTable:
         return np.isin(self.outcome.astype(str), FINAL_OUTCOMES)
 
     def insert(self, numbers: Sequence[int], part: CaseResults) -> None:
-        """Store the results of the cases with these numbers; `part` has them in the same order."""
+        """Store the results of the cases with these numbers.
+
+        `part` has them in the same order.
+        """
         numbers = np.asarray(numbers, int)
         self.outcome[numbers] = part.outcome
         for name, unit in part.units.items():
@@ -172,7 +178,7 @@ class SweepTable:
         self.faults.update(dict.fromkeys(part.faults))
 
     def select_trusted(self, name: str) -> np.ndarray:
-        """Return the values (n,) of the measure `name` that count for statements on it; NaN for others.
+        """Return the values (n,) of the measure `name` that count for statements on it, or NaN for others.
 
         A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. The
         case need not have settled if no settled case has a value, or if the measure is a steady estimate.

@@ -87,8 +87,8 @@ class PointCompliance:
             After `max_iterations` steps.
         """
 
-        # Conjugate gradients; the inverse of the compliance without contact edges (by cosine transforms) is the
-        # preconditioner
+        # Conjugate gradients. The inverse of the compliance without contact edges (by cosine transforms) is the
+        # preconditioner.
         residual = np.where(active, motion, 0.0)
         tolerance = EQUATION_TOL * np.abs(residual).max()
         force = np.zeros(residual.size)

@@ -58,7 +58,7 @@ class FreeEquations(NamedTuple):
 
     - residual: (N,) [m]
     - jacobian: (N, N) derivatives by the unknowns
-    - motion: the motion that the unknowns describe; None if omega is not positive
+    - motion: the motion that the unknowns describe, or None if omega is not positive
     """
 
     residual: np.ndarray
@@ -218,7 +218,7 @@ class FreeBalance:
         NotConverged
             If there is no motion near x.
         """
-        # Slides and residuals in units of the amplitude; frequency and damping ratio have the size 1
+        # Slides and residuals in units of the amplitude. Frequency and damping ratio have the size 1.
         size = abs(x[-1])
         unit = np.full(x.size, size)
         unit[-3:-1] = 1.0
@@ -234,11 +234,11 @@ class FreeBalance:
             Parameters
             ----------
             equations : FreeEquations
-                Scaled equations before the step; unused.
+                Scaled equations before the step (unused).
             residual : (N,) array
                 Their linearised residual after it [1].
             size : float
-                Norm of the unknowns; unused, because the residual is scaled.
+                Norm of the unknowns. It is not used, because the residual is scaled.
             """
             return float(np.linalg.norm(residual)) < MAX_RESIDUAL
 
@@ -274,7 +274,7 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
-            # First guess: slides and amplitude in proportion to the target; frequency and damping ratio stay.
+            # First guess: slides and amplitude in proportion to the target. Frequency and damping ratio stay.
             scaled = x * (targets[-1] / start)
             scaled[-3:-1] = x[-3:-1]
             try:

@@ -3,8 +3,8 @@
 from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 
-# Ratio of the stretch to its limit above which an element slips; one that sticks since the largest slide returns to its
-# limit there but for round-off.
+# Ratio of the stretch to its limit above which an element slips. An element that sticks since the largest slide
+# returns to its limit there but for round-off.
 SLIP_RATIO = 1 + 1e-12
 
 
@@ -12,8 +12,8 @@ SLIP_RATIO = 1 + 1e-12
 def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
     """Add the forces of elements along a cycle, from its largest slide on, and their derivatives.
 
-    An element sticks at q - offset, where its offset is the slide at which it is unstretched. While it slips it takes the
-    offset along; at a reversal it sticks, so that its force then depends on the slide there.
+    An element sticks at q - offset, where its offset is the slide at which it is unstretched. While it slips it takes
+    the offset along. At a reversal it sticks, so that its force then depends on the slide there.
 
     Parameters
     ----------
@@ -26,8 +26,8 @@ def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
     first : int
         Node of the largest slide, to which the elements are loaded from 0.
     out : (3 + r, M) array
-        Force [N], stretch times limit [N m], stiffness [N/m], and derivatives by the slides at the r reversals [N/m]; the
-        values of the elements are added.
+        Force [N], stretch times limit [N m], stiffness [N/m], and derivatives by the slides at the r reversals [N/m].
+        The values of the elements are added.
     """
     n = q.size
     for k, limit in zip(stiffness, limit_slide):
@@ -43,7 +43,7 @@ def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
                 stretch = limit if stretch > 0 else -limit
                 offset = q[i] - stretch
                 reversal = reversal_of_node[i]
-            # The first node is the last one too; it belongs to the cycle once the cycle is closed.
+            # The first node is the last one too. It belongs to the cycle once the cycle is closed.
             if step == 0:
                 continue
 

@@ -13,7 +13,7 @@ from .slides import Slides, make_slides
 
 # Largest range of slip at which bonds count as sticking, in bond lengths.
 STUCK_SLIDE_RATIO = 1e-3
-# Largest magnitude of a multiplier of a stable motion; above 1, because the multipliers are those of differences.
+# Largest magnitude of a multiplier of a stable motion. It is above 1, because the multipliers are those of differences.
 MAX_STABLE_MULTIPLIER = 1 + 1e-5
 
 
@@ -27,7 +27,7 @@ class SteadyMotion:
     - samples: samples per cycle
     - error: relative error of the motion
     - iterations: number of Newton steps
-    - multipliers: Floquet multipliers in decreasing magnitude; None until they are computed
+    - multipliers: Floquet multipliers in decreasing magnitude, or None until they are computed
     """
 
     omega: float

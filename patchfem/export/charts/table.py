@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Chart of an answer; several names in a string are separated by spaces.
+    """Chart of an answer.
+
+    Several names in a string are separated by spaces.
 
     Attributes
     ----------
@@ -27,7 +29,7 @@ class Chart:
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
-        Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values, also for the other axis of "x auto".
+        Logarithmic axes: "", "x", "y" or "xy". "auto" decides by the values, also for the other axis of "x auto".
     by : str
         Variable of codes that colour the points.
     marks : str
@@ -35,9 +37,9 @@ class Chart:
     lines : str
         Further variables of the vertical axis, drawn as lines beside points.
     x_label, y_label : str
-        Names of the axes; "" for the name of the variable, "*" for its description.
+        Names of the axes, or "" for the name of the variable, "*" for its description.
     caption : str
-        Sentence below the chart; "" for none.
+        Sentence below the chart, or "" for none.
     """
 
     title: str
@@ -72,7 +74,8 @@ class Column(NamedTuple):
 def parse_columns(line: str) -> list[Column]:
     """Return the columns of a heading line such as "x, height = before, at = value:quantity".
 
-    Each part is NAME, HEADING = NAME or HEADING = NAME:STYLE, as the fields of `Column`; without a heading the name is used.
+    Each part is NAME, HEADING = NAME or HEADING = NAME:STYLE, as the fields of `Column`. Without a heading the name is
+    used.
     """
     columns = []
     for part in line.split(", "):
@@ -86,8 +89,8 @@ class CsvFile(NamedTuple):
     """CSV file of an answer.
 
     - source: its rows (`columns.list_rows`).
-    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS; "" for all columns of the
-      rows, and `labels` for the texts of an object, each of which has a column.
+    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS, or "" for all columns of
+      the rows, and `labels` for the texts of an object, each of which has a column.
     - has_intervals: whether the columns NAME, NAME_low and NAME_high of all quantities of the rows follow.
     """
 
@@ -101,7 +104,7 @@ class Table(NamedTuple):
 
     - title: heading.
     - source: its rows (`columns.list_rows`).
-    - columns: heading line (`parse_columns`); the heading "*" is the description of the variable.
+    - columns: heading line (`parse_columns`). The heading "*" is the description of the variable.
     """
 
     title: str

@@ -151,7 +151,10 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
 
 
 def create_folder(folder: Path) -> None:
-    """Create the folder of an output file; Missing if it cannot be created."""
+    """Create the folder of an output file.
+
+    Missing is raised if it cannot be created.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

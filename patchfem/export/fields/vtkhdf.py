@@ -45,7 +45,7 @@ def write_fields(result, path: Path) -> None:
     Parameters
     ----------
     result : Result
-        Result of a run; notes on yielding are added to it.
+        Result of a run. Notes on yielding are added to it.
     path : Path
         File to write.
     """
@@ -173,7 +173,10 @@ def find_fields(folder: Path) -> Path:
 
 
 def read_frames(path: Path) -> Frames:
-    """Read a file of fields; PatchfemError if it is damaged, or was written by an older version."""
+    """Read a file of fields.
+
+    PatchfemError is raised if it is damaged, or was written by an older version.
+    """
     try:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]

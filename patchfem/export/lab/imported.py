@@ -126,7 +126,7 @@ def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
 
 
 def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict[str, object]:
-    """Write measured records as a table.
+    """Write the histories of a laboratory file as a table, one row per sample, in SI units.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     out : Path
         Table to write.
     requests : iterable of str
-        Channels that are asked for, such as "force=Load cell [lbf]"; without any, those that the file states.
+        Requested channels, such as "force=Load cell [lbf]", or without any, those that the file states.
     zero : bool
         Whether time and displacements are shifted to start at 0.
 
@@ -165,7 +165,7 @@ def _write_decay(
     out : Path
         Table to write.
     begin : float or None
-        Time at which the decay begins [s]; None: it is found.
+        Time at which the decay begins [s]. It is found if this is None.
     notes : list of str
         Notes on the records.
     """
@@ -211,7 +211,10 @@ def _write_modes(
 
 
 def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
-    """Return the tables [structure] and [[structure.mode]] of a scene as text; `source` is the name of the measured file."""
+    """Return the tables [structure] and [[structure.mode]] of a scene as text.
+
+    `source` is the name of the measured file.
+    """
 
     def printable(text: str) -> str:
         """Return a text as one line for a comment."""
@@ -238,7 +241,10 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
 
 
 def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
-    """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
+    """Return measured records by quantity with notes.
+
+    PatchfemError is raised if none of them is a response.
+    """
     file_records = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS
     if file_records.channel_list and not file_records.values.keys() & responses.keys():

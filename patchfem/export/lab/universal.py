@@ -39,7 +39,7 @@ class Column(NamedTuple):
     - name: name of the quantity.
     - unit: unit as in netCDF, such as "m s-2".
     - values (k,): one value for each row.
-    - number: number of the interface or mode, from 1; 0 if there is only one.
+    - number: number of the interface or mode, from 1, or 0 if there is only one.
     """
 
     name: str
@@ -132,7 +132,10 @@ def write_histories(
 
 
 def write_datasets(path: Path, datasets: list[dict]) -> None:
-    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts; Missing without pyuff."""
+    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts.
+
+    Missing is raised if pyuff is not installed.
+    """
     try:
         import pyuff
     except ImportError:

@@ -170,7 +170,7 @@ def build(
     values = values | {name_in_track(name): value for name, value in track.items()}
     shown = {name: one for name, one in values.items() if name not in SHOWN_ELSEWHERE}
 
-    # Head of compare.json: the verdict and all quantities; `details` follow
+    # Head of compare.json: the verdict and all quantities. `details` follow.
     content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],

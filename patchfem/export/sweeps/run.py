@@ -274,7 +274,9 @@ def compute_in_memory(
 def collect_shards(
     sweep_scene: SweepScene, cases: Cases, target: Path, page: bool = True
 ) -> Answer:
-    """Write all tables of a sweep whose shards are complete, from its folder; Missing if cases have no result yet.
+    """Write all tables of a sweep whose shards are complete, from its folder.
+
+    Missing is raised if cases have no result yet.
 
     Parameters
     ----------

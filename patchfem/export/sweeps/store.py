@@ -24,7 +24,9 @@ TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
-    """Write the results of cases into a file of a folder, and return this file; WriteError without space.
+    """Write the results of cases into a file of a folder, and return this file.
+
+    WriteError is raised if the disk has no space.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ def _label(name: str) -> str:
 
 
 def _format_measure(name: str, unit: str, value: float) -> str:
-    """Return a value of a measure, given in SI units, with its unit; 0 has none."""
+    """Return a value of a measure, given in SI units, with its unit, which 0 does not need."""
     return format_value(value, unit, name=name) if value else "0"
 
 

@@ -286,9 +286,10 @@ def divide(path, eps, growth, law):
     covered = -expm1(-min(x, cutoff) / AGE_PER_WIDTH)
     count = AGE_PER_WIDTH / MAX_STRIP_LENGTH * covered
 
-    # Growing bonds also need strips so short that the growth J in each stays small. Bonds that form on an increment carry
-    # about (path/eps_0)^(1 + min(p, 0)) of the friction limit; the exponent is below 1 for p < 0, as young bonds then carry
-    # more. The error of n strips is at most this over n^4, so that never more than (limit/NEW_BOND_TOL)^0.25 are needed.
+    # Growing bonds also need strips so short that the growth J in each stays small. Bonds that form on an increment
+    # carry about (path/eps_0)^(1 + min(p, 0)) of the friction limit. The exponent is below 1 for p < 0, as young bonds
+    # then carry more. The error of n strips is at most this over n^4, so that never more than (limit/NEW_BOND_TOL)^0.25
+    # are needed.
     if form == FORM_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
         min_count = (limit / NEW_BOND_TOL) ** 0.25

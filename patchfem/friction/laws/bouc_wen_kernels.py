@@ -22,7 +22,9 @@ SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
 
 
 class BoucWenNumber(IntEnum):
-    """Indices of the parameters of the law; index 0 is reserved for the engines.
+    """Indices of the parameters of the law.
+
+    Index 0 is reserved for the engines.
 
     - LIMIT: friction limit mu N [N]
     - LENGTH: length eps [m]
@@ -61,7 +63,7 @@ def _find_rate(y, power, unloading):
 def _saturate(distance, power, path):
     """Return the distance e of y from 1 after a path in lengths, and its mean over the path.
 
-    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2. `distance`
+    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation. It is exact for n = 1 and 2. `distance`
     is e at the start, which is not negative, `power` the exponent n, and `path` is x in lengths eps.
     """
     bend = 0.5 * (power - 1)

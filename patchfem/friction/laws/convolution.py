@@ -62,7 +62,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     nodes : (m,) array
         Positions of the nodes [m], increasing.
     is_bare : (m - 1,) array of bool
-        Segments between two nodes that have no pressure; nothing is averaged beyond them.
+        Segments between two nodes that have no pressure. Nothing is averaged beyond them.
     length : float
         Bond length eps [m].
     order : float

@@ -18,7 +18,9 @@ MIN_LIMIT_RATIO = 1e-9
 
 
 class LuGreNumber(IntEnum):
-    """Indices of the parameters of the law; index 0 is reserved for the engines.
+    """Indices of the parameters of the law.
+
+    Index 0 is reserved for the engines.
 
     - STIFFNESS: stiffness [N/m]
     - KINETIC, STATIC: kinetic and static friction force [N]

@@ -107,7 +107,7 @@ def _solve_group(
     Parameters
     ----------
     group : hashable or None
-        What the cases have in common; None for cases that must be run one by one.
+        What the cases have in common, or None for cases that must be run one by one.
     models : sequence of Model
         Models of the cases.
     solve_one_by_one : callable

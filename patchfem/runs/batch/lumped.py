@@ -56,8 +56,8 @@ from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements, solve_in_parts
 
 ENGINE = "points"  # name of the engine in the settings of a case
-# Steps per cycle of successive marches; no two of them have a step in common, whose error would not show in their
-# difference
+# Steps per cycle of successive marches. No two of them have a step in common, whose error would not show in their
+# difference.
 STEPS = (20, 34, 54, 86, 138, 222, 354, 566, 906)
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run

@@ -19,7 +19,7 @@ def _import_averaged_law():
 
 
 def find_tractions(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
-    """Return the averaged pressure (m,) [Pa] at the loaded nodes of the upper piece; 0 at open nodes.
+    """Return the averaged pressure (m,) [Pa] at the loaded nodes of the upper piece, or 0 at open nodes.
 
     The law averages the pressure over the part of the surface that the node has just passed, that is, behind it in the
     direction of the motion.

@@ -154,7 +154,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
         "power": np.abs(np.diff(work)).sum(),
         "peak_stored": np.abs(stored).max(),
     }
-    # The slip is that of the last cycle; all other measures are those of the whole run.
+    # The slip is that of the last cycle. All other measures are those of the whole run.
     return {
         "normal_load": float(model.point.load if model.load_varies else load[0]),
         "friction_force_peak": float(np.abs(force).max()),

@@ -215,7 +215,7 @@ class BenchSizes(NamedTuple):
     """Sizes of a bench run.
 
     - engine: name of the engine.
-    - unknowns: {"bond_list_about": expected number of strips of a list of bonds}; {} without a list.
+    - unknowns: {"bond_list_about": expected number of strips of a list of bonds}, or {} without a list.
     - samples: number of samples that the run and its comparison runs keep.
     """
 

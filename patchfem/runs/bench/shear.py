@@ -82,7 +82,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
     pieces. The shear modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so
-    that nodes that are open at first also count; with m modes they are exact for any weights.
+    that nodes that are open at first also count. With m modes they are exact for any weights.
 
     Parameters
     ----------
@@ -95,9 +95,9 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     row : (n,) array
         Slide per modal coordinate.
     bond_sum
-        How the bonds of a law with bonds are summed; None for other laws.
+        How the bonds of a law with bonds are summed, or None for other laws.
     n_modes : int or None
-        Number of shear modes; None: it follows from the tolerance.
+        Number of shear modes. It follows from the tolerance if this is None.
     """
     weight = patch.pieces.interface.weight
     force = patch.pressure.sigma_n * weight

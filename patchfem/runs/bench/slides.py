@@ -114,7 +114,7 @@ def follow_path(task: SlideTask) -> SlideHistories:
 def _follow_without_memory(task: SlideTask) -> SlideHistories:
     """Compute the histories of a law without memory from the force and the loss of each step.
 
-    The work of lifting the load on the flanks of grooves is stored energy; the friction work is dissipated.
+    The work of lifting the load on the flanks of grooves is stored energy. The friction work is dissipated.
     """
     model = task.model
     slide = task.slide

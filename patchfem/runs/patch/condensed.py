@@ -162,7 +162,7 @@ def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
     patch_model : PatchModel
         Patch whose materials, width and coatings the pieces have.
     grid, upper_grid : TensorGrid or PieceMesh
-        Meshes of the lower and the upper piece; the upper one is None if the pieces are identical.
+        Meshes of the lower and the upper piece. The upper one is None if the pieces are identical.
     """
 
     def make() -> CondensedPair:

@@ -312,13 +312,13 @@ def _make_edge_bands(edge_positions: list[tuple[float, ...]], min_cell: float) -
 
 
 def _min_coating_thickness(patch_model) -> float:
-    """Return the thickness [m] of the thinner coating; inf without a coating."""
+    """Return the thickness [m] of the thinner coating, or inf without a coating."""
     thicknesses = (piece.thickness for piece in patch_model.pieces.both)
     return min(filter(None, thicknesses), default=np.inf)
 
 
 def find_contact_extent(patch: Patch) -> ContactExtent:
-    """Return the contact region of a patch on a coarse grid; without contact, the cells around its smallest gap.
+    """Return the contact region of a patch on a coarse grid, or without contact the cells around its smallest gap.
 
     A smooth asperity layer carries pressure everywhere, so that only pressures above a thousandth
     of the peak count.

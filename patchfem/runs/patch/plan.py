@@ -30,7 +30,7 @@ StiffnessChain = dict[str, float | str]
 def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshes.Mesh | None]":
     """Return the meshes of the pieces on the expected finest level.
 
-    A mesh file is not read; an automatic mesh takes its place. `tolerance` is the relative error that the static
+    A mesh file is not read. An automatic mesh takes its place. `tolerance` is the relative error that the static
     measures have to meet.
     """
     if patch_model.mesh.shared is not None:

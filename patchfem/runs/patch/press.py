@@ -256,7 +256,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     weight_shift = bare_fraction * edges.edge_offset(cell, cell, 0.0, pair.row) / cell
 
     # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
-    # node takes the worn depth of its neighbour there; on the lower side likewise.
+    # node takes the worn depth of its neighbour there, and on the lower side likewise.
     higher = node + 1
     lower = node - 1
     if unworn_gap[lower] < unworn_gap[higher]:
@@ -305,7 +305,7 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
         state.residuals,
     )
 
-    # Without strips, the layer can be part of the compliance; without a tangential ratio it is rigid in shear.
+    # Without strips, the layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
     pieces = pair.compliance
     layer_shear = 0.0
     if skin is not None and interface.strips is None:

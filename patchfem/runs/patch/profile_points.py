@@ -101,7 +101,7 @@ class PointForces(NamedTuple):
 
     - force (n,): nodal forces [N].
     - load, moment: sum [N] and moment [N m] of the forces.
-    - approach, rotation: [m] and [rad]; the rotation includes that of the gap.
+    - approach, rotation: [m] and [rad]. The rotation includes that of the gap.
     - n_iterations: iterations of the solver.
     """
 
@@ -148,7 +148,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     solution = None
     with use_one_blas_thread():
         try:
-            # Finer compliances of the free ends on the coarsest points; then the last of them on more and more points
+            # Finer compliances of the free ends on the coarsest points, then the last of them on more and more points
             ends = [_compute_free_end_compliance(patch_model, level) for level in range(MIN_LEVELS)]
             end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
             point_levels = end_levels[-1:]

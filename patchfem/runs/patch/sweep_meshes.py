@@ -131,7 +131,10 @@ def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
 
 
 def _list_numbers(value) -> list[float]:
-    """Return the numbers in nested tuples in their order; None counts as 0, and texts are left out."""
+    """Return the numbers in nested tuples in their order.
+
+    None counts as 0, and texts are left out.
+    """
     if value is None or isinstance(value, int | float):
         return [float(value or 0.0)]
     if not isinstance(value, tuple):
@@ -140,7 +143,7 @@ def _list_numbers(value) -> list[float]:
 
 
 def _make_common_layout(cases: list[PatchModel]) -> Layout | None:
-    """Return column layouts of the coarsest grids merged for all patches of equal geometry; None on failure."""
+    """Return column layouts of the coarsest grids merged for all patches of equal geometry, or None on failure."""
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = grids.make_search_layout(first)

@@ -163,7 +163,7 @@ def _warn_of_work_check(facts: LawFacts) -> Iterator[str]:
 
 
 def _note_on_growth(facts: LawFacts) -> Iterator[str]:
-    """Note what growing bonds do: initial bonds of the printed law do not grow; others may exceed the friction limit."""
+    """Note that initial bonds of the printed law do not grow, or that growing bonds may exceed the friction limit."""
     law = find_bonds(facts.model)
     if law is None or not law.has_growth:
         return

@@ -104,7 +104,7 @@ class ElementSizes(NamedTuple):
     """Friction elements of a rig.
 
     - count: number of elements of all interfaces
-    - max_stiffness: largest stiffness of one in stick [N/m]; rigid elements count as 0
+    - max_stiffness: largest stiffness of one in stick [N/m]. Rigid elements count as 0
     """
 
     count: int

@@ -273,7 +273,7 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows.
 
-    `patch` is the solved patch and `coarse` that on a coarser mesh, None without them. `solution` is the steady motion,
+    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them. `solution` is the steady motion,
     with the errors that its finder knows by measure.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})

@@ -72,7 +72,7 @@ class RunEvaluator:
         cycles : float
             Number of cycles of the drive.
         before
-            Run from whose end the motion goes on; None for the start of the rig.
+            Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable, optional

@@ -186,7 +186,7 @@ class LumpedEvaluator(RunEvaluator):
         cycles : float
             Number of cycles of the drive.
         before : LumpedRun or None
-            Run from whose end the motion goes on; None for the start of the rig.
+            Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable, optional
@@ -213,7 +213,7 @@ class LumpedEvaluator(RunEvaluator):
         cycles : float
             Number of cycles of the drive.
         state : State or None
-            State from which the motion goes on; None for the start of the rig.
+            State from which the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the elements in the last cycle.
         """
@@ -250,7 +250,7 @@ class LumpedEvaluator(RunEvaluator):
         travel : float
             Largest magnitude of the output [m], at which the run ends.
         state : State or None
-            State at the start; None for the start of the rig.
+            State at the start, or None for the start of the rig.
         """
         numerics = self.numerics
         schedule = cases.Schedule(cycles, numerics.window, np.unique(times), travel)

@@ -109,8 +109,7 @@ class LimitCycles(NamedTuple):
 
     - cycles: limit cycles by increasing amplitude.
     - reason: reason why no unstable one is known.
-    - smallest_amplitude: smallest output amplitude of the search [m]; 0 if it covered all
-      amplitudes.
+    - smallest_amplitude: smallest output amplitude of the search [m], or 0 if it covered all amplitudes.
     """
 
     cycles: "list[limit_cycles.LimitCycle]"
@@ -121,8 +120,9 @@ class LimitCycles(NamedTuple):
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface.
 
-    `numerics` are the settings of the run, and `patch` is the pressed patch of the interface, or None for an interface
-    without one. If no limit cycle can be computed, the note in the result says why.
+    A law of rigid friction is a relay, and harmonic balance finds the limit cycles of all other laws. If none can be
+    computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and `patch` is the pressed patch of
+    the interface, or None for an interface without one.
     """
     rig = model.rig
     f = model.friction

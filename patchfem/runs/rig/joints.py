@@ -41,8 +41,8 @@ class Joint(NamedTuple):
     - law: effective keys of the friction law.
     - load: normal load.
     - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
-    - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips part
-      by part; None for an interface that slips as a whole.
+    - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips
+      part by part, or None for an interface that slips as a whole.
     - reduction: JenkinsSet of such a patch, or None.
     """
 
@@ -81,7 +81,7 @@ class Joints(NamedTuple):
     """Interfaces of a rig for the engine `hybrid`.
 
     - laws: (LawNumbers, Load) of each interface.
-    - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () without partial
+    - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface, or () without partial
       slip.
     - contact: Joint of the only patch, if it slips part by part, or None.
     - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
@@ -99,12 +99,12 @@ class Joints(NamedTuple):
 
     @property
     def springs(self) -> np.ndarray:
-        """Stiffness (i,) [N/m] of each interface in stick; nan for a law that is no single element."""
+        """Stiffness (i,) [N/m] of each interface in stick, or nan for a law that is no single element."""
         return np.array([_find_spring_stiffness(law) for law, _ in self.laws])
 
 
 def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
-    """Return the interfaces of a rig, or the strips of its patch that slide apart; [] without friction.
+    """Return the interfaces of a rig, or the strips of its patch that slide apart, or [] without friction.
 
     Parameters
     ----------
@@ -135,7 +135,10 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
 
 
 def _find_rigid_law(law, model: Model, patch):
-    """Return the law of an interface; a law that averages the pressure is Coulomb's law on a rigid block."""
+    """Return the law of an interface.
+
+    A law that averages the pressure is Coulomb's law on a rigid block.
+    """
     if not law_has_trait(law.law, "averaged"):
         return law
     static = law.static * averaged_law.slip_force_ratio(model, patch)
@@ -214,7 +217,7 @@ def _make_groove_law(model: Model) -> LawNumbers:
 
 
 def _find_spring_stiffness(law: LawNumbers) -> float:
-    """Return the stiffness [N/m] of a law that is a single element in stick; nan for other laws."""
+    """Return the stiffness [N/m] of a law that is a single element in stick, or nan for other laws."""
     if law.law != "masing" or law.numbers[1] >= 0 or has_many_elements(law):
         return np.nan
     limit, length = law.numbers[2:4]
@@ -222,7 +225,7 @@ def _find_spring_stiffness(law: LawNumbers) -> float:
 
 
 def _find_stick_tolerance(joints, laws) -> float:
-    """Return the largest slip per cycle [m] of interfaces that count as stuck; 0 for rigid laws."""
+    """Return the largest slip per cycle [m] of interfaces that count as stuck, or 0 for rigid laws."""
     lengths = []
     for joint, law in zip(joints, laws):
         keys = joint.law
@@ -274,7 +277,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
 
 
 def make_single_law(model: Model, numerics: Numerics, patch) -> protocol.Element | None:
-    """Return the law of a rig with one interface under a constant load; None for bonds that are no single element.
+    """Return the law of a rig with one interface under a constant load, or None for bonds that are no single element.
 
     Parameters
     ----------

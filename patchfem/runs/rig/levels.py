@@ -160,7 +160,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     Parameters
     ----------
     evaluator : RunEvaluator
-        Integrates and evaluates each level; its model has the levels of the drive.
+        Integrates and evaluates each level. Its model has the levels of the drive.
     frames : int
         Number of snapshots of the interface in the last cycle of the last level.
     progress : callable, optional
@@ -185,7 +185,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         level : float
             Drive level [m s-2].
         before
-            Run from whose end the level goes on; None for rest.
+            Run from whose end the level goes on, or None for rest.
         n_frames : int
             Number of snapshots of the interface in the last cycle.
         report : callable, optional
@@ -253,7 +253,7 @@ def _join_histories(histories, shifts: list[float]) -> Response:
     parts = []
     start = np.zeros((4, 1))
     for part, shift in zip(histories, shifts):
-        # Work, dissipated and created energy go on from run to run; the stored energy does not add up.
+        # Work, dissipated and created energy go on from run to run. The stored energy does not add up.
         ledger = part.extra["ledger"] + start
         start = ledger[:, -1:].copy()
         start[1] = 0.0

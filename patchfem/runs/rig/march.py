@@ -78,7 +78,7 @@ class MarchEvaluator(RunEvaluator):
         cycles : float
             Number of cycles of the drive.
         before : points.time_march.Motion or None
-            Run from whose end the motion goes on; None for the start of the rig.
+            Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable, optional

@@ -118,8 +118,8 @@ def count_unknowns(model: Model) -> dict[str, int]:
 def compute_dimensionless_groups(model: Model) -> Values:
     """Return a dict of the dimensionless groups of the motion of a rig.
 
-    - D: ratio of the static friction limit to the largest force of the drive, both as they act on
-      the first mode; at resonance it is D of eq. 2.3 of Srinivasan, Cassenti and Cutts (1985).
+    - D: ratio of the static friction limit to the largest force of the drive, both as they act on the first mode. At
+      resonance it is D of eq. 2.3 of Srinivasan, Cassenti and Cutts (1985).
     - D_kinetic: the same ratio with the kinetic limit, if it differs.
     - knee [m s-2], or knee_force [N] for a drive by force: largest drive at which friction alone
       bounds the motion of a sliding block at resonance.

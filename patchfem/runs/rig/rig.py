@@ -42,7 +42,7 @@ MIN_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
 # tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
 MAX_REFINED_WORK = 1e8
-# The same for measures that are not main ones; it takes some 0.1 s of CPU time.
+# The same for measures that are not main ones. It takes some 0.1 s of CPU time.
 MAX_OTHER_WORK = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0

@@ -49,12 +49,12 @@ class Solution:
     - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
     - run_errors: error estimates by measure from the run itself, without coarse runs.
     - errors: error estimates by measure of an engine that needs no coarse runs, or None.
-    - bond_summation: EngineChoice of the bond summation; None without bonds.
+    - bond_summation: EngineChoice of the bond summation, or None without bonds.
     - coarser: pairs of a coarse run and its reference run (None for this run).
     - extremes (c, 2), phasors (c,): minimum and maximum output, and phasor of the output, of every cycle [m], from which
-      the outcome is determined; None if the engine sets the outcome.
-    - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
-    - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
+      the outcome is determined, or None if the engine sets the outcome.
+    - drive: drive of the largest motion of a response curve or of drive levels, or None for a single motion.
+    - peak_error: error of the frequency of this drive [Hz], or inf for a curve without a peak, NaN without a curve.
     - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
     - settings: Settings of an engine that only it knows.
     - periodic: SteadyData of a periodic motion, or None.

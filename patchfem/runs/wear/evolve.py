@@ -479,7 +479,10 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     offsets = strip_offsets(width, len(np.atleast_2d(area)))
 
     def interpolate_path(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of the other patch; without strips there is a single row."""
+        """Interpolate a slip path to the nodes and strips of the other patch.
+
+        Without strips there is a single row.
+        """
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
         row_offsets = strip_offsets(width, len(rows))
         columns = [np.interp(offsets, row_offsets, column) for column in rows.T]

@@ -305,7 +305,7 @@ def _warn_of_friction_table(model, evolved) -> list[str]:
             f"wear.friction to a depth of at least {format_length(depths[-1], 3)}"
         )
 
-    # Largest number of rows of the table that one jump passes; of more than one, some have no effect
+    # Largest number of rows of the table that one jump passes. Of more than one, some have no effect.
     n_passed = 0
     for before, after in pairwise(depths):
         n_passed = max(n_passed, sum(before < row < after for row in table.depth))

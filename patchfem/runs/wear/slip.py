@@ -87,7 +87,7 @@ class _Motion(NamedTuple):
     - window: histories of its last cycles.
     - slide (k,): relative displacement [m] during the whole run.
     - values: measures by name.
-    - frames: _NodeFrames of the last cycle; None if no frames were asked for.
+    - frames: _NodeFrames of the last cycle, or None if no frames were asked for.
     - outcome: outcome of a motion without periodic cycle, else None.
     """
 
@@ -158,7 +158,11 @@ def choose_frame_count(tolerance: float) -> int:
 
 
 def slips_uniformly(model) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip by equal distances."""
+    """Return whether all points of a patch, or of each of its strips, slip by equal distances.
+
+    This holds if the patch has no partial slip and its pressure moves with the upper piece. A pressure that rests on the
+    lower piece passes over the points of the upper one, so that they do not slip alike.
+    """
     return not model.partial_slip and model.side == "upper"
 
 
@@ -294,7 +298,7 @@ def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
 def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
     """Return the histories of the last cycle of a bench or a rig.
 
-    `window` has the histories of the last cycles. `load` is the constant load [N] of a rig; over grooves the window has
+    `window` has the histories of the last cycles. `load` is the constant load [N] of a rig. Over grooves the window has
     the vertical force.
     """
     if model.rig is None:
@@ -319,7 +323,7 @@ def _make_point_slip(
 
     On flat faces it is the normal traction V, or with form 'energy' |F| of the friction traction F, which opposes the
     slip also in a step with a reversal. On a flank of slope t = dz/dq with the path ds, it is R ds/dq = V + F t of the
-    normal traction R on the flank; with form 'energy' it is |f| ds/dq = |F - V t| of the friction f along the flank.
+    normal traction R on the flank. With form 'energy' it is |f| ds/dq = |F - V t| of the friction f along the flank.
 
     Parameters
     ----------
@@ -332,7 +336,7 @@ def _make_point_slip(
     friction, normal : (k, p) ndarray
         Horizontal and vertical tractions [Pa], or forces [N].
     pressure : (p,) ndarray
-        Traction or force to which they are related; an open point, with 0, does not wear.
+        Traction or force to which they are related. An open point, with 0, does not wear.
     """
     slope = 0.0 if model.grooves is None else model.grooves.slope(motion.slide)[:, None]
     if model.wear.uses_friction_work:

@@ -158,8 +158,8 @@ def format_keys(words: str) -> str:
 def find_selectors(model: type[Table]) -> tuple[Selector, ...]:
     """Return the selectors of a table, in the order in which they count.
 
-    A selector is a key whose value decides which other keys the table needs, such as `law` or `waveform`; `model` is
-    the class of the table.
+    A selector is a key whose value decides which other keys the table needs, such as `law` or `waveform`. `model` is the
+    class of the table.
     """
     return tuple(selector for selector in SELECTORS if issubclass(model, selector.model))
 

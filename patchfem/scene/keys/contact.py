@@ -59,7 +59,10 @@ class Material(Table):
 
 
 def find_material(value: TomlValue | Material) -> Material:
-    """Return the Material of a name; raise ValueError for an unknown name and for other values."""
+    """Return the Material of a name.
+
+    ValueError is raised for an unknown name and for other values.
+    """
     if isinstance(value, Material):
         return value
     if isinstance(value, int | float) and find_material_name(str(value)) is not None:
@@ -161,7 +164,10 @@ class Holder(Table):
 
 
 def require_convex_radius(value: TomlValue) -> TomlValue:
-    """Return the radius of a crown; raise ValueError for the negative radius of a hollow."""
+    """Return the radius of a crown.
+
+    ValueError is raised for the negative radius of a hollow.
+    """
     if str(value).lstrip().startswith("-"):
         raise ValueError(
             "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] and give "

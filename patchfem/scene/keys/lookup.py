@@ -90,7 +90,7 @@ def validate_values(
 ) -> tuple[dict[str, KeyValue], Sequence[ErrorDetails]]:
     """Return the valid ones of the plain values of a table by attribute, and the errors on the others.
 
-    `model` is the class of the table; the errors are those of pydantic.
+    `model` is the class of the table. The errors are those of pydantic.
     """
     valid: dict[str, KeyValue] = {}
     try:

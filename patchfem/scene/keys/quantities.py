@@ -89,9 +89,10 @@ def describe_requirement(kind: str) -> str:
 
 
 def _multiply(number: str, factor: float, kind: str) -> float:
-    """Return number times factor, correctly rounded; raise ValueError if it is out of range.
+    """Return number times factor, correctly rounded.
 
-    The lower limit depends on the `kind` of quantity: a temperature is not below 0 K.
+    ValueError is raised if it is out of range. The lower limit depends on the `kind` of quantity: a temperature is not
+    below 0 K.
     """
     rounded = float(number)
     if rounded == 0.0:

@@ -527,7 +527,7 @@ class Drive(Table):
     def _read_forces(cls, value: TomlValue, info: ValidationInfo) -> TomlValue:
         """Read the levels of a force drive: write each force in SI as if it were an acceleration.
 
-        `value` are the levels as written; `info` has the keys before this one, among them the kind of drive. Levels of
+        `value` are the levels as written. `info` has the keys before this one, among them the kind of drive. Levels of
         other drives are returned unchanged.
         """
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):

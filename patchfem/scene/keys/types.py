@@ -73,7 +73,7 @@ class Check:
     ) -> CoreSchema:
         """Return the schema of the annotated type `source`, to which this check is added.
 
-        `handler` makes the schema of the type itself; pydantic calls this method.
+        `handler` makes the schema of the type itself. pydantic calls this method.
         """
         return self.make_schema(self.function, handler(source))
 
@@ -180,7 +180,10 @@ def array(kind: KeyType, least: int = 1, most: int | None = None) -> KeyType:
 
 
 def _require_printable(value: str) -> str:
-    """Return a text; raise ValueError for characters that results files cannot hold."""
+    """Return a text.
+
+    ValueError is raised for characters that results files cannot hold.
+    """
     for sign in value:
         if category(sign) in ("Cc", "Cs") and sign not in "\n\t":
             raise ValueError(
@@ -285,16 +288,20 @@ class Table(BaseModel):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Return the JSON schema of a table; inside another table it is only the name of its class.
+        """Return the JSON schema of a table.
 
-        pydantic calls this method with the inner `schema` and with `handler`, which converts it.
+        Inside another table it is only the name of its class. pydantic calls this method with the inner `schema` and
+        with `handler`, which converts it.
         """
         is_inner = schema["type"] == "function-plain"
         return {TABLE_WORD: cls.__name__} if is_inner else handler(schema)
 
     @classmethod
     def _validate_inner(cls, value: TomlValue | Table) -> Table:
-        """Return a table from plain values; a `value` that is such a table already is returned unchanged."""
+        """Return a table from plain values.
+
+        A `value` that is such a table already is returned unchanged.
+        """
         return value if isinstance(value, cls) else cls.model_validate(value)
 
     @field_validator("*", mode="after")

@@ -20,7 +20,7 @@ RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "w
 
 
 def check_scene(draft: SceneDraft) -> str:
-    """Report all mistakes of a scene draft to it; return the kind of scene.
+    """Report all mistakes of a scene draft to it, and return the kind of scene.
 
     The kind is "patch", "bench", "rig" or "linear", or "" if the tables define none.
     """

@@ -152,9 +152,9 @@ def _check_coatings(patch: TableFacts) -> None:
 
 
 def _check_shapes_have_a_piece(patch: TableFacts) -> None:
-    """Report gap shapes of a patch whose table lacks the key `on`; `Contact.shapes` leaves them out.
+    """Report gap shapes of a patch whose table lacks the key `on`.
 
-    Only a shape that somebody adds to the package can lack this key.
+    `Contact.shapes` leaves them out. Only a shape that somebody adds to the package can lack this key.
     """
     for name in GAP_SHAPES:
         if getattr(patch.table, name, None) is not None and name not in patch.table.shapes:

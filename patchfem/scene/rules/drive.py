@@ -47,7 +47,7 @@ def _check_waveform(drive: TableFacts) -> None:
 def check_length(draft: SceneDraft, kind: str) -> None:
     """Report a draft whose run is shorter than a quarter of a drive cycle.
 
-    `kind` is the kind of scene; only "rig" and "linear" have a drive.
+    `kind` is the kind of scene. Only "rig" and "linear" have a drive.
     """
     if kind not in ("rig", "linear"):
         return

@@ -47,11 +47,17 @@ class TableFacts(TableView):
         return any(find_value(self._written, name) is not None for name in names)
 
     def add_mistake(self, key: str, sentence: str) -> None:
-        """Add a mistake at a key of the table; the sentence says what is wrong, and what to do."""
+        """Add a mistake at a key of the table.
+
+        The sentence says what is wrong, and what to do.
+        """
         self.draft.add_mistake(f"{self.table_key}.{key}", sentence)
 
     def add_missing(self, key: str, reason: str = "") -> None:
-        """Add a missing key of the table as a mistake; the reason says what needs it."""
+        """Add a missing key of the table as a mistake.
+
+        The reason says what needs it.
+        """
         self.draft.add_missing(f"{self.table_key}.{key}", reason)
 
     def add_remark(self, key: str, sentence: str) -> None:

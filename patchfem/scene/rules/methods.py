@@ -206,7 +206,7 @@ def list_unused_methods(kind: str) -> tuple[str, ...]:
 def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     """Return the features of a scene, as far as its tables could be read.
 
-    `kind` is the kind of scene; only a "rig" has interfaces.
+    `kind` is the kind of scene. Only a "rig" has interfaces.
     """
     scene = TableView(tables)
     if kind != "rig":

@@ -23,7 +23,7 @@ HINTS = {  # what else a user should know about a missing key
 
 
 def check_needed_keys(draft: SceneDraft) -> None:
-    """Report the keys that the tables of a draft lack or exclude; add a remark on each key without meaning.
+    """Report the keys that the tables of a draft lack or exclude, and add a remark on each key without meaning.
 
     Which keys a table needs follows from its selectors, such as `law` or `waveform`, from other keys (NEEDS), and from
     lists that must have equal lengths.

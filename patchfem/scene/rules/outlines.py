@@ -47,7 +47,10 @@ def check_outlines(patch: TableFacts) -> None:
 
 
 def _check_piece(patch: TableFacts, name: str) -> None:
-    """Report ends that do not fit into a piece of a patch; its name is "upper" or "lower"."""
+    """Report ends that do not fit into a piece of a patch.
+
+    Its name is "upper" or "lower".
+    """
     piece = patch[name]
     length = find_piece_length(patch, name)
     height = piece.height or patch.height

@@ -97,13 +97,19 @@ class SceneDraft:
         self._add(order, location, number_items_from_one(f"{self.display_key(key)}: {message}"))
 
     def add_missing(self, key: str, reason: str) -> None:
-        """Add a missing key as a mistake at the line of its table; the reason says what needs it."""
+        """Add a missing key as a mistake at the line of its table.
+
+        The reason says what needs it.
+        """
         needed = describe_missing_key(find_key(key), key)
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 
     def add_missing_table(self, name: str, reason: str) -> None:
-        """Add the missing table `name` as a mistake of the whole file; the reason says what needs it."""
+        """Add the missing table `name` as a mistake of the whole file.
+
+        The reason says what needs it.
+        """
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
@@ -153,9 +159,9 @@ class SceneDraft:
         return line, f"{self.path}:{line}" if line else self.path
 
     def _add(self, order: int, location: str, text: str) -> None:
-        """Add the text of a mistake once, with the location before it; long words and control characters are cut.
+        """Add the text of a mistake once, with the location before it.
 
-        `order` sorts the mistakes: a line number, or 0 for the whole file.
+        Long words and control characters are cut. `order` sorts the mistakes: a line number, or 0 for the whole file.
         """
         text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:N_SHOWN_CHARACTERS]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)

@@ -57,7 +57,7 @@ class Joint(TableFacts):
     table_key : str
         Dotted key of the law: "friction", or that of an interface between masses.
     law : Friction or None
-        Table of the friction law, None if it could not be read.
+        Table of the friction law, or None if it could not be read.
     contact : Contact or None
         Patch of the joint.
     kind : str
@@ -85,12 +85,18 @@ class Joint(TableFacts):
         self.wave = find_waveform(draft.tables.drive)
 
     def find_key_value(self, key: str) -> ViewValue:
-        """Return the value of a dotted key of the scene; "patch" at its beginning stands for the patch of this joint."""
+        """Return the value of a dotted key of the scene.
+
+        "patch" at its beginning stands for the patch of this joint.
+        """
         table, *names = key.split(".")
         return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
 
     def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait, such as "bonds"; `effects.LAWS` lists them."""
+        """Return whether the law has a trait, such as "bonds".
+
+        `effects.LAWS` lists them.
+        """
         return law_has_trait(self.law or None, trait)
 
     def supports(self, *words: str) -> bool:

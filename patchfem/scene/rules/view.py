@@ -44,7 +44,10 @@ class TableView:
         self.table = table
 
     def __getattr__(self, name: str) -> ViewValue:
-        """Return the value of a key of the table by its attribute name, wrapped; unknown without a table."""
+        """Return the value of a key of the table by its attribute name, wrapped.
+
+        It is unknown without a table.
+        """
         value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds the value without this method
         return value

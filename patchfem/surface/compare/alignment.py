@@ -19,7 +19,7 @@ from .statistics import (
     subtract_local_level,
 )
 
-# Largest number of points to which the place is fitted; more would hardly improve it
+# Largest number of points to which the place is fitted. More would hardly improve it.
 MAX_FIT_POINTS = 40_000
 # Smallest part of the own surface that both surfaces must show
 MIN_COMMON = 0.2
@@ -122,10 +122,10 @@ def _refuse(first: Raster, second: Raster) -> Aligned:
 
 
 def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
-    """Return the model of two surfaces at a place; None if they hardly overlap.
+    """Return the model of two surfaces at a place, or None if they hardly overlap.
 
-    `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every
-    axis; by default as many as MAX_FIT_POINTS allows.
+    `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every axis,
+    by default as many as MAX_FIT_POINTS allows.
     """
     own, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:

@@ -15,12 +15,12 @@ from .statistics import (
 
 # Sides in samples of the windows whose mean depth is tested, by number of axes
 WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
-# Side in samples of the smallest changed part of scans; a smaller one may be an error of interpolation
+# Side in samples of the smallest changed part of scans. A smaller one may be an error of interpolation.
 MIN_PART_SIDE = 4
 # Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
 # and one more on each side
 MIN_RUN_SAMPLES = 9
-# Side in samples of the smallest group of points whose own depths, not means over windows, show a change; by number of
+# Side in samples of the smallest group of points whose own depths, not means over windows, show a change, by number of
 # axes
 MIN_SPOT_SIDE = {1: 1, 2: 3}
 # Standard deviations to which a single depth counts in a mean over a window, by number of axes
@@ -58,7 +58,7 @@ def find_changed(depth, noise) -> np.ndarray:
     pull = MAX_PULL_DEVIATIONS[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
 
-    # Windows from single points to wide ones; points that have changed already do not count in wider windows
+    # Windows from single points to wide ones. Points that have changed already do not count in wider windows.
     for side in windows:
         if side > min(depth.shape) / 4:
             break
@@ -72,7 +72,7 @@ def find_changed(depth, noise) -> np.ndarray:
         scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], fraction)
         scatter = max(scatter, side ** (-depth.ndim / 2))
 
-        # All points of a window whose mean is too high have changed; single points of scans count only in groups
+        # All points of a window whose mean is too high have changed. Single points of scans count only in groups.
         high = (mean > limit * scatter) & (weight > 0.25)
         spot = MIN_SPOT_SIDE[depth.ndim]
         if side == 1:
@@ -80,7 +80,7 @@ def find_changed(depth, noise) -> np.ndarray:
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
-    # A trace may have a track too shallow for any window; groups of points too small for a change are left out
+    # A trace may have a track too shallow for any window. Groups of points too small for a change are left out.
     side = MIN_PART_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)

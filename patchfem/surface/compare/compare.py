@@ -46,7 +46,7 @@ MIN_GROWN_LINE = 0.5
 WORN_MARGIN_SIDE = 7
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
 MAX_TRACK_FRACTION = 0.8
-# Smallest fraction of worn heights in a track as wide as the whole surface; where only tops are worn, it is smaller
+# Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
 MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW_RATIO = 3.0
@@ -428,7 +428,7 @@ def _doubt(
     code : str
         Verdict: the given one, or one of two possible causes.
     numbers : dict
-        Heights [m] by name that both causes would have; {} if there is one cause.
+        Heights [m] by name that both causes would have, or {} if there is one cause.
     """
     area, grown, bend = sizes
     bow = 2 / 3 * max(bend, 0.0) * depths.size
@@ -518,7 +518,7 @@ def _name_ends(
 
 
 def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
-    """Compare the waves along lines of the common part; return their ratios after/before by name.
+    """Compare the waves along lines of the common part, and return their ratios after/before by name.
 
     `result` is the comparison, and `direction` "x" or "y" that of the lines. Without a common place the ratios have no
     value.

@@ -82,9 +82,9 @@ class DepthMap:
         return float(known.std()) if known.size else 0.0
 
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
-        """Integrate the depth over a mask; return area [m2] or volume [m3] and its standard deviation.
+        """Integrate the depth over a mask, and return area [m2] or volume [m3] and its standard deviation.
 
-        `part` is the mask; with the sign -1 grown material counts as positive.
+        `part` is the mask. With the sign -1 grown material counts as positive.
         """
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
         error = SCATTER_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell

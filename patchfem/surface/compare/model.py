@@ -31,8 +31,8 @@ BORDER_SAMPLES = 3  # distance from the border of a surface from which on its sp
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
-# Side of a surface relative to the standard deviation of a Gaussian; the waves longer than it are not used to refine
-# the place
+# Side of a surface relative to the standard deviation of a Gaussian. The waves longer than it are not used to refine the
+# place.
 PLACE_WAVES = {1: 100, 2: 20}
 # Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
 # place
@@ -44,10 +44,10 @@ N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
-# Smallest determinant of the mean datum functions of some tiles; below it these tiles do not determine a datum
+# Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
 MIN_DETERMINANT = 1e-3
-# Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one; datums of larger
-# scale are not compared
+# Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one. Datums of larger
+# scale are not compared.
 MAX_DATUM_SCALE = 4.0
 MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
 # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
@@ -110,7 +110,7 @@ class Model:
     def keep_common(self, state) -> None:
         """Keep the points that both surfaces show at a state.
 
-        They are `known`; `common` has those near the border of the other surface, too.
+        They are `known`. `common` has those near the border of the other surface, too.
         """
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)

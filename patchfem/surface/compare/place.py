@@ -103,7 +103,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             at = (own.middle - own.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
             best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
-        # Mirrored scans are tried only if this side does not fit clearly; traces are always tried both ways.
+        # Mirrored scans are tried only if this side does not fit clearly. Traces are always tried both ways.
         if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
             break
     return best
@@ -147,7 +147,7 @@ def correlate(first, second) -> np.ndarray:
     It is -inf where the images overlap too little.
 
     `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. Lags count pixels by which the
-    second image is moved; negative lags stand at the end of each axis.
+    second image is moved. Negative lags stand at the end of each axis.
     """
     size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]

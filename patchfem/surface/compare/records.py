@@ -108,7 +108,7 @@ class Comparison:
 def name_quantity(name: str, value: float, low: float | None, high: float | None) -> Quantity:
     """Return the quantity of this name with its value and its interval.
 
-    Its unit and definition are those of the name; `low` and `high` are the ends of the interval, None if they are not
+    Its unit and definition are those of the name. `low` and `high` are the ends of the interval, or None if they are not
     known.
     """
     bounds = [None if number is None else float(number) for number in (value, low, high)]

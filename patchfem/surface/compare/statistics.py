@@ -7,7 +7,7 @@ from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
-BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
+BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight, 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
@@ -139,7 +139,7 @@ def subtract_local_level(values, mask) -> np.ndarray:
 def find_mirror_finish(surfaces) -> dict[str, float]:
     """Return rms height and noise [m] of a surface hardly rougher than its white noise, else {}.
 
-    `surfaces` are arrays of heights (n,) or (m, n) [m]; the first such surface counts.
+    `surfaces` are arrays of heights (n,) or (m, n) [m]. The first such surface counts.
     """
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)

@@ -10,7 +10,7 @@ from .changes import MIN_RUN_SAMPLES, WINDOW_SIDES
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .statistics import compute_threshold, remove_long_waves
 
-# Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear; its reverse shows growth
+# Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear. Its reverse shows growth.
 LOSS_TO_GROWTH_RATIO = 3.0
 MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
 TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower

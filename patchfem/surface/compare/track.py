@@ -146,8 +146,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 def _has_unworn_valleys(relative, is_high) -> bool:
     """Return whether wear inside an end of a track touched tops alone.
 
-    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops; then the
-    valleys between them are less deep.
+    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops. Then the valleys
+    between them are less deep.
     """
     if is_high.all() or not is_high.any():
         return False
@@ -195,8 +195,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     levels = np.array([values, values + level, values - level])
     deviance = _fit_flanks(part, levels, places, depths.errors.correlation)
 
-    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form; the
-    # interval of the end reaches over all of them
+    # Likely places have a deviance near the lowest of some form of flank that is itself near the best form. The interval
+    # of the end reaches over all of them.
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE

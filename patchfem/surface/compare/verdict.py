@@ -31,7 +31,7 @@ def find_sure_loss(depths: DepthMap) -> float:
 def measure_sharp_loss(depths: DepthMap) -> float:
     """Return the area [m2] or volume [m3] lost from tops of the `depths` map that lie deeper than others.
 
-    Unworn heights beside them do not lie as deep; no drift is so sharp.
+    Unworn heights beside them do not lie as deep. No drift is so sharp.
     """
     if not depths.worn.any():
         return 0.0

@@ -54,7 +54,7 @@ def compare_waves(
     Returns
     -------
     dict of str to Quantity
-        "amplitude_ratio" and "slope_ratio"; without value where noise or the length does not allow one.
+        "amplitude_ratio" and "slope_ratio", without value where noise or the length does not allow one.
     """
     is_kept = np.ones(lines[0].shape[1], bool)
     for end in ends:
@@ -149,7 +149,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     if cutoff is None:
         return {}, None
 
-    # Each region is cut into sections of one cut-off, whose parameters scatter; their means have intervals
+    # Each region is cut into sections of one cut-off, whose parameters scatter. Their means have intervals.
     regions = {}
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():

@@ -58,9 +58,9 @@ def read_mat(content: Content) -> Table:
 
 
 def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
-    """Read the only array of two or three columns; raise PatchfemError if there is none, or more than one.
+    """Read the only array of two or three columns.
 
-    `path` names the file in the message.
+    PatchfemError is raised if there is none, or more than one. `path` names the file in the message.
     """
     tables = [array for array in arrays.values() if array.ndim == 2 and array.shape[1] in (2, 3)]
     if len(tables) == 1:
@@ -74,6 +74,9 @@ def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
 
 
 def _make_table(path, columns: dict[str, np.ndarray]) -> Table:
-    """Return the table of columns without units; `path` is the file."""
+    """Return the table of columns without units.
+
+    `path` is the file.
+    """
     columns = {name: np.asarray(values, float) for name, values in columns.items()}
     return Table(path, columns, {}, str(path), remedy=f"write it as text and {HEADER_EXAMPLE}")

@@ -22,7 +22,8 @@ MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row n
 COMMENT_SIGNS = ("#", "%", "//")
 # Pattern of a number with a decimal comma, such as -1,25e-6
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-# Pattern of a height that was not measured
+# Cells that stand for a height that was not measured: nan with or without a sign, stars such as ***, bad, and an empty
+# cell. Capital letters do not matter.
 MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
 _COLUMN = re.compile(
@@ -48,7 +49,7 @@ class Column(NamedTuple):
 class Header(NamedTuple):
     """What stands above the numbers of a text file.
 
-    - columns: columns that a line names; [] without such a line.
+    - columns: columns that a line names, or [] without such a line.
     - facts: what is said of a matrix or of points, such as {"width": "4 um"}.
     - count: number of values in the first row, or of columns that a line names with their units.
     - number: number of the line of names, or of the first row.
@@ -90,7 +91,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         cells, delimiter = split_cells(text)
         is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
 
-        # A row of numbers ends the header; its columns are those of the last line of as many names
+        # A row of numbers ends the header. Its columns are those of the last line of as many names.
         start, columns = named.get(len(cells), (number, []))
         if is_row and cells[0] and not is_comment:
             return Header(columns, facts, len(cells), start), chain([(number, line)], lines)
@@ -143,7 +144,7 @@ def _parse_column(cell: str) -> Column:
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
-    """Return number and unit in the text of a fact such as `4.0 um`; None for what is missing."""
+    """Return number and unit in the text of a fact such as `4.0 um`, or None for what is missing."""
     number, _, unit = text.strip().partition(" ")
     if not NUMBER_PATTERN.fullmatch(number):
         return None, text.strip() or None
@@ -151,7 +152,7 @@ def parse_fact(text: str) -> tuple[float | None, str | None]:
 
 
 def split_cells(text: str) -> tuple[list[str], str | None]:
-    """Split the text of a line into cells; return these and the delimiter, None for blanks.
+    """Split the text of a line into cells, and return these and the delimiter, which is None for blanks.
 
     It is the delimiter that leaves only numbers, or else the first one. So a decimal comma is not taken for a delimiter.
     """

@@ -60,9 +60,9 @@ def _require_units(path, units) -> None:
 
 
 def read_profile(path, units: tuple[str, str] | None = None) -> Profile:
-    """Read the trace in the file `path`; raise PatchfemError for an areal scan.
+    """Read the trace in the file `path`.
 
-    `units` are those of x and z, such as ("mm", "um").
+    PatchfemError is raised for an areal scan. `units` are those of x and z, such as ("mm", "um").
     """
     surface = read_surface(path, units)
     if isinstance(surface, Areal):

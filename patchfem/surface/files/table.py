@@ -39,11 +39,11 @@ class Table(NamedTuple):
     """Numbers of a file in its own units.
 
     - path: file, for messages.
-    - columns: "x" and "z" (n,) of a trace, with "y" (n,) of the points of a scan; or "z" (m, n) of a matrix, with "x" (n,)
-      and "y" (m,). A missing height is NaN.
-    - units: unit of each column; None where the file states none.
+    - columns: "x" and "z" (n,) of a trace, with "y" (n,) of the points of a scan, or "z" (m, n) of a matrix, with "x"
+      (n,) and "y" (m,). A missing height is NaN.
+    - units: unit of each column, or None where the file states none.
     - place: file, with the line that names the columns if there is one.
-    - lines: line of the file of each sample; None if the file has no lines.
+    - lines: line of the file of each sample, or None if the file has no lines.
     - notes: sentences on the file.
     - are_units_fixed: whether the format defines or always states its units.
     - remedy: how the file would state its units.
@@ -220,7 +220,7 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
 def _require_increase(table: Table, role: str, places) -> None:
     """Raise PatchfemError if the positions of a column are equal or do not increase.
 
-    `role` is "x" or "y", and `places` (n,) [m] are the positions; the `table` tells the line of a wrong one.
+    `role` is "x" or "y", and `places` (n,) [m] are the positions. The `table` tells the line of a wrong one.
     """
     if not np.ptp(places) > 0:
         raise PatchfemError(

@@ -96,7 +96,7 @@ def _find_roles(
     header : Header
         What stands above the numbers.
     has_units : bool
-        Whether the user states the units; then columns of unknown names have their roles in their order.
+        Whether the user states the units. Then columns of unknown names have their roles in their order.
 
     Returns
     -------
@@ -153,7 +153,8 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
 
-    # The first row and column may be coordinates, which no header states
+    # No header tells whether the first row and the first column are coordinates. Evenly spaced numbers in both are
+    # coordinates, unless the second row is even as well, as that of a tilted plane.
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
     if has_axes and not _is_even(z[1, 1:]):
         raise PatchfemError(
@@ -185,7 +186,9 @@ def _is_even(values: np.ndarray) -> bool:
 def _read_rows(
     path, lines: Iterator[tuple[int, str]], roles: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read all rows of numbers of a text file; a million rows of two columns take three seconds.
+    """Read all rows of numbers of a text file.
+
+    A million rows of two columns take three seconds.
 
     Parameters
     ----------
@@ -194,7 +197,7 @@ def _read_rows(
     lines : iterator of (int, str)
         Numbers and texts of the lines below the header. The first row shows the delimiter of all.
     roles : list of str
-        Role of each column; a height "z" may be missing, and an "index" is not read.
+        Role of each column. A height "z" may be missing, and an "index" is not read.
 
     Returns
     -------
@@ -243,9 +246,10 @@ def _read_rows(
 
 
 def _parse_cell(place: str, role: str, cell: str) -> float:
-    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text.
+    """Return the number in a cell, or NaN for a missing height.
 
-    `place` is file and line for the message, and `role` is the name of the column.
+    PatchfemError is raised for other text. `place` is file and line for the message, and `role` is the name of the
+    column.
     """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)

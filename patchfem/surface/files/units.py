@@ -38,7 +38,7 @@ SIZE_LINES = "write `# Width: 1.2 mm` and `# Height: 0.8 mm` and `# Value units:
 
 
 def parse_length_unit(word: str) -> float | None:
-    """Return the factor to metres of a word such as um, µm, [mm] or Mikrometer, None for others."""
+    """Return the factor to metres of a word such as um, µm, [mm] or Mikrometer, or None for others."""
     word = normalize_unit(word.strip("[]() "))
     return UNITS.get(word) or UNIT_WORDS.get(word.lower())
 

@@ -96,7 +96,7 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
 
 
 def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
-    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf if never.
+    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction, or inf if never.
 
     `rho` is the autocorrelation, with the zero lag in the middle, and `steps` [m] are its steps along y and x.
     """

@@ -57,7 +57,7 @@ def compute_parameters(z, step: float, section: float | None = None) -> dict[str
 def compute_moments(z) -> dict[str, float | None]:
     """Compute mean, root mean square [m], skewness and kurtosis [1] of heights z (n,) [m].
 
-    The keys are "a", "q", "sk" and "ku", as in Ra; "a" is the mean of the absolute heights.
+    The keys are "a", "q", "sk" and "ku", as in Ra. "a" is the mean of the absolute heights.
     """
     rms = np.sqrt(np.mean(z**2))
     out = {"a": float(np.abs(z).mean()), "q": float(rms), "sk": None, "ku": None}
@@ -67,7 +67,7 @@ def compute_moments(z) -> dict[str, float | None]:
 
 
 def _compute_element_length(z, step: float, rough: float, section: float) -> float | None:
-    """Compute Sm, the mean length of the profile elements [m]; None if the trace contains no whole element.
+    """Compute Sm, the mean length of the profile elements [m], or None if the trace contains no whole element.
 
     An element reaches from a rise through the mean line to the next rise, or from a fall to the next
     fall. Hills and dales that are too low or too narrow are left out, and neighbours of one sign between which
@@ -142,7 +142,7 @@ def estimate_errors(z, step: float, section: float) -> dict[str, float]:
     """Estimate the standard errors of the roughness parameters by the jackknife over sections.
 
     The heights z (n,) [m] lie at equal steps `step` [m], and `section` [m] is the length of a section, one cut-off.
-    Errors are by name, in the units of the parameters; {} for fewer than MIN_SECTIONS sections.
+    Errors are by name, in the units of the parameters, or {} for fewer than MIN_SECTIONS sections.
     """
     size = round(section / step)
     count = z.size // size

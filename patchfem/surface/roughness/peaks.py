@@ -21,7 +21,7 @@ from .filter import filter_surface
 from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
-# Nayak's spectral width alpha of an isotropic surface whose waves all have the same length; no surface has less
+# Nayak's spectral width alpha of an isotropic surface whose waves all have the same length. No surface has less.
 MIN_ALPHA = 1.5
 # Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
 PERSSON = (0.4, 0.5)
@@ -72,12 +72,11 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace shorter than `cutoff` [m]; of all if it is None.
+    """Measure the moments of the waves of a trace shorter than `cutoff` [m], or of all waves if it is None.
 
-    Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
-    trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
-    PatchfemError for fewer than 16 samples, for a flat trace and for a cut-off of fewer than four
-    steps.
+    Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off trimmed at each end).
+    A trace no longer than the cut-off keeps all of its waves. Raises PatchfemError for fewer than 16 samples, for a flat
+    trace and for a cut-off of fewer than four steps.
     """
     clean = remove_spikes(trace)
     is_removed = clean.missing & ~trace.missing

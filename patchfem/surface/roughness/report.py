@@ -46,7 +46,7 @@ class Treatment(NamedTuple):
 
     - form: name of the least-squares form.
     - short: nesting index of the S-filter [m].
-    - cutoff: cut-off between waviness and roughness [m]; for a scan, the nesting index of the L-filter.
+    - cutoff: cut-off between waviness and roughness [m], or for a scan the nesting index of the L-filter.
     - window: first and last position [m], for a scan in x and then in y.
     """
 
@@ -250,7 +250,7 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     surface : Profile or Areal
         Trace or scan.
     *ends : float
-        First and last position [m] along x of a trace; of a scan, the same along x and then along y.
+        First and last position [m] along x of a trace, or of a scan the same along x and then along y.
 
     Returns
     -------

@@ -121,7 +121,10 @@ class Cluster(FutureExecutor):
             self.executor = self.client.get_executor(pure=False)
 
     def submit(self, chunk: list[int]) -> Future:
-        """Submit a chunk; raise Missing if the connection to the scheduler is lost."""
+        """Submit a chunk.
+
+        Missing is raised if the connection to the scheduler is lost.
+        """
         with self._report_lost_connection():
             return self.executor.submit(_compute_on_worker, self.shared, chunk, self.common_data)
 

@@ -143,7 +143,10 @@ class Pool(FutureExecutor):
         self.last_chunks: dict[ProcessPoolExecutor, Future] = {}
 
     def submit(self, chunk: list[int]) -> Future:
-        """Submit a chunk to an idle process, or to a new one; raise Missing if none can be started."""
+        """Submit a chunk to an idle process, or to a new one.
+
+        Missing is raised if none can be started.
+        """
         idle = [executor for executor, future in self.last_chunks.items() if future.done()]
         for executor in idle:
             try:

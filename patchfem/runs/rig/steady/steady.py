@@ -12,7 +12,7 @@ from .balance import BalanceFinder
 from .peak import solve_peak
 from .shooting import ShootingFinder
 
-# By the engine that `choose_steady_method` names.
+# Classes that find steady motions, by the name of the engine from `choose_steady_method`
 FINDERS = {"hybrid": ShootingFinder, "harmonic": BalanceFinder}
 
 
