@@ -215,14 +215,17 @@ def find_margin_root(rig, state, i, k, left, right):
     f_left = find_value(rig, state, left, i, k)
     if f_left < -MARGIN_TOL:
         return left
-    # A margin that starts at 0, or at a round-off above it, may first increase.
-    inside = 0.0
-    while f_left <= MARGIN_TOL:
-        inside = FIRST_LOOK if inside == 0 else 4 * inside
-        if inside > 1:
+    start = left
+    if f_left <= MARGIN_TOL:
+        # A margin that starts at 0, or at a round-off above it, may first increase.
+        inside = FIRST_LOOK
+        while inside <= 1 and find_value(rig, state, left + inside * (right - left), i, k) <= 0:
+            inside *= 4
+        if inside <= 1:
+            start = left + inside * (right - left)
+        elif f_left <= 0:
             return left
-        f_left = find_value(rig, state, left + inside * (right - left), i, k)
-    return find_root(rig, state, i, k, left + inside * (right - left), right)
+    return find_root(rig, state, i, k, start, right)
 
 
 @njit(**NJIT_KERNEL)
