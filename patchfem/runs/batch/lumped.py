@@ -24,7 +24,7 @@ from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import convergence_errors, total_error
+from ...response.errors import MAX_ORDER, convergence_errors, total_error
 from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
 from ...response.reasons import (
     CHANGE_NOT_RESOLVED_REASON,
@@ -283,10 +283,16 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
     count, fewer : int
         Their steps per cycle.
     """
-    errors = {}
     with np.errstate(all="ignore"):
-        found = convergence_errors(fine, coarse, ratio=count / fewer, steps=count * TICKS)
-        for name, error in found.items():
+        errors = convergence_errors(fine, coarse, ratio=count / fewer, steps=count * TICKS)
+        # A change that is small by accident does not give an error far below those of the other measures, relative to
+        # the value of a measure or to the terms of a difference.
+        sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
+        relative = np.array([errors[name] / sizes[name] for name in errors])
+        relative = np.where((relative > 0) & (relative < 1), relative, np.nan)
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_ORDER
+        for name, error in errors.items():
+            error = np.where(error > 0, np.fmax(error, typical * sizes[name]), error)
             errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
     return errors
 
