@@ -161,6 +161,8 @@ def write_probes(rig, state, t, y, probes):
         probes[first + Probe.SLIP] = y[integrals + N_FACE_INTEGRALS * i + 1]
         probes[first + Probe.SLIDE] = point.slide
         probes[first + Probe.LOAD] = max(point.load, 0.0)
+        if i == 0:
+            probes[Probe.VELOCITY] = point.velocity
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
         is_still = rests(memory) or point.velocity == 0
         probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
