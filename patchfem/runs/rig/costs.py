@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine.
 
 In: a Model. Out: numbers of steps, CPU times, and whether a time integration with constant steps is
 chosen instead of steps from event to event.
@@ -14,18 +14,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import cost_model
-from ...core import Missing
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import find_max_acceleration, find_max_frequency_ratio
+from ...structure.drive_sizes import (
+    find_drive_omega,
+    find_max_acceleration,
+    find_max_frequency_ratio,
+)
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
-MAX_EXACT_SECONDS = (
-    600.0  # Largest CPU time [s] of a motion from event to event; a longer one is refused.
-)
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -189,9 +189,22 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
         rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
-        speed = 4 * rig.displacement_scale / rig.drive.signal.period
-        rate = max(rate, speed / min(length, keys.slip_growth or inf))
+        rate = max(rate, _estimate_slide_speed(rig) / min(length, keys.slip_growth or inf))
     return rate
+
+
+def _estimate_slide_speed(rig) -> float:
+    """Estimate the mean speed [m/s] of the fastest interface of a rig, from its drive and its start."""
+    modes = rig.modes
+    drive = rig.drive.signal
+    omega = find_drive_omega(drive)
+
+    # Motion of the modes without restoring forces, of which an interface sees its participation.
+    peaks = [np.abs(modes.base) * find_max_acceleration(drive) / omega]
+    if rig.start is not None:
+        peaks += [np.abs(rig.start.v), omega * np.abs(rig.start.z)]
+    peak = np.max(np.abs(modes.interfaces) @ np.transpose(peaks))
+    return 2 / pi * float(peak)
 
 
 def _estimate_stiff_fraction(model: Model, limit: float) -> float:
@@ -254,19 +267,3 @@ def prefers_time_steps(model: Model) -> bool:
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
-
-
-def refuse_long_hybrid_run(model: Model) -> None:
-    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
-    seconds = estimate_hybrid_seconds(model)
-    if seconds > MAX_EXACT_SECONDS:
-        march = ""
-        if estimate_march_seconds(model) < seconds:
-            march = ', or use accuracy.method = "march"'
-        raise Missing(
-            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by events, "
-            f"the fastest free vibration and the friction law) would need a computing time of about {seconds:.0f} s, "
-            f"more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness of modes and "
-            f"elements{march}",
-            "",
-        )
