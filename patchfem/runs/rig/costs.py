@@ -8,7 +8,7 @@ over which a law forgets, and from the events of friction elements.
 """
 
 from functools import lru_cache
-from math import inf, log2, pi, sqrt
+from math import inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -33,10 +33,6 @@ STEPS_PER_EVENT = 3.0
 MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
-# an error of 2e-4 of the motion of a slipping joint.
-MAX_MERGES = 4
-MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
 # Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
     "steps_per_cycle",
@@ -44,10 +40,6 @@ MARCH_SETTINGS = (
     "merge",
     "shear_modes",
 )
-# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
-# where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
-# 1.26 were measured.
-STIFF_TIME_EXPONENT = 9.0
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -75,24 +67,6 @@ def steps_per_cycle(model: Model) -> int:
     return model.accuracy.steps_per_cycle or min(
         max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
     )
-
-
-def count_cell_merges(model: Model) -> int:
-    """Return how many times neighbouring slider cells are merged in pairs for the first run.
-
-    The error is proportional to the square of the cell width. If it exceeds the tolerance, the run
-    is repeated with more cells (`Numerics.finer`).
-    """
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if (
-        not laws
-        or model.partial_slip
-        or model.rig.friction.has_partial_slip
-        or not all(law_has_trait(law, "cells") for law in laws)
-    ):
-        return 0
-    n_merges = MAX_MERGES + log2(model.accuracy.tolerance / MERGE_TOLERANCE) / 2
-    return int(min(max(n_merges, 0), MAX_MERGES))
 
 
 def find_interface_load(model: Model, interface) -> float:
@@ -185,8 +159,7 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
     limit = keys.static * find_interface_load(model, interface)
     rate = ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * mobility
     if keys.reference_speed:
-        slope = limit / keys.reference_speed * mobility
-        rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
+        rate = max(rate, limit / keys.reference_speed * mobility)
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
         rate = max(rate, _estimate_slide_speed(rig) / min(length, keys.slip_growth or inf))
@@ -205,25 +178,6 @@ def _estimate_slide_speed(rig) -> float:
         peaks += [np.abs(rig.start.v), omega * np.abs(rig.start.z)]
     peak = np.max(np.abs(modes.interfaces) @ np.transpose(peaks))
     return 2 / pi * float(peak)
-
-
-def _estimate_stiff_fraction(model: Model, limit: float) -> float:
-    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
-
-    It is 1 if there are several modes or if the drive force is below the friction limit, and smaller otherwise.
-
-    Parameters
-    ----------
-    model : Model
-        Drive and modes; friction must depend on speed.
-    limit : float
-        Largest friction force [N].
-    """
-    modes = model.rig.modes
-    if modes.omega.size > 1 or not modes.slide[0] or not limit:
-        return 1.0
-    push = find_max_acceleration(model.rig.drive.signal) * abs(modes.base[0] / modes.slide[0])
-    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - modes.mass * push / limit))))
 
 
 def estimate_hybrid_seconds(model: Model) -> float:
