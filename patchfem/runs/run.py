@@ -386,6 +386,8 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunI
         faces=(face._replace(patches=worn, unworn=face.patches),),
         progress=None,
         stiffer=stiffer,
+        # The time of the wear, which has passes of its own, is not that of the motion.
+        limit=inputs.limit._replace(begin=process_time()),
     )
 
 

@@ -55,7 +55,7 @@ def add_level_errors(
         solved = {
             key: (*run.levels, *[none] * len(levels))[number] for key, run in solutions.items()
         }
-        sources, _ = estimate_errors(None, level.values, coarser_runs, solved)
+        sources = estimate_errors(None, level.values, coarser_runs, solved)
         errors = dict(level.errors)
         for name, causes in split_errors(level.values, sources).items():
             errors[name] = errors.get(name, 0.0) + sum(causes.parts.values())
