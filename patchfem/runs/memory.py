@@ -203,21 +203,16 @@ def _read_number(path: Path, name: str = "", place: int = 0) -> float:
         return float("nan")
 
 
-def reason_for_refusal(plan: Plan) -> str:
-    """Return why a run needs more memory than is free, or "" if it does not."""
+def refuse_insufficient_memory(plan: Plan) -> None:
+    """Raise Missing if a run would need more memory than is free, with the largest contribution and its remedy."""
     parts = list_parts(plan)
     free = free_bytes()
     total = sum(part.bytes for part in parts)
     if total <= free:
-        return ""
+        return
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
     largest = next(part for part in parts if part.remedy)
     if largest.bytes < 0.1 * total:
-        return f"{text}; free some memory, or run on a machine with more memory"
-    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {largest.remedy}"
-
-
-def refuse_insufficient_memory(plan: Plan) -> None:
-    """Raise Missing if a run would need more memory than is free."""
-    if text := reason_for_refusal(plan):
-        raise Missing(text, "")
+        raise Missing(f"{text}; free some memory, or run on a machine with more memory", "")
+    size = f"{largest.bytes / 1e9:.3g} GB"
+    raise Missing(f"{text}; {size} of these are for {largest.what}: {largest.remedy}", "")
