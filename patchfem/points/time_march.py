@@ -783,11 +783,6 @@ def enlarge_lists(system: System, place: str) -> System:
     return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
 
 
-def count_list_bytes(n_strips: float) -> float:
-    """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
-    return 3 * STRIP_BYTES * min(n_strips, MAX_LIST_STRIPS)
-
-
 def split_losses(samples, n: int, scale: float) -> np.ndarray:
     """Return the loss [J] in each step between samples, friction work less the gain of stored energy.
 
