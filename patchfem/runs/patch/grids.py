@@ -27,8 +27,8 @@ N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
 MAX_GRID_COLUMNS = 120
-# Each of the following dicts has a value for a static patch (True) and for a patch in motion
-# (False), which gets fewer nodes, because every node slows down each time step.
+# Each of the following dicts has a value for a fine mesh (True) and for that of a patch in a rig or with wear (False), which
+# gets fewer nodes, because every node slows down each time step or jump (`PatchMesh.is_fine`).
 CELL_GROWTH = {
     True: 0.5,
     False: 0.9,
@@ -69,7 +69,7 @@ MAX_SEARCHES = 8
 # would have the same columns.
 BAND_CHANGE_TOL = 0.1
 MIN_LEVELS = 3  # Smallest number of nested meshes at which the order of convergence is known.
-# Largest predicted CPU time [s] of condensing a mesh, by whether the patch is static; more
+# Largest predicted CPU time [s] of condensing a mesh, by whether the mesh is a fine one; more
 # expensive meshes are not tried.
 MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
 SECONDS_PER_NODE = 4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^NODE_EXPONENT
@@ -165,7 +165,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
         layout = make_column_layout(patch_model, extents)
         edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
         is_resolved = _resolves_contact(patch_model, x, layout, contact.slip_zones)
-        if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and is_resolved:
+        if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_fine] - 1) and is_resolved:
             break
         if _have_bands_converged(layout, previous_layout):
             break
@@ -228,7 +228,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     length = patch_model.pieces.length
     half = length / 2
     mesh = patch_model.mesh
-    n_edge_cells = EDGE_CELLS[mesh.is_static]
+    n_edge_cells = EDGE_CELLS[mesh.is_fine]
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
 
@@ -292,7 +292,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[mesh.is_static],
+        CELL_GROWTH[mesh.is_fine],
     )
 
 
@@ -401,7 +401,7 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
         x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
-    growth = CELL_GROWTH[patch_model.mesh.is_static]
+    growth = CELL_GROWTH[patch_model.mesh.is_fine]
     pieces = patch_model.pieces.both
     grids = []
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
