@@ -16,7 +16,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
 from patchfem import PatchfemError
-from patchfem.export import page
+from patchfem.export.fields import film
 from patchfem.export.fields.blocks import FIELDS
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
@@ -250,6 +250,6 @@ def test_refuses_impossible_mesh_of_a_page(tmp_path, name, value, is_refused):
         with pytest.raises(
             PatchfemError, match=f"{path}: not the fields .* node that does not exist"
         ):
-            page.make_stress_panels(path)
+            film.make_stress_panels(path)
     else:
-        assert len(page.make_stress_panels(path)) == 1
+        assert len(film.make_stress_panels(path)) == 1

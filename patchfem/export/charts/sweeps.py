@@ -109,14 +109,16 @@ def list_measures(answers: Answers) -> list[str]:
     The main ones that change come first, in the order of the verdict, then the other main ones, then all others.
     """
     known = [
-        name
-        for answer in answers.values()
-        for name in answer.data
-        if f"{name}_error" in answer.data and np.isfinite(answer.data[name].values).any()
+        name for answer in answers.values() for name in answer.data if _has_values(answer, name)
     ]
     ranges = [name for answer in answers.values() for name in answer.quantities]
     changing = [name.removeprefix("smallest_") for name in ranges if name.startswith("smallest_")]
     return [name for name in dict.fromkeys((*changing, *MAIN_MEASURES, *known)) if name in known]
+
+
+def _has_values(answer: Answer, name: str) -> bool:
+    """Return whether a variable of a sweep is a measure, which has errors, with a value in at least one case."""
+    return f"{name}_error" in answer.data and bool(np.isfinite(answer.data[name].values).any())
 
 
 def spread_indices(size: int, count: int) -> np.ndarray:
@@ -175,7 +177,8 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
     curves = []
     axes = ()
     for title, answer in answers.items():
-        if name not in answer.data:
+        # the name may be that of a swept key of another sweep
+        if not _has_values(answer, name):
             continue
         view = view_sweep(answer)
         shares = answer.details.get("ranking", {}).get(name)

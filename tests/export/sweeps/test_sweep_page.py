@@ -1,6 +1,7 @@
 """Answer and page of a sweep: sentences, quantities and charts agree with sweep.csv."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,11 @@ from command_line import run_cli
 from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
 
+import patchfem as pf
 from patchfem.export import store
+from patchfem.export.charts.sweeps import make_menu
+from patchfem.export.charts.table import CHARTS
+from patchfem.export.sweeps.dataset import to_dataset
 
 KINDS = {
     "one key": ("rig", ("--over", "friction.static=0.3,0.35,0.6,0.1")),
@@ -107,3 +112,22 @@ def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     assert "How far the key may go" in text and "contact fraction" in text
     values = answer.data["pressure_peak"].values
     assert f"{values[-1] / 1e6:.4g} MPa" in answer.verdict[0]
+
+
+def test_exact_page_of_two_sweeps_shows_measures_of_each(folders, tmp_path):
+    """A measure is drawn for the sweeps that have values of it; one that sweeps a key of this name once ended in a fault."""
+    kinds = ("random", "one key")
+    paths = [folders[kind] for kind in kinds]
+    assert run_cli("report", *paths, "-o", tmp_path / "both.html").code == 0
+
+    answers = {kind: store.read(path) for kind, path in zip(kinds, paths)}
+    unknown = answers["random"].data["loop_area"]
+    answers["random"].data["loop_area"] = replace(
+        unknown, values=np.full(unknown.values.shape, np.nan)
+    )
+    menu = make_menu(answers, CHARTS["sweep"][1])
+    drawn = {panel.title: [curve.name for curve in panel.curves] for panel in menu.choices}
+    assert drawn["relative displacement amplitude"] == ["random", "one key"]
+    assert drawn["normal load"] == drawn["loop area"] == ["one key"]
+    with pytest.raises(pf.PatchfemError, match="no measure 'loop_area'"):
+        pf.plot.sweep(to_dataset(answers["random"]), "loop_area")
