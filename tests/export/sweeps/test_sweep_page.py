@@ -131,3 +131,14 @@ def test_exact_page_of_two_sweeps_shows_measures_of_each(folders, tmp_path):
     assert drawn["normal load"] == drawn["loop area"] == ["one key"]
     with pytest.raises(pf.PatchfemError, match="no measure 'loop_area'"):
         pf.plot.sweep(to_dataset(answers["random"]), "loop_area")
+
+
+def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):
+    """A sweep of a single case says that this case settled; once the sentence began with "All 1 cases"."""
+    scene = folders["one key"].parent / "rig.toml"
+    out = tmp_path / "out"
+    assert run_cli("sweep", scene, "--over", "friction.static=0.35", "-o", out).code == 0
+    assert store.read(out).verdict == (
+        "Only one case has a result, so that no change is known.",
+        "The only case settled and meets the tolerance.",
+    )
