@@ -122,9 +122,18 @@ def make_figure(panels: list[Panel]):
 
 
 def save(figure, target, ending: str, dpi: float = 150.0) -> None:
-    """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
+    """Write a figure of matplotlib such that equal figures give equal files.
 
-    `ending` is the format without a dot, such as "svg", and `dpi` the number of pixels per inch.
+    Parameters
+    ----------
+    figure : matplotlib Figure
+        Figure to write.
+    target : Path or stream
+        File or stream that receives it.
+    ending : str
+        Format without a dot, such as "svg".
+    dpi : float
+        Pixels per inch.
     """
     from matplotlib import rc_context
 
