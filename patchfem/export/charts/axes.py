@@ -122,7 +122,7 @@ def make_figure(panels: list[Panel]):
 
 
 def save(figure, target, ending: str, dpi: float = 150.0) -> None:
-    """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
+    """Write a figure of matplotlib such that equal figures give equal files.
 
     Parameters
     ----------
