@@ -5,10 +5,18 @@ from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason; longer reasons are cut
+MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason
 
 # Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
 MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
+
+
+def shorten(text, length: int = 40) -> str:
+    """Make a text from a file or a library printable and at most `length` characters long."""
+    text = " ".join(str(text).split())
+    if not text.isprintable():
+        text = text.encode("unicode_escape").decode()
+    return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 @contextmanager
@@ -22,7 +30,5 @@ def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     except (PatchfemError, *MISTAKES):
         raise
     except Exception as error:
-        reason = " ".join(str(error).split())[:MAX_REASON_LENGTH]
-        if not reason.isprintable():
-            reason = type(error).__name__
+        reason = shorten(error, MAX_REASON_LENGTH)
         raise PatchfemError(f"{message} ({reason}){remedy}") from None

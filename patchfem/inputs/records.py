@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
+from .damage import shorten
+from .tables import require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
 MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
@@ -209,7 +211,7 @@ def find_channel(path, channels: list[Channel], source: str) -> Channel:
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
     raise PatchfemError(
-        f"{path}: no channel '{source[:60]}'; the file has {describe_channels(channels)}"
+        f"{path}: no channel '{shorten(source, 60)}'; the file has {describe_channels(channels)}"
     )
 
 
@@ -218,8 +220,8 @@ def describe_channels(channels: list[Channel]) -> str:
     texts = []
     for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
         place = f" at {channel.place}" if channel.place else ""
-        unit = f" [{channel.unit[:20]}]" if channel.unit else ""
-        texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
+        unit = f" [{shorten(channel.unit, 20)}]" if channel.unit else ""
+        texts.append(f"{number} '{shorten(channel.name)}'{place}{unit}")
     n_unlisted = len(channels) - MAX_LISTED_CHANNELS
     listed = ", ".join(texts) or "no channel of numbers"
     return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
@@ -268,14 +270,8 @@ def make_records(
                 f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number"
             )
 
-    time = values.get("time")
-    late = [] if time is None else np.flatnonzero(np.diff(time) <= 0)
-    if len(late):
-        k = late[0]
-        raise PatchfemError(
-            f"{path}: time {time[k + 1]:.9g} s of sample {k + 2} is not later than "
-            f"{time[k]:.9g} s of the sample before; times must strictly rise"
-        )
+    if "time" in values:
+        require_increasing_time(f"{path}: sample ", values["time"], second_row=2)
     frozen = {name: frozen_array(column) for name, column in values.items()}
     return Records(Path(path), frozen, notes, channel_list)
 
@@ -298,7 +294,7 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
     if factor is None:
         if not channel.unit and "" not in CHANNEL_UNITS[quantity]:
             raise PatchfemError(
-                f"{path}: '{channel.name[:40]}' has no unit; write --map "
+                f"{path}: '{shorten(channel.name)}' has no unit; write --map "
                 f'"{quantity}=CHANNEL [{SI_UNITS[quantity]}]"'
             )
         factor = find_unit_factor(quantity, channel.unit, f"{path}: ")
@@ -320,8 +316,8 @@ def _find_shared_time(
     for channel in selected:
         if channel.time is None or not np.array_equal(channel.time, times[0]):
             raise PatchfemError(
-                f"{path}: '{channel.name[:40]}' is sampled at other times than "
-                f"'{selected[0].name[:40]}'; use --map to choose channels that have the same "
+                f"{path}: '{shorten(channel.name)}' is sampled at other times than "
+                f"'{shorten(selected[0].name)}'; use --map to choose channels that have the same "
                 f"times; the channels are {channel_list}"
             )
     return times[0]
