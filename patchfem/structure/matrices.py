@@ -189,8 +189,8 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
 def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) for a stiffness K [N/m].
 
-    `root` is the Cholesky factor (n, n) of the mass matrix, or its diagonal (n,). The columns of the shapes are
-    eigenvectors y of L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
+    `root` is the Cholesky factor (n, n) of the mass matrix. The columns of the shapes are eigenvectors y of
+    L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
     """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
@@ -215,19 +215,15 @@ def _require_finite(per_mass) -> np.ndarray:
     return per_mass
 
 
-def _factor_mass(M):
-    """Return the Cholesky factor (n, n) of a mass matrix M, or its square roots (n,) if M is diagonal."""
+def _factor_mass(M) -> np.ndarray:
+    """Return the Cholesky factor (n, n) of a mass matrix M."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
-    if not (M - np.diag(diagonal)).any():
-        root = scale
-        is_positive = bool((root > 0).all())
-    else:
-        try:
-            root = cholesky(M, lower=True)
-            is_positive = bool((np.diag(root) > np.sqrt(len(M) * EIGENVALUE_TOL) * scale).all())
-        except LinAlgError:
-            is_positive = False
+    try:
+        root = cholesky(M, lower=True)
+        is_positive = bool((np.diag(root) > np.sqrt(len(M) * EIGENVALUE_TOL) * scale).all())
+    except LinAlgError:
+        is_positive = False
     if not is_positive:
         massless = np.flatnonzero(diagonal <= 0)
         example = f" (coordinate {massless[0] + 1} has none)" if massless.size else ""
@@ -239,16 +235,11 @@ def _factor_mass(M):
 
 
 def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
-    """Solve L X = right with the Cholesky factor L of the mass matrix, or L^T X = right if `transpose`.
+    """Solve L X = right with the Cholesky factor L (n, n), `root`, of the mass matrix, or L^T X = right if `transpose`.
 
-    `root` is L (n, n), or its diagonal (n,) if the mass matrix is diagonal.
+    An overflow is not refused here, but by `_require_finite`.
     """
-    if root.ndim == 2:
-        return solve_triangular(
-            root, right, lower=True, trans="T" if transpose else "N", check_finite=False
-        )
-    with np.errstate(over="ignore"):  # `_require_finite` raises an error instead
-        return right / root[:, None]
+    return solve_triangular(root, right, lower=True, trans=int(transpose), check_finite=False)
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
