@@ -1,11 +1,12 @@
-"""Errors for damaged files."""
+"""Errors for damaged files, and short quotations of what files contain."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
 MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason
+MAX_LISTED = 12  # largest number of names that a message lists
 
 # Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
 MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
@@ -17,6 +18,12 @@ def shorten(text, length: int = 40) -> str:
     if not text.isprintable():
         text = text.encode("unicode_escape").decode()
     return text if len(text) <= length else f"{text[: length - 3]}..."
+
+
+def list_some(texts: Sequence[str]) -> str:
+    """Join texts with commas; those beyond `MAX_LISTED` are only counted."""
+    n_more = len(texts) - MAX_LISTED
+    return ", ".join(texts[:MAX_LISTED]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 @contextmanager

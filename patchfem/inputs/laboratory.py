@@ -111,7 +111,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     if len(names) > MAX_TABLE_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-            f"needed, not '{shorten(table.separator.join(names), MAX_LINE_LENGTH)}'"
+            f"needed, not '{shorten(table.header, MAX_LINE_LENGTH)}'"
         )
     columns = [name.lower().replace(" ", "_") for name in names]
     channels = []

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..core import PatchfemError
 from . import matlab
-from .damage import refuse_damage
+from .damage import list_some, refuse_damage
 from .packed import count_zip_bytes, refuse_large_content
 from .symmetric import SKEW_REFUSAL, symmetrize
 
@@ -27,7 +27,6 @@ MATRIX_NAMES = {
 }
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
-MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
 
 
 class Matrix(NamedTuple):
@@ -122,7 +121,7 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
             return short_names[known]
     names = list(names)
     if len(names) != 1:
-        contents = ", ".join(names[:MAX_LISTED_ARRAYS]) or "none"
+        contents = list_some(names) or "none"
         raise PatchfemError(
             f"{path}: contains no {matrix_name} under a known name ({', '.join(MATRIX_NAMES[matrix_name])}); its arrays: "
             f"{contents}"

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
-from .damage import shorten
+from .damage import list_some, shorten
 from .tables import require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
 MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
-MAX_LISTED_CHANNELS = 12  # largest number of channels that an error message lists
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 
@@ -139,8 +138,12 @@ def select_channels(
         channels have different times.
     """
     channel_list = describe_channels(channels)
+    # A unit that the user states overrules that of the file.
     if requests:
-        selected = [_make_requested_channel(path, channels, request) for request in requests]
+        selected = []
+        for quantity, source, unit in requests:
+            channel = find_channel(path, channels, source)._replace(quantity=quantity)
+            selected.append(channel._replace(unit=unit, factor=None) if unit else channel)
     else:
         selected = [channel for channel in channels if channel.quantity]
 
@@ -167,15 +170,6 @@ def select_channels(
     if time is not None:
         values = {"time": time, **values}
     return make_records(path, values, notes, channel_list)
-
-
-def _make_requested_channel(path, channels: list[Channel], request: RequestedChannel) -> Channel:
-    """Return a channel with the quantity of a request, and the unit if the request has one.
-
-    `path` names the file of the `channels` in messages.
-    """
-    channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
-    return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
 
 def find_channel(path, channels: list[Channel], source: str) -> Channel:
@@ -218,13 +212,11 @@ def find_channel(path, channels: list[Channel], source: str) -> Channel:
 def describe_channels(channels: list[Channel]) -> str:
     """Return a list of the channels as text, with number, name, degree of freedom and unit."""
     texts = []
-    for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
+    for number, channel in enumerate(channels, 1):
         place = f" at {channel.place}" if channel.place else ""
         unit = f" [{shorten(channel.unit, 20)}]" if channel.unit else ""
         texts.append(f"{number} '{shorten(channel.name)}'{place}{unit}")
-    n_unlisted = len(channels) - MAX_LISTED_CHANNELS
-    listed = ", ".join(texts) or "no channel of numbers"
-    return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
+    return list_some(texts) or "no channel of numbers"
 
 
 def make_records(

@@ -62,12 +62,14 @@ class TextTable(NamedTuple):
     """Text of a table.
 
     - path: file.
+    - header: first line of the file.
     - names, units: name and unit of each column. The unit is None if there is none.
     - separator: sign between the cells.
     - lines: lines below the header, without blank ones at the end.
     """
 
     path: Path
+    header: str
     names: list[str]
     units: list[str | None]
     separator: str
@@ -89,28 +91,6 @@ class TextTable(NamedTuple):
                     f"{len(cells)} as in '{shorten(line, MAX_LINE_LENGTH)}'"
                 )
             yield number, cells
-
-
-def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
-    """Read the lines of the text file `path`.
-
-    The last one is empty after a final line break. `contents` says in messages what the file is, and `remedy` what to do
-    if there is no such file.
-    """
-    try:
-        with open_for_reading(path) as file:
-            text = file.read(MAX_BYTES + 1)
-        if len(text) > MAX_BYTES:
-            raise PatchfemError(
-                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
-            )
-        lines = text.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-        return lines.split("\n")
-    except FileNotFoundError:
-        raise Missing(f"{path}: there is no such file{remedy}") from None
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
 
 
 def split_cells(location: str, line: str, separator: str) -> list[str]:
@@ -157,14 +137,29 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     PatchfemError
         If the file cannot be read or is too large.
     """
-    header, *lines = _read_lines(path, contents, remedy)
+    try:
+        with open_for_reading(path) as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise PatchfemError(
+                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
+            )
+        text = data.decode("utf-8-sig")
+    except FileNotFoundError:
+        raise Missing(f"{path}: there is no such file{remedy}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
+
+    # Lines end as on any system. Blank ones at the end do not count.
+    header, *lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     while lines and not lines[-1].strip():
         lines.pop()
     separator = max(",;\t", key=header.count)
     cells = split_cells(f"{path}:1", header, separator)
     heads = [_HEAD_PATTERN.fullmatch(cell).groups() for cell in cells]
     units = [unit if other is None else other for _, unit, other in heads]
-    return TextTable(path, [name for name, *_ in heads], units, separator, lines)
+    return TextTable(path, header, [name for name, *_ in heads], units, separator, lines)
 
 
 def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
@@ -173,11 +168,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     Raises PatchfemError if the header is not that of the format, `form`.
     """
     names = table.names
-    heads = []
-    for name, unit in zip(names, table.units):
-        heads.append(name if unit is None else f"{name} [{unit}]")
-    header = table.separator.join(heads)
-    quoted = shorten(header, MAX_LINE_LENGTH)
+    quoted = shorten(table.header, MAX_LINE_LENGTH)
     expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{quoted}'"
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")

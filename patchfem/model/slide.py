@@ -137,9 +137,9 @@ class SlidePath:
         time = index * period / steps
         if self.run_in:
             n_run_in = max(2, ceil(steps * self.run_in / (4 * self.amplitude)))
-            run_in = np.linspace(0, self.run_in, n_run_in + 1)
-            time = np.concatenate([run_in / self.speed, time[1:] + self.run_in / self.speed])
-            rel_disp = np.concatenate([run_in, self.run_in - rel_disp[1:]])
+            run_in = self.run_in * np.arange(n_run_in) / n_run_in
+            time = np.concatenate([run_in, time * self.speed + self.run_in]) / self.speed
+            rel_disp = np.concatenate([run_in, self.run_in - rel_disp])
         return SlideSamples(time, rel_disp, max(0, time.size - 1 - steps), 2 * np.pi / period)
 
     def steps(self, tolerance: float, pinned_steps: int | None, length: float | None) -> int:

@@ -241,18 +241,18 @@ class CurveModel(FreeKeys):
     def solve(
         self, measured: MeasuredCurve, method: str, starts: int = 1, kind: str = "", start=None
     ) -> Fit:
-        """Fit the keys to a measured curve by a method of the backbone.
+        """Fit the keys to a measured curve by least squares.
 
         Parameters
         ----------
         measured : MeasuredCurve
-            Frequency and damping ratio with their errors.
+            Frequencies [Hz] and damping ratios (2, k) at k amplitudes, with their standard deviations.
         method : str
-            From METHODS.
+            Method by which a backbone computes the curve of the model, such as "balance".
         starts : int
-            Number of starting points.
+            Number of starting points of the search.
         kind : str
-            Value of `IntervalKind`.
+            How confidence intervals are computed: "rows" for independent rows, "series" for correlated ones, "" for none.
         start : (n,) array, optional
             First starting point in place of that of the scene.
 

@@ -357,6 +357,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     n_independent = fitted.keys.fit.intervals.rows
     warnings = []
 
+    # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
     if fitted.rms > MIN_RMS * peak and n_independent < MIN_INDEPENDENT * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
@@ -364,10 +365,11 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
             "is systematic"
         )
 
-    # A law with memory carries no force before its first slide.
+    # The model carries no force before its first slide. A law without memory does not depend on the start, and rows that
+    # are held out are not fitted.
     first_force = abs(loop.reading[0])
-    starts_at_rest = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
-    if first_force > MAX_FIRST_FORCE * peak and not starts_at_rest:
+    needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
+    if first_force > MAX_FIRST_FORCE * peak and not needs_no_start:
         warnings.append(
             f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
             "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "
