@@ -188,6 +188,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
                 f"{table.path}:1: {name} [{shorten(unit)}]: unknown unit; use one of {known}"
             )
 
+    # An entry such as "displacement slide" is met by either column.
     absent = [text.split()[0] for text in form.required if not set(text.split()) & set(names)]
     if absent:
         raise PatchfemError(f"{expected} (no column {', '.join(absent)})")

@@ -171,7 +171,8 @@ def _make_channel(
             f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
 
-    # A channel whose label states a unit of its quantity needs no factor.
+    # A channel whose label states a unit of its quantity needs no factor. Dataset 164 gives the length (force) in the unit
+    # of the file that equals one SI unit.
     unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
     factor = None
     if quantity and unit not in CHANNEL_UNITS[quantity]:

@@ -191,6 +191,7 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
     length = float(x[-1] - x[0])
     nodes = np.linspace(x[0], x[-1], max(1, round(length / cell)) + 1)
     raw = _read_without_spikes(path, nodes, 2 * cell)
+    # Here larger heights are a wider gap, so that the heights of a surface change their sign.
     if is_material:
         raw = replace(raw, z=frozen_array(-raw.z))
     trace = level(raw)

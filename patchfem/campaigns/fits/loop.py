@@ -265,24 +265,31 @@ def fit_hysteresis_loop(
     keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
     keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
 
+    # Mistakes in the files that the scene names do not depend on the keys. They are raised here, because a search takes an
+    # error as a failed evaluation.
     with locate_errors(scene):
-        build(scene)  # mistakes in the files that the scene names do not depend on the keys
+        build(scene)
 
-    # least squares of the deviations, as fractions of the largest force
+    # Least squares of the deviations, as fractions of the largest force. A force that depends on the time steps is fitted
+    # with the largest steps first, without intervals.
     bench = BenchModel(keys, loop, time, say)
     scale = np.abs(loop.reading[~held_out]).max(initial=0.0)
     problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
         fit = problem.solve(interval_kind="series" if bench.is_exact else "")
     except NotConverged:
-        keys.base.override(keys.assign([bound.low for bound in ranges]))  # raises its mistakes
+        # If a value of the keys makes the scene invalid, its mistakes are raised instead.
+        keys.base.override(keys.assign([bound.low for bound in ranges]))
         raise
+
+    # The steps are halved until the force at this result converges, and the search goes on from there.
     if not bench.is_exact:
-        # the steps are chosen at the result of the fit with the largest steps
         first = fit
         bench.refine_steps(first.values)
         fit = replace(problem, start=first.values).solve(1, "series")
         fit = fit.count_earlier_search(first)
+
+    # The warnings need the fitted loop, and belong to its keys.
     fitted = FittedLoop(
         keys=keys.make_fitted_keys(fit),
         loop=loop,
