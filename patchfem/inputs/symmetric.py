@@ -29,9 +29,9 @@ def to_real(values, subject: str):
     PatchfemError
         If an imaginary part is not 0.
     """
-    values = numbers = values if sparse.issparse(values) else np.asarray(values)
-    if sparse.issparse(values):
-        numbers = values.data
+    is_sparse = sparse.issparse(values)
+    values = values if is_sparse else np.asarray(values)
+    numbers = values.data if is_sparse else values
     if not np.iscomplexobj(numbers):
         return values
 

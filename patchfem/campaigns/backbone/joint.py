@@ -302,6 +302,8 @@ def build_joint(model: Model, name: str) -> JointMode:
             "structure",
         )
 
+    # The pressed patch on its mesh and on coarser ones, of which None marks the end. The joint that was bolted in the modal
+    # test is taken off the modes of `model`.
     patch = None
     stiffer = None
     coarser: tuple[Patch | None, ...] = (None,)
@@ -309,6 +311,7 @@ def build_joint(model: Model, name: str) -> JointMode:
         model, (patch, *others), stiffer = solve_without_joint(model)
         coarser = (*others, None)
 
+    # First the mode without its contact, which has no frequency of stick.
     number = _find_mode(model.rig, name)
     modes = model.rig.modes
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
