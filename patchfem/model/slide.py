@@ -130,9 +130,8 @@ class SlidePath:
         `index` (k,) counts the samples from 0. After a run-in of the length `run_in` [m] the wave starts in the
         opposite direction.
         """
-        rel_disp = self.amplitude * np.interp(
-            index % steps * (4 / steps), (0, 1, 3, 4), (0, 1, -1, 0)
-        )
+        quarter = index % steps / steps * 4
+        rel_disp = self.amplitude * np.interp(quarter, (0, 1, 3, 4), (0, 1, -1, 0))
         period = 4 * self.amplitude / self.speed
         time = index * period / steps
         if self.run_in:
