@@ -1,8 +1,8 @@
 """A measured friction loop: rows of displacement and force, and optionally time and labels."""
 
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ EXPORTED_NAMES = {
 }
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Loop:
+class Loop(NamedTuple):
     """A measured friction loop.
 
     - path: file.

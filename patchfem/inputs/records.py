@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,20 +50,17 @@ class RequestedChannel(NamedTuple):
     unit: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Records:
+class Records(NamedTuple):
     """Channels in SI with a common time axis.
 
-    - path: file that was read.
     - values: values (k,) of each quantity by name, with `time` [s] first if there is one.
     - notes: sentences on what was not read as it stands.
     - channel_list: all channels of the file in words.
     """
 
-    path: Path
     values: dict[str, np.ndarray]
-    notes: list[str] = field(default_factory=list)
-    channel_list: str = ""
+    notes: list[str]
+    channel_list: str
 
 
 def check_file(path: Path, remedy: str) -> None:
@@ -220,7 +216,7 @@ def describe_channels(channels: list[Channel]) -> str:
 
 
 def make_records(
-    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str = ""
+    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str
 ) -> Records:
     """Check arrays in SI and return them as `Records`.
 
@@ -265,7 +261,7 @@ def make_records(
     if "time" in values:
         require_increasing_time(f"{path}: sample ", values["time"], second_row=2)
     frozen = {name: frozen_array(column) for name, column in values.items()}
-    return Records(Path(path), frozen, notes, channel_list)
+    return Records(frozen, notes, channel_list)
 
 
 def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

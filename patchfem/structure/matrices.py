@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError
-from ..inputs.symmetric import read_numbers, symmetrize
+from ..inputs.symmetric import read_row, symmetrize
 from .modes import make_basis
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
@@ -97,19 +97,23 @@ def build_basis(
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
     # Rows of the interfaces and of the output; the sign of each mode follows from them.
-    faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
+    faces = (
+        np.zeros((0, n))
+        if faces is None
+        else np.atleast_2d(read_row(faces, "slide", n, allows_rows=True))
+    )
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
-    output = _check_row(output, n, "output")
+    output = read_row(output, "output", n)
     sign = _find_shape_signs(phi, output)
     phi = phi * sign
     zeta, damping = split_damping(D * np.outer(sign, sign), omega)
 
     # Participation of the drive.
     if force is not None:
-        participation = -phi.T @ _check_row(force, n, "force")
+        participation = -phi.T @ read_row(force, "force", n)
     else:
-        base = np.ones(n) if base is None else _check_row(base, n, "base")
+        base = np.ones(n) if base is None else read_row(base, "base", n)
         participation = phi.T @ (M @ base)
 
     slides = faces @ phi
@@ -306,18 +310,6 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
             D = trim_round_off(rotation.T @ D @ rotation, np.maximum(scale, scale.max()))
         first = last
     return phi, D
-
-
-def _check_row(row, n: int, name: str) -> np.ndarray:
-    """Return a row of numbers as an array (n,), after checking that it has n finite real entries.
-
-    A column is returned as a row. If `name`, the name of the row in the error message, is "slide", the result may have
-    several rows (k, n).
-    """
-    if name == "slide":
-        return read_numbers(row, name, (n,), (None, n))
-    is_column = np.ndim(row) == 2 and 1 in np.shape(row)
-    return read_numbers(np.ravel(row) if is_column else row, name, (n,))
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:
