@@ -1057,8 +1057,12 @@ class Record:
         window_start = part[-1, NUMBER] - self.n_window
         while len(self.recent) > 1 and self.recent[1][0, NUMBER] <= window_start:
             rows = self.recent.pop(0)
-            if self.keeps_samples and sum(map(len, self.early)) <= checkpoint.MAX_EARLY_SAMPLES:
+            if self.keeps_samples:
                 self.early.append(rows[: -1 : self.stride])
+        # Every second sample is kept if there are too many; a cycle then need not begin with one.
+        if sum(map(len, self.early)) > checkpoint.MAX_EARLY_SAMPLES:
+            self.early = [np.concatenate(self.early)[::2]]
+            self.stride *= 2
 
     def repeat(self, count: int) -> None:
         """Append copies of the last part of a motion that repeats, instead of computing its next cycles.
