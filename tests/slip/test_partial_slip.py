@@ -14,7 +14,7 @@ from yielding_points import jenkins_forces, solve_all_points
 from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
-from patchfem.slip import find_sufficient_modes, jenkins_set, scale_limits
+from patchfem.slip import find_sufficient_modes, jenkins_set
 from patchfem.slip.shear_modes import shear_modes
 
 MU = 0.3
@@ -26,20 +26,20 @@ def friction_limit(cells, angle):
     return MU * press(pair, tilt(pair.interface.x, angle), LOAD).sigma_n * pair.interface.weight
 
 
-def test_exact_scaled_limits_equal_recomputed_elements():
-    """Elements whose limits are scaled by a factor equal elements computed for the scaled friction
-    limits, within 1e-11."""
+def test_exact_yield_displacements_are_in_proportion_to_limits():
+    """Friction limits that are multiplied by a factor multiply the yield displacements by this factor, and leave the
+    stiffnesses unchanged, within 1e-11."""
     pair = make_coated_pair(20)
     limit = friction_limit(20, 1e-4)
-    scaled = scale_limits(jenkins_set(pair.tangential, limit), 0.37)
-    recomputed = jenkins_set(pair.tangential, 0.37 * limit)
-    assert np.array_equal(scaled.points, recomputed.points)
+    elements = jenkins_set(pair.tangential, limit)
+    scaled = jenkins_set(pair.tangential, 0.37 * limit)
+    assert np.array_equal(scaled.points, elements.points)
     for name in ("yield_displacement", "limit"):
-        assert getattr(scaled, name) == pytest.approx(getattr(recomputed, name), rel=1e-11)
+        assert getattr(scaled, name) == pytest.approx(0.37 * getattr(elements, name), rel=1e-11)
     for name in ("stiffness", "force_matrix"):
         assert (
-            np.abs(getattr(scaled, name) - getattr(recomputed, name)).max()
-            < 1e-11 * np.abs(recomputed.stiffness).max()
+            np.abs(getattr(scaled, name) - getattr(elements, name)).max()
+            < 1e-11 * np.abs(elements.stiffness).max()
         )
 
 
