@@ -13,7 +13,7 @@ import numpy as np
 
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
-from ...contact.edges import ContactEdge
+from ...contact.edges import contact_intervals
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
     PointCompliance,
@@ -329,10 +329,11 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
 
     # The edges between the points follow from the forces on the points in contact.
     contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
-    intervals = _contact_intervals(active, contact_edges, length)
+    # A loaded point at an end of the interface is in contact as far as this end.
+    intervals = contact_intervals(half_points[[0, -1]], force[[0, -1]], contact_edges)
     are_alike = patch_model.pieces.are_alike
     edge_values = EdgeValues(
-        length=float(np.maximum(np.diff(intervals).ravel(), 0.0).sum()),
+        length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
         normal=set_stiffness(normal, active, unit, contact_edges),
         tangential=set_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
@@ -370,21 +371,6 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.n_iterations,
         bool(corner_force > MIN_CORNER_PRESSURE_RATIO * force.max()),
     )
-
-
-def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) -> np.ndarray:
-    """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool, `active`.
-
-    An interval ends at a contact edge between two points, or at an end of the interface. The edges are in order of x,
-    and `length` is that of the interface [m].
-    """
-    is_active = np.concatenate([[False], active, [False]])
-    edges = iter(contact_edges)
-    ends = []
-    for point in np.flatnonzero(is_active[1:] != is_active[:-1]):
-        is_inside = 0 < point < active.size
-        ends.append(next(edges).position if is_inside else (point / active.size - 0.5) * length)
-    return np.array(ends).reshape(-1, 2)
 
 
 def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
