@@ -26,7 +26,7 @@ from ..model.structure import compute_sticking_stiffness
 from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
 from .patch import mesh_levels, store
-from .patch.jenkins_elements import elements, strip_elements
+from .patch.jenkins_elements import join_elements, list_elements
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -164,10 +164,7 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
     if not model.partial_slip:
         return compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
     length = _find_bond_length(model, load)
-    if patch.strips is not None:
-        strips = strip_elements(patch, f.static, length)
-        return float(sum(strip_element.stiffness.sum() for strip_element in strips))
-    return float(elements(patch, f.static, length).stiffness.sum())
+    return float(join_elements(list_elements(patch, f.static, length)).stiffness.sum())
 
 
 def _find_bond_length(model: Model, load: float) -> float:
