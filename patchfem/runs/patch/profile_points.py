@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact.active_set import patch_problem
-from ...contact.conjugate_gradients import solve_by_gradients
+from ...contact.conjugate_gradients import fit_motion, solve_by_gradients
 from ...contact.edges import contact_intervals
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
@@ -390,28 +390,25 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     x = normal.x
     loading = patch_model.loading
     initial_force = None if start is None else np.repeat(start, 2) / 2
-    has_approach = loading.approach is not None
-    offset = loading.approach if has_approach else gap.min()
-    moment = loading.moment
-
-    problem = patch_problem(x, gap - offset, loading.load, moment, loading.rotational_stiffness)
+    offset = float(gap.min()) if loading.approach is None else loading.approach
+    problem = patch_problem(
+        x, gap - offset, loading.load, loading.moment, loading.rotational_stiffness
+    )
     force, n_iterations = solve_by_gradients(
         normal, problem, CONTACT_TOL, MAX_CONTACT_ITERATIONS, initial_force
     )
 
-    # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).
+    # Approach and rotation follow from the rigid motion of the loaded points, as far as it is free (least squares).
     active = force > 0
-    approach = float(offset)
-    rotation = patch_model.gap.angle
-    if not has_approach and active.any():
-        displacement = (gap + normal.product(force))[active]
-        approach = float(displacement.mean())
-        if moment is not None:
-            middle = x[active].mean()
-            arms = x[active] - middle
-            slope = float(arms @ displacement) / max(float(arms @ arms), 1e-300)
-            approach -= float(slope * middle)
-            rotation -= slope
+    closing = gap - offset + normal.product(force)
+    motion = np.zeros(2)
+    motion[: problem.target.size] = fit_motion(problem.motions[active], closing[active])
+    approach, slope = motion.tolist()
     return PointForces(
-        force, float(force.sum()), float(force @ x), approach, rotation, n_iterations
+        force,
+        float(force.sum()),
+        float(force @ x),
+        approach=offset + approach,
+        rotation=patch_model.gap.angle - slope,
+        n_iterations=n_iterations,
     )
