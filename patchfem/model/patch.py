@@ -340,7 +340,7 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
         file=trace.file if trace is not None else "",
     )
 
-    # Peaks that a trace or root mean squares determine.
+    # Radius, density and heights of Hertzian asperities may follow from a trace or from its root mean squares.
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)

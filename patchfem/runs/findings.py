@@ -7,11 +7,10 @@ the allowed one therefore needs a resolution that is finer by the factor `excess
 """
 
 from collections.abc import Callable, Mapping
-from math import ceil, floor, log2, log10, pi
+from math import ceil, floor, log2, log10
 from typing import NamedTuple
 
 from ..core import Measure
-from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
@@ -60,8 +59,6 @@ class Missed(NamedTuple):
         Result of the run.
     faces : tuple of Face
         Pressed interfaces of the run, or the one to which the measures belong.
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     model : Model
         Model of the run or of the interface.
     measures : Mapping
@@ -72,7 +69,6 @@ class Missed(NamedTuple):
 
     result: Result
     faces: tuple[Face, ...]
-    next_seconds: float
     model: Model
     measures: Mapping[str, Measure]
     excess: Mapping[str, float]
@@ -94,6 +90,11 @@ class Missed(NamedTuple):
         """Named measure with the largest ratio of error to allowed error."""
         return max(self.find_names(), key=self.excess.get)
 
+    def is_time_short(self, *axes: str) -> bool:
+        """Return whether accuracy.max_seconds ended the refinement along one of some axes."""
+        shortage = self.result.shortage
+        return shortage is not None and shortage.axis in axes
+
     def make_finding(self, advice: Advice) -> Finding:
         """Return the finding on these measures: errors, tolerance and advice."""
         first, *others = self.find_names()
@@ -106,9 +107,7 @@ class Missed(NamedTuple):
         return Finding(words, advice)
 
 
-def find_missed_measures(
-    result: Result, faces: tuple[Face, ...], next_seconds: float = 0.0
-) -> list[Finding]:
+def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Finding]:
     """Return a finding on the static measures of each interface that miss the tolerance, and one on those of the motion.
 
     Parameters
@@ -117,8 +116,6 @@ def find_missed_measures(
         Result of the run.
     faces : tuple of Face
         Pressed interfaces of the run.
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     """
     model = result.plan.model
     measures = result.measures
@@ -137,11 +134,11 @@ def find_missed_measures(
         missed = {name: excess.pop(full) for name, full in numbered.items() if full in excess}
         if not missed:
             return []
-        return _find_static(Missed(result, (face,), next_seconds, face.model, own, missed))
+        return _find_static(Missed(result, (face,), face.model, own, missed))
 
     findings = merge_findings(model, faces, find_on_face)
     if excess:
-        motion = Missed(result, faces, next_seconds, model, measures, excess)
+        motion = Missed(result, faces, model, measures, excess)
         findings.append(motion.make_finding(_advise_on_motion(motion)))
     return findings
 
@@ -225,10 +222,8 @@ def _advise_mesh(
         return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
     if not all(patch_model.mesh.is_automatic for patch_model, _ in solved):
         return Advice(f"{cause}leave out {ELEMENT_SIZE}", ELEMENT_SIZE)
-    if missed.next_seconds:
-        limit = _round_up(MAX_SECONDS_MARGIN * missed.next_seconds)
-        text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for finer meshes"
-        return Advice(text, "accuracy.max_seconds", limit)
+    if missed.is_time_short("mesh"):
+        return _advise_time(missed, "finer meshes", cause)
     if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
         return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
@@ -242,10 +237,14 @@ def _advise_mesh(
     return Advice(text, "accuracy.tolerance", tolerance)
 
 
-def _round_up(value: float) -> float:
-    """Return a value rounded up to two significant digits."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return unit * ceil(value / unit)
+def _advise_time(missed: Missed, purpose: str, cause: str = "") -> Advice:
+    """Return the advice to allow the CPU time that further passes need, for a purpose and after a clause on the cause."""
+    # The proposed time has two significant digits.
+    seconds = MAX_SECONDS_MARGIN * missed.result.shortage.seconds
+    unit = 10.0 ** (floor(log10(seconds)) - 1)
+    limit = unit * ceil(seconds / unit)
+    text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for {purpose}"
+    return Advice(text, "accuracy.max_seconds", limit)
 
 
 def _advise_on_motion(missed: Missed) -> Advice:
@@ -256,6 +255,8 @@ def _advise_on_motion(missed: Missed) -> Advice:
     """
     name = missed.worst
     axis = refine.find_axis(missed.measures[name], name)
+    if axis != "mesh" and missed.is_time_short(axis):
+        return _advise_time(missed, "smaller time steps")._replace(axis=axis)
     advise = ADVICE_BY_AXIS.get(axis)
     advice = None if advise is None else advise(missed)
     if advice is not None:
@@ -266,7 +267,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     harmonics = missed.result.settings.harmonics
     if harmonics is None or name.startswith(SAMPLED_MEASURES):
         return NO_ADVICE
-    return notes.advise_harmonics(harmonics, _count_friction_harmonics(missed))
+    return notes.advise_harmonics(harmonics)
 
 
 def _advise_steps(missed: Missed) -> Advice | None:
@@ -356,15 +357,3 @@ ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
     "modes": _advise_shear_modes,
     "bonds": _advise_bond_sum,
 }
-
-
-def _count_friction_harmonics(missed: Missed) -> float:
-    """Return the number of harmonics that a velocity-dependent friction force needs.
-
-    It is the largest slip velocity divided by the reference speed of the law; 0 for other laws.
-    """
-    law = missed.model.friction
-    slip = missed.measures.get("slip_amplitude")
-    if law is None or slip is None or not law_has_trait(law.law, "creeps"):
-        return 0.0
-    return 2 * pi / missed.result.motion.period * slip.value / law.reference_speed

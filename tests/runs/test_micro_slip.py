@@ -103,6 +103,28 @@ def test_status_agrees_with_traction_and_slip():
     np.testing.assert_array_equal(slips, (change > 1e-6 * change.max()) & loaded)
 
 
+@pytest.mark.parametrize(
+    "law, amplitude, tolerance",
+    [("elastic-plastic", 0, 1e-15), ("elastic-plastic", 1e-6, 1e-8), ("nonlocal", 0, 1e-8)],
+)
+def test_slip_is_slide_less_stretch_of_bonds_and_pieces(law, amplitude, tolerance):
+    """The slip of a node is the slide less the stretch of its bonds and the elastic displacement under all tractions,
+    without grooves and over low ones."""
+    scene = SLIDING_BENCH.replace("7.8188e-08", "2e-06").replace("cycles = 2", "cycles = 1")
+    scene = scene.replace('"coulomb"', f'"{law}"\nbond_length = "0.1 um"')
+    if amplitude:
+        scene += f'[contact.grooves]\nwavelength = "80 um"\namplitude = "{amplitude} um"\n'
+    result = pf.run(scene)
+    patch, fields = result.patch, result.fields
+    traction, pressure = fields["shear_stress"], fields["normal_stress"]
+    loaded = pressure > 0
+    stretch = 1e-7 * traction / np.where(loaded, 0.359 * pressure, 1.0)
+    bend = (traction * patch.pieces.interface.weight) @ patch.slip_compliance.T
+    slip = fields["holder_slide"][:, None] - stretch - bend
+    np.testing.assert_allclose(fields["slip"][loaded], slip[loaded], rtol=0, atol=tolerance)
+    assert np.abs(slip[loaded]).max() > 1e-6
+
+
 def test_status_of_first_frame_in_rig_agrees_with_traction():
     """The first frame of a motion after earlier cycles has no slip to compare with: a node slips whose traction is at the
     limit."""

@@ -99,7 +99,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     # The runs are stored by their settings, because several estimates share one run.
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
-    errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
+    errors = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
     if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
@@ -108,6 +108,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     for settings in coarser_runs[0].runs:
         run = bench_runs[settings]
         step_runs.append(StepRun(settings.steps, run.seconds, run.values))
+    seconds = sum(run.seconds for run in bench_runs.values())
     return BenchErrors(errors, seconds, step_runs)
 
 

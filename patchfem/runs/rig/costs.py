@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine.
 
 In: a Model. Out: numbers of steps, CPU times, and whether a time integration with constant steps is
 chosen instead of steps from event to event.
@@ -8,24 +8,24 @@ over which a law forgets, and from the events of friction elements.
 """
 
 from functools import lru_cache
-from math import inf, log2, pi, sqrt
+from math import inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ... import cost_model
-from ...core import Missing
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import find_max_acceleration, find_max_frequency_ratio
+from ...structure.drive_sizes import (
+    find_drive_omega,
+    find_max_acceleration,
+    find_max_frequency_ratio,
+)
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
-MAX_EXACT_SECONDS = (
-    600.0  # Largest CPU time [s] of a motion from event to event; a longer one is refused.
-)
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -33,10 +33,6 @@ STEPS_PER_EVENT = 3.0
 MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
-# an error of 2e-4 of the motion of a slipping joint.
-MAX_MERGES = 4
-MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
 # Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
     "steps_per_cycle",
@@ -44,10 +40,6 @@ MARCH_SETTINGS = (
     "merge",
     "shear_modes",
 )
-# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
-# where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
-# 1.26 were measured.
-STIFF_TIME_EXPONENT = 9.0
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -75,24 +67,6 @@ def steps_per_cycle(model: Model) -> int:
     return model.accuracy.steps_per_cycle or min(
         max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
     )
-
-
-def count_cell_merges(model: Model) -> int:
-    """Return how many times neighbouring slider cells are merged in pairs for the first run.
-
-    The error is proportional to the square of the cell width. If it exceeds the tolerance, the run
-    is repeated with more cells (`Numerics.finer`).
-    """
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if (
-        not laws
-        or model.partial_slip
-        or model.rig.friction.has_partial_slip
-        or not all(law_has_trait(law, "cells") for law in laws)
-    ):
-        return 0
-    n_merges = MAX_MERGES + log2(model.accuracy.tolerance / MERGE_TOLERANCE) / 2
-    return int(min(max(n_merges, 0), MAX_MERGES))
 
 
 def find_interface_load(model: Model, interface) -> float:
@@ -185,32 +159,25 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
     limit = keys.static * find_interface_load(model, interface)
     rate = ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * mobility
     if keys.reference_speed:
-        slope = limit / keys.reference_speed * mobility
-        rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
+        rate = max(rate, limit / keys.reference_speed * mobility)
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
-        speed = 4 * rig.displacement_scale / rig.drive.signal.period
-        rate = max(rate, speed / min(length, keys.slip_growth or inf))
+        rate = max(rate, _estimate_slide_speed(rig) / min(length, keys.slip_growth or inf))
     return rate
 
 
-def _estimate_stiff_fraction(model: Model, limit: float) -> float:
-    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
+def _estimate_slide_speed(rig) -> float:
+    """Estimate the mean speed [m/s] of the fastest interface of a rig, from its drive and its start."""
+    modes = rig.modes
+    drive = rig.drive.signal
+    omega = find_drive_omega(drive)
 
-    It is 1 if there are several modes or if the drive force is below the friction limit, and smaller otherwise.
-
-    Parameters
-    ----------
-    model : Model
-        Drive and modes; friction must depend on speed.
-    limit : float
-        Largest friction force [N].
-    """
-    modes = model.rig.modes
-    if modes.omega.size > 1 or not modes.slide[0] or not limit:
-        return 1.0
-    push = find_max_acceleration(model.rig.drive.signal) * abs(modes.base[0] / modes.slide[0])
-    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - modes.mass * push / limit))))
+    # Motion of the modes without restoring forces, of which an interface sees its participation.
+    peaks = [np.abs(modes.base) * find_max_acceleration(drive) / omega]
+    if rig.start is not None:
+        peaks += [np.abs(rig.start.v), omega * np.abs(rig.start.z)]
+    peak = np.max(np.abs(modes.interfaces) @ np.transpose(peaks))
+    return 2 / pi * float(peak)
 
 
 def estimate_hybrid_seconds(model: Model) -> float:
@@ -254,19 +221,3 @@ def prefers_time_steps(model: Model) -> bool:
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
-
-
-def refuse_long_hybrid_run(model: Model) -> None:
-    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
-    seconds = estimate_hybrid_seconds(model)
-    if seconds > MAX_EXACT_SECONDS:
-        march = ""
-        if estimate_march_seconds(model) < seconds:
-            march = ', or use accuracy.method = "march"'
-        raise Missing(
-            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by events, "
-            f"the fastest free vibration and the friction law) would need a computing time of about {seconds:.0f} s, "
-            f"more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness of modes and "
-            f"elements{march}",
-            "",
-        )

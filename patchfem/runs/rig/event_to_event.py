@@ -167,9 +167,7 @@ class LumpedEvaluator(RunEvaluator):
     """Runs of the engine `hybrid` and their evaluation."""
 
     def __init__(self, model, numerics, patch, joints: Joints):
-        super().__init__(
-            model, numerics, patch, joints.contact, joints.stick_tolerance, LATE_SAMPLES_PER_CYCLE
-        )
+        super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
         self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
@@ -498,7 +496,7 @@ class LumpedEvaluator(RunEvaluator):
             if change > 0 and name not in ERROR_MEASURES:
                 row = find_definition(name)
                 error = convergence_error(change, order=row.order)
-                errors[name] = error + row.sample_error / self.steps
+                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
         return errors
 
 

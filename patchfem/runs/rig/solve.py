@@ -111,7 +111,7 @@ class Runner:
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
-        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)[0]
+        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
 
     def list_step_runs(
         self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns

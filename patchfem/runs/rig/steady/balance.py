@@ -305,7 +305,7 @@ class BalanceFinder:
         middle = (window.output.max() + window.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = CycleRun(window, extremes, energies, motion.find_reversals())
-        evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
+        evaluator = BalanceEvaluator(self.model, self.numerics, self.patch)
         return evaluator.evaluate_measures(run, drive), run
 
     def trace_curve(self, drive) -> ResponseCurve:
