@@ -93,7 +93,7 @@ Verbose = flag_option("print all numbers", "-v", "--verbose")
 class Output:
     """Options of all commands that write a results folder.
 
-    Without `out` no files are written.
+    Without `out` no files are written. A picture of another format is refused before anything is computed.
     """
 
     out: Out = None
@@ -102,6 +102,10 @@ class Output:
     json_: Json = False
     quiet: Quiet = False
     verbose: Verbose = False
+
+    def __post_init__(self):
+        if self.plot is not None:
+            axes.find_picture_format(self.plot)
 
     def into(self, name: str) -> "Output":
         """Return the output into the folder that -o gives, or into out/NAME."""
