@@ -159,7 +159,7 @@ def describe_command() -> str:
 
 
 def present(answer: "Answer", output: Output) -> None:
-    """Print an answer, draw its picture, and print the names of its files.
+    """Print an answer and the names of its files, and draw its picture.
 
     The options in `output` tell what is printed, and where picture and files go.
     """
@@ -175,10 +175,11 @@ def present(answer: "Answer", output: Output) -> None:
             _print_remark(f"warning: {text}")
         for text in answer.remarks.notes:
             note(text)
-    if output.plot is not None:
-        axes.write_plot(answer, output.plot)
     if output.out is not None and not (output.json_ or output.quiet):
         print(*show.list_files(output.out, not output.no_page), sep="\n", flush=True)
+    # the results are in place and named if the picture cannot be written
+    if output.plot is not None:
+        axes.write_plot(answer, output.plot)
 
 
 def refuse_existing(out: Path | None) -> None:
