@@ -66,12 +66,11 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
         If no mode moves the output.
     """
     is_rigid = (basis.omega == 0) & (basis.output != 0)
-    shape = np.zeros(basis.omega.size)
     if is_rigid.any():
-        shape[is_rigid] = basis.output[is_rigid]
+        shape = np.where(is_rigid, basis.output, 0.0)
     else:
-        is_elastic = basis.omega > 0
-        shape[is_elastic] = basis.output[is_elastic] / basis.omega[is_elastic] ** 2
+        none = np.zeros(basis.omega.size)
+        shape = np.divide(basis.output, basis.omega**2, out=none, where=basis.omega > 0)
     output = float(shape @ basis.output)
     if output == 0:
         raise PatchfemError(
