@@ -296,5 +296,5 @@ def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     -------
     (s, n) ndarray
     """
-    yaw = np.zeros(modes.slide.size) if modes.yaw is None else modes.yaw
+    yaw = np.zeros_like(modes.slide) if modes.yaw is None else modes.yaw
     return modes.slide - np.outer(offsets, yaw)

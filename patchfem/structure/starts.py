@@ -7,7 +7,7 @@ from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 def start_at_rest(basis: ModalBasis, z=0.0) -> InitialState:
     """Return the initial state of a modal basis at rest with the coordinates z (n,) [m]."""
-    zero = np.zeros(basis.omega.size)
+    zero = np.zeros_like(basis.omega)
     return InitialState(frozen_array(zero + z), frozen_array(zero))
 
 
@@ -69,7 +69,7 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
     if is_rigid.any():
         shape = np.where(is_rigid, basis.output, 0.0)
     else:
-        none = np.zeros(basis.omega.size)
+        none = np.zeros_like(basis.omega)
         shape = np.divide(basis.output, basis.omega**2, out=none, where=basis.omega > 0)
     output = float(shape @ basis.output)
     if output == 0:
