@@ -203,7 +203,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     model = inputs.plan.model
     engine = ENGINES[numerics.engine]
     size = model.rig.displacement_scale
-    runner = Runner(inputs, numerics)
+    runner = Runner(inputs)
     first = runner.solve(numerics)
     inputs.seconds.update({"march": first.seconds} | (first.prepare or {}))
 
