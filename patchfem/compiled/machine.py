@@ -57,6 +57,8 @@ class ArgumentConverter:
             return _convert_array(value)
         if not isinstance(value, tuple):
             raise UnsupportedError
+
+        # A cached tuple stands as (tuple, type code, words) at its `id`.
         known = self.known_tuples.get(id(value))
         if known is None:
             codes, words = zip(*map(self.convert, value)) if value else ((), ())

@@ -199,7 +199,7 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
     if table.contact is None:
         return None
     try:
-        patch = patch_models.build_patch(table.contact, scene.kind, scene.resolve_path)
+        patch = patch_models.build_patch(table.contact, scene.resolve_path)
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise

@@ -24,7 +24,6 @@ from .structure import (
     build_own_modes,
     build_start,
     compute_joint_stiffnesses,
-    compute_natural_frequencies,
     find_bolted_scene,
     has_pressed_joint,
     needs_strip_displacements,
@@ -411,11 +410,7 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
     slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
     elastic = np.flatnonzero(own_modes.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-
-    # A frequency that the scene states is free of the round-off of the modes.
     frequency = float(own_modes.omega[first]) / (2 * np.pi)
-    if structure.mode and structure.measured == "free":
-        frequency = structure.mode[first].frequency
 
     # The mass at the output is that of this mode, or of all coordinates if the mode does not move the output.
     mass = structure.moving_mass
@@ -455,7 +450,7 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
         else:
             bolted = bolted._replace(stiffness=tuple(compute_joint_stiffnesses(bolted_scene)))
     return RigStructure(
-        frequencies=compute_natural_frequencies(structure, modes),
+        frequencies=modes.omega / (2 * np.pi),
         lists_modes=bool(structure.mode),
         notes=tuple(read_file_notes(scene)),
         bolted=bolted,

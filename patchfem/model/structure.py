@@ -5,7 +5,7 @@ give the same quantities for each description.
 """
 
 from dataclasses import replace
-from math import inf, pi
+from math import inf
 
 import numpy as np
 
@@ -276,17 +276,6 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
     `modal` (k, n) [m] are coordinates of `modes`.
     """
     return modal if modes.shapes is None else modal @ modes.shapes.T
-
-
-def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring, or 0 for rigid-body modes.
-
-    `structure` is the table [structure], and `modes` are the modes with the spring.
-    """
-    if structure.mode and structure.bonded is None and structure.measured == "free":
-        # Frequencies that the scene states are returned without the round-off of the modes.
-        return np.array([mode.frequency for mode in structure.mode])
-    return modes.omega / (2 * pi)
 
 
 def needs_strip_displacements(scene) -> bool:

@@ -889,6 +889,7 @@ def commit(system, h):
 
     # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
+    is_any_held = False
     for j in range(count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
@@ -896,6 +897,7 @@ def commit(system, h):
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
         elif points.numbers[0, j] == Law.COULOMB:
+            is_any_held = is_any_held or points.trial[0, j] == 0
             was_held = is_held(points, p) and points.trial[0, j] == 0
             ports.values[Port.FREE, p] = slide if was_held else 0.0
             values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
@@ -932,7 +934,7 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    if options.has_events and system.sets.counters[PRESENT_SLOT] >= 0:
+    if is_any_held and system.sets.counters[PRESENT_SLOT] >= 0:
         return_ports_to_rest(system)
         rest += energy - find_motion_energy(system)
         if ports.contact[0] >= 0:

@@ -19,6 +19,7 @@ from ..friction.path_work import sampled_work
 from ..structure.histories import find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
+from .exponentials import exponential
 from .law_rows import Law
 from .laws import N_MEMORY, N_NUMBERS
 from .march_rows import (
@@ -60,7 +61,6 @@ LONG_LIST_ADVICE = (
 )
 MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
-TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
@@ -207,35 +207,6 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
             parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
         forms = [form + whole.T @ form @ whole for form in forms]
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
-
-
-def exponential(matrix, time: float, powers) -> np.ndarray:
-    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
-
-    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
-
-    Parameters
-    ----------
-    matrix : (k, k) array
-        Matrix of the rates of the state.
-    time : float
-        [s]
-    powers : (k,) array
-        Powers of the unit of each state.
-    """
-    # In units of the time the entries of the exponent are of order 1.
-    units = time**-powers
-    ratio = units[:, None] / units
-    exponent = time * matrix / ratio
-    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
-    exponent = exponent / 2**n_squares
-    identity = np.eye(powers.size)
-    result = identity
-    for order in range(TAYLOR_DEGREE, 0, -1):
-        result = identity + exponent @ result / order
-    for _ in range(n_squares):
-        result = result @ result
-    return result * ratio
 
 
 def make_system(
@@ -1086,8 +1057,12 @@ class Record:
         window_start = part[-1, NUMBER] - self.n_window
         while len(self.recent) > 1 and self.recent[1][0, NUMBER] <= window_start:
             rows = self.recent.pop(0)
-            if self.keeps_samples and sum(map(len, self.early)) <= checkpoint.MAX_EARLY_SAMPLES:
+            if self.keeps_samples:
                 self.early.append(rows[: -1 : self.stride])
+        # Every second sample is kept if there are too many; a cycle then need not begin with one.
+        if sum(map(len, self.early)) > checkpoint.MAX_EARLY_SAMPLES:
+            self.early = [np.concatenate(self.early)[::2]]
+            self.stride *= 2
 
     def repeat(self, count: int) -> None:
         """Append copies of the last part of a motion that repeats, instead of computing its next cycles.

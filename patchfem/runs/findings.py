@@ -157,11 +157,10 @@ def _find_static(missed: Missed) -> list[Finding]:
 
     (face,) = missed.faces
     findings = [missed.make_finding(_advise_on_statics(missed, face))]
-    patch = (face.static or face.patches)[0]
     if face.model.patch.gap.profile is None:
         return findings
     if face.patch.points is None or missed.model.kind != "patch":
-        element = longest_loaded_cell(patch.x, patch.active)
+        element = longest_loaded_cell(face.patch.x, face.patch.active)
         findings += map(Finding, trace_split.advise_split(face.model.patch, element))
     return findings
 
@@ -186,9 +185,7 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     # its limit.
     is_at_limit = missed.excess.keys() <= set(patch_rows.MESH_MEASURES)
     name = "mesh" if missed.model.kind == "patch" else "mesh of the pressed pieces"
-    if face.static:
-        patch_model = patch_model.with_mesh(is_static=True, slip=None)
-    solved = [(patch_model, face.unworn or face.static or face.patches)]
+    solved = [(patch_model, face.unworn or face.patches)]
     advice = _advise_mesh(missed, solved, name, is_at_limit=is_at_limit)
     return advice._replace(axis="mesh")
 

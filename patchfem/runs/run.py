@@ -313,19 +313,14 @@ def _press_interfaces(
     tolerance = model.accuracy.tolerance
     solved = (before[0].unworn or before[0].patches) if before else ()
     patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
-    static = ()
-    # After wear the static measures are those of the worn patch.
-    if model.kind == "bench" and model.wear is None and not _is_open(patches[0]):
-        solved = before[0].static if before else ()
-        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate, solved)
-    return (Face(0, "", model, patches, static=static),)
+    return (Face(0, "", model, patches),)
 
 
 def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     """Return a Result with the static measures of interfaces before those of the motion."""
     static: Measures = {}
     for face in pressed:
-        patch, *coarse = face.static or face.patches
+        patch, *coarse = face.patches
         for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
@@ -361,7 +356,7 @@ def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
     result = patch_result.make_static_result(replace(inputs, plan=run_plan, warnings=warnings))
     result = replace(result, outcome=Outcome.NOT_CONVERGED)
     inputs.seconds["total"] = sum(inputs.seconds.values())
-    unmoved = (inputs.faces[0]._replace(static=(), unworn=()),)
+    unmoved = (inputs.faces[0]._replace(unworn=()),)
     return _complete_result(FinishedPass(run_plan.model, result, unmoved, 0.0))
 
 

@@ -1,6 +1,7 @@
 """fields.vtkhdf and its exports agree with the run when VTK, PyVista, meshio and h5py read them."""
 
 import csv
+import shutil
 import tomllib
 
 import h5py
@@ -15,8 +16,6 @@ from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
-from patchfem import PatchfemError
-from patchfem.export import page
 from patchfem.export.fields.blocks import FIELDS
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
@@ -240,16 +239,15 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         ("interface/PointData/normal_stress", -1.0, False),
     ],
 )
-def test_refuses_impossible_mesh_of_a_page(tmp_path, name, value, is_refused):
+def test_refuses_impossible_mesh_of_a_page(bench_folder, tmp_path, name, value, is_refused):
     """A page names the file whose cells have nodes that do not exist; pressures that are all below 0 are drawn."""
-    write_small_series(tmp_path / "out")
-    path = tmp_path / "out" / NAME
-    with h5py.File(path, "r+") as file:
+    folder = shutil.copytree(bench_folder, tmp_path / "out")
+    with h5py.File(folder / NAME, "r+") as file:
         file[f"VTKHDF/{name}"][...] = value
+    answer = run_cli("report", folder, "-o", tmp_path / "page.html")
     if is_refused:
-        with pytest.raises(
-            PatchfemError, match=f"{path}: not the fields .* node that does not exist"
-        ):
-            page.make_stress_panels(path)
+        assert answer.code == 2 and f"{folder / NAME}: not the fields" in answer.err
+        assert "a cell has a node that does not exist" in answer.err
     else:
-        assert len(page.make_stress_panels(path)) == 1
+        assert answer.code == 0
+        assert "von Mises stress in both pieces" in (tmp_path / "page.html").read_text("utf-8")

@@ -122,9 +122,18 @@ def make_figure(panels: list[Panel]):
 
 
 def save(figure, target, ending: str, dpi: float = 150.0) -> None:
-    """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
+    """Write a figure of matplotlib such that equal figures give equal files.
 
-    `ending` is the format without a dot, such as "svg", and `dpi` the number of pixels per inch.
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure to write.
+    target : str, Path or file object
+        File, or stream, which is open for text if the format is "svg".
+    ending : str
+        Format without a dot, such as "svg".
+    dpi : float
+        Number of pixels per inch.
     """
     from matplotlib import rc_context
 

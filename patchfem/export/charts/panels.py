@@ -295,33 +295,3 @@ def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Pan
     curve = Curve("", x[::step], values[:, ::step], rows=rows, meanings=variable.meanings)
     label = colours.label
     return Panel(chart.title, "map", x_axis, y_axis, [curve], chart.caption, colour_label=label)
-
-
-def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
-    """Return the panel of a map that changes over time.
-
-    Parameters
-    ----------
-    frames : dict
-        `x` (k,) and `y` (j,) [m], `times` (f,) [s], `values` (f, j, k).
-    title : str
-        Title of the chart, and name of the values.
-    unit : str
-        SI unit of the values.
-    """
-    positions = np.concatenate([frames["x"], frames["y"]])
-    x_axis = make_axis("x", "m", positions)
-    y_axis = make_axis("y", "m", positions)
-    colours = make_axis(title, unit, frames["values"])
-    times = make_axis("time", "s", frames["times"])
-    curves = [
-        Curve(
-            name=f"{format_number(float(time) * times.scale, 5)} {times.unit}",
-            x=frames["x"] * x_axis.scale,
-            y=values * colours.scale,
-            rows=frames["y"] * y_axis.scale,
-        )
-        for time, values in zip(frames["times"], frames["values"], strict=True)
-    ]
-    caption = "The colours are the same in all frames; the interface is at y = 0."
-    return Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=colours.unit)

@@ -6,7 +6,7 @@ from ...core import PatchfemError
 from .. import netcdf
 from ..answer import Answer
 from ..charts import axes as drawing
-from ..charts.sweeps import list_keys, make_measure_panel
+from ..charts.sweeps import list_keys, list_measures, make_measure_panel
 
 
 def to_dataset(answer: Answer):
@@ -32,10 +32,10 @@ def draw_sweep(dataset, measure: str, axes=None):
     Raises
     ------
     PatchfemError
-        If the dataset is not that of a sweep, or does not have this measure.
+        If the dataset is not that of a sweep, or has no value of this measure.
     """
     answer = netcdf.from_dataset(dataset, "sweep")
-    names = [name for name in answer.data if f"{name}_error" in answer.data]
+    names = list_measures({"": answer})
     if measure not in names:
         listed = ", ".join(sorted(names)) or "none; give a Dataset returned by pf.sweep"
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")

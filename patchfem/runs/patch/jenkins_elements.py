@@ -27,8 +27,7 @@ class StripElements(NamedTuple):
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
     """Return the parallel Jenkins elements of a patch whose nodes yield at their friction limits.
 
-    The limit of a node is the coefficient of friction times its normal force. Coulomb elements with
-    different coefficients have equal springs, so that they are computed once and scaled.
+    The limit of a node is the coefficient of friction times its normal force.
 
     Parameters
     ----------
@@ -39,18 +38,11 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     length : float
         Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
     """
-    load = patch.pressure.sigma_n * patch.pieces.interface.weight
-
-    def make() -> "shear_modes.JenkinsSet":
-        """Compute the Jenkins elements; Coulomb elements are scaled from a coefficient of 1."""
-        if length or not static > 0:
-            return shear_modes.jenkins_set(patch.slip_compliance, static * load, length)
-        unit_elements = store.get_or_compute(
-            ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.slip_compliance, load)
-        )
-        return shear_modes.scale_limits(unit_elements, static)
-
-    return store.get_or_compute(("elements", patch, static, length), make)
+    limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    return store.get_or_compute(
+        ("elements", patch, static, length),
+        lambda: shear_modes.jenkins_set(patch.slip_compliance, limit, length),
+    )
 
 
 def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:

@@ -112,7 +112,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     middle = (span[0] + span[1]) // 2
     count = relative.size
 
-    # Each end is sought in the direction from outside to the middle.
+    # Each end is sought in the direction from outside to the middle: positions, relative depths and which heights are tops
+    # in this direction, the first worn sample, the sample after the middle, and the tops that are not worn.
     tops = find_tops(depths)
     unworn = tops.places[tops.depths < MAX_UNWORN_TOP]
     sides = (
@@ -129,13 +130,19 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     ends = []
     for x, values, is_high, worn, stop, places in sides:
         end = _find_change_point(x[:stop], values[:stop], worn, depths)
+
+        # The track has begun where the depth is beyond that of unworn heights, and not yet at the last few unworn tops
+        # before this place.
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
         beyond = np.sort(places[places < deep])[-MIN_UNWORN_TOPS:]
         farthest = int(beyond[0]) if beyond.size else 0
-        # Where only tops are worn, the end lies between the outermost worn one and those beyond it that are not worn.
+
+        # Where only tops are worn, the end lies between the outermost worn one and those beyond it that are not worn. As
+        # much of the track as lies before it shows whether its valleys are unworn.
         inside = slice(deep, 2 * deep - farthest)
         if not _has_unworn_valleys(values[inside], is_high[inside]):
             farthest = deep
+
         value = min(end.value, float(x[deep]))
         low = min(end.low, float(x[farthest]))
         ends.append(End(value, low, max(end.high, float(x[deep]))))

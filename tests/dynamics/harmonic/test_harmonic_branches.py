@@ -11,10 +11,12 @@ from harmonic_cases import (
     make_five_modes,
     make_sdof,
     make_speed_law,
+    march_exactly,
 )
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
+from yielding_points import jenkins_forces
 
 from patchfem import plan, run
 from patchfem.core import G_N, NotConverged, SineDrive
@@ -32,6 +34,7 @@ from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.series import evaluate_series, half_range
 from patchfem.hybrid import cases, drives, periodic
+from patchfem.hybrid.laws.masing import from_elements
 from patchfem.hybrid.records import LawNumbers
 
 W = 2 * np.pi * 143
@@ -256,6 +259,35 @@ def test_exact_multipliers_of_bonds_agree_with_dop853():
         p, modes, [cases.Interface(numbers, cases.Load(1.0), modes.slide)]
     )
     assert np.abs(multipliers[:2]) == pytest.approx(np.abs(exact[:2]), abs=1e-4)
+
+
+def test_exact_multipliers_of_many_elements_agree_with_perturbed_march():
+    """For five modes and eight elements, all of which slip in a cycle, the multipliers agree with those of differences of a
+    march over a period within 6e-3; the stretches of the elements at its start leave no trace."""
+    modes, (k, w), drive = make_five_modes(), make_elements(8), SineDrive(1.5, 0.8)
+    p = find_steady_motion(modes, drive, Jenkins(k, w), tolerance=1e-5)
+
+    def march_period(state):
+        """Return modes, rates and stretches of the elements after a period of 800 steps."""
+        rows = march_exactly(modes, drive, k, w, state[:10], state[10:], 800)[0]
+        stretch = state[10:]
+        for change in np.diff(rows[:, :5] @ modes.slide):
+            stretch = np.clip(stretch + change, -w, w)
+        return np.concatenate([rows[-1], stretch])
+
+    response = make_cycle_response(p, modes, drive, 800)
+    slides = np.append(np.tile(response.slide[:-1], 2), response.slide[0])
+    stretch = jenkins_forces(slides, k, w)[1]
+    start = np.concatenate([response.modal[0], response.modal_rate[0], stretch])
+    columns = [
+        (march_period(start + step) - march_period(start - step)) / 2e-5
+        for step in 1e-5 * np.eye(start.size)
+    ]
+    exact = np.sort(np.abs(np.linalg.eigvals(np.array(columns).T)))[::-1]
+    interface = cases.Interface(from_elements(k, w), cases.Load(1.0), modes.slide)
+    multipliers = np.abs(find_multipliers(p, modes, [interface]))
+    assert multipliers == pytest.approx(exact[:10], abs=6e-3)
+    assert exact[9] > 0.2 and exact[10] < 1e-6
 
 
 @pytest.mark.parametrize("speed", [0.1, 3e-3])
