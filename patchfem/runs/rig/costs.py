@@ -20,8 +20,6 @@ from ...hybrid import cases
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import (
-    find_drive_omega,
-    find_max_acceleration,
     find_max_frequency_ratio,
 )
 
@@ -166,22 +164,9 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
         rate = max(rate, limit / keys.reference_speed * mobility)
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
-        rate = max(rate, _estimate_slide_speed(rig) / min(length, keys.slip_growth or inf))
+        speed = 2 / pi * rig.slide_speed_scale
+        rate = max(rate, speed / min(length, keys.slip_growth or inf))
     return rate
-
-
-def _estimate_slide_speed(rig) -> float:
-    """Estimate the mean speed [m/s] of the fastest interface of a rig, from its drive and its start."""
-    modes = rig.modes
-    drive = rig.drive.signal
-    omega = find_drive_omega(drive)
-
-    # Motion of the modes without restoring forces, of which an interface sees its participation.
-    peaks = [np.abs(modes.base) * find_max_acceleration(drive) / omega]
-    if rig.start is not None:
-        peaks += [np.abs(rig.start.v), omega * np.abs(rig.start.z)]
-    peak = np.max(np.abs(modes.interfaces) @ np.transpose(peaks))
-    return 2 / pi * float(peak)
 
 
 def estimate_hybrid_seconds(model: Model) -> float:
