@@ -116,7 +116,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         Indices of the interfaces whose patches have a coarser mesh.
     """
     friction = model.rig.friction
-    speed = model.rig.speed_scale
+    speed = model.rig.slide_speed_scale
     if not friction.interfaces:
         return []
     if patch is not None:
