@@ -531,7 +531,15 @@ def start_directions(rig, state):
     """Set the directions of motion at the start of a run; a law keeps a direction that it has.
 
     A new law has that of the velocity, or of the acceleration if there is no velocity. A rigid interface without a
-    velocity is at rest.
+    velocity is at rest. A bench prescribes the slide, so that its interface always moves.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion at its start. The memory of each interface is updated: `Memory.DIRECTION` is 1, -1 or, at rest, 0, and
+        `Memory.CONTACT` is -1 where the surfaces are apart.
     """
     n = rig.modes.shape[1]
     t = state.clock[Clock.TIME]

@@ -157,8 +157,8 @@ class Model:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s]: the peak of a prescribed slide, or that of the rig."""
-        return self.slide.peak_speed if self.rig is None else self.rig.speed_scale
+        """Expected sliding speed [m/s]: the peak of a prescribed slide, or that of the interfaces of a rig."""
+        return self.slide.peak_speed if self.rig is None else self.rig.slide_speed_scale
 
     @property
     def bonds(self) -> Bonds:

@@ -15,6 +15,7 @@ from ..structure.drive_sizes import (
     estimate_peak_speed,
     find_decay_rate,
     find_drive_omega,
+    find_max_acceleration,
 )
 from . import structure_reduced
 from .drive import build_signal
@@ -259,8 +260,22 @@ class Rig:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s] from drive signal and initial state; it sets the default rest speed (2.10)."""
+        """Expected speed [m/s] from drive signal and initial state."""
         return estimate_peak_speed(self.drive.signal, self.start)
+
+    @property
+    def slide_speed_scale(self) -> float:
+        """Expected sliding speed [m/s] of the fastest interface; it sets the default rest speed of bonds (2.10).
+
+        It is that of modes without restoring forces, as far as the interfaces take part in them.
+        """
+        signal = self.drive.signal
+        omega = find_drive_omega(signal)
+        peaks = [np.abs(self.modes.base) * find_max_acceleration(signal) / omega]
+        if self.start is not None:
+            peaks += [np.abs(self.start.v), omega * np.abs(self.start.z)]
+        speeds = np.abs(self.modes.interfaces) @ np.transpose(peaks)
+        return float(speeds.max(initial=0.0))
 
     @property
     def displacement_scale(self) -> float:

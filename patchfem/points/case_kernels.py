@@ -775,6 +775,8 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
+
+    # The irreversible slide turns inside the step where its velocity changes the sign.
     slip = now[Now.SLIP]
     first = seen[Seen.SHARE] * start[1]
     last = share * now[Now.VELOCITY]
@@ -783,6 +785,9 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], force)
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
     seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
+
+    # The work check compares the exact work with the trapezoidal rule over the ends of the steps, relative to the work
+    # that passed through the point in either direction.
     seen[Seen.WORK] += work
     seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
     seen[Seen.PASSED] += abs(work)

@@ -278,3 +278,16 @@ def test_always_loop_errors_of_sweep_are_close_to_single_runs():
         single, shared = (pf.run(case).measures["loop_area"] for case in pair)
         assert shared.error <= 1.5 * single.error
         assert abs(shared.value - single.value) <= shared.error + single.error
+
+
+def test_always_shared_mesh_resolves_zones_of_slip_of_every_case():
+    """The mesh of a sweep over the slide resolves the friction work of small slides too, whose zones of slip are short.
+
+    On the mesh that the static measures need, the loop area of a small slide misses the tolerance.
+    """
+    tilted = TILTED + '[contact.tilt]\nangle = "1e-4 rad"\n' + SHEAR + COULOMB + LOOP
+    amplitudes = ("0.03 um", "0.06 um", "0.1 um", "0.4 um")
+    cases = build_family(tilted, "accuracy.tolerance=1e-2", "slide.amplitude", amplitudes)
+    for amplitude, case in zip(amplitudes, with_shared_meshes(cases), strict=True):
+        assert case.patch.mesh.shared is not None
+        assert pf.run(case).measures["loop_area"].error_ratio(1e-2) <= 1, amplitude

@@ -116,7 +116,9 @@ def _choose_counts(drive, group: LawGroup, harmonics: int | None, start) -> list
 
 def find_amplitudes(slides) -> np.ndarray:
     """Return the amplitudes (...) [m] of slides (..., H + 1), half their range at equal samples."""
-    count = 2 ** (slides.shape[-1] + 63).bit_length()
+    # More than twice as many samples as harmonics, and at least 64.
+    size = slides.shape[-1]
+    count = 2 ** max(size + 63, 2 * size - 1).bit_length()
     return np.ptp(evaluate_series(slides, count), axis=-1) / 2
 
 

@@ -28,6 +28,8 @@ MIN_EXCESS_RATIO = 1e-3
 MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
 HARMONICS_FACTOR = 4  # Ratio of the proposed to the present number of harmonics.
 MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning proposes.
+# Largest number of harmonics that a warning proposes for a steep friction law.
+MAX_PROPOSED_HARMONICS = 500
 
 
 class LawFacts(NamedTuple):
@@ -238,11 +240,12 @@ def find_bonds(model):
     return model.bonds if has_bonds else None
 
 
-def advise_harmonics(n_harmonics: int) -> Advice:
+def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     """Return the advice to use more harmonics in the harmonic balance.
 
     At least MIN_PROPOSED_HARMONICS are proposed, because the convergence of a balance with few
-    harmonics is not known.
+    harmonics is not known. n_law_harmonics: number of harmonics that the friction law needs.
     """
-    n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS)
+    n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
+    n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
     return Advice.set_key("accuracy.harmonics", n_proposed)

@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
 
 In: a Model. Out: numbers of steps, CPU times, and whether a time integration with constant steps is
 chosen instead of steps from event to event.
@@ -14,18 +14,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import cost_model
+from ...core import Missing
 from ...effects import law_has_trait
+from ...hybrid import cases
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import (
-    find_drive_omega,
-    find_max_acceleration,
     find_max_frequency_ratio,
 )
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
+# Ratio of predicted to possible steps of `hybrid` above which a run is refused at once; the engine itself ends one below.
+MAX_STEPS_EXCESS = 10.0
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -162,22 +164,9 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
         rate = max(rate, limit / keys.reference_speed * mobility)
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
-        rate = max(rate, _estimate_slide_speed(rig) / min(length, keys.slip_growth or inf))
+        speed = 2 / pi * rig.slide_speed_scale
+        rate = max(rate, speed / min(length, keys.slip_growth or inf))
     return rate
-
-
-def _estimate_slide_speed(rig) -> float:
-    """Estimate the mean speed [m/s] of the fastest interface of a rig, from its drive and its start."""
-    modes = rig.modes
-    drive = rig.drive.signal
-    omega = find_drive_omega(drive)
-
-    # Motion of the modes without restoring forces, of which an interface sees its participation.
-    peaks = [np.abs(modes.base) * find_max_acceleration(drive) / omega]
-    if rig.start is not None:
-        peaks += [np.abs(rig.start.v), omega * np.abs(rig.start.z)]
-    peak = np.max(np.abs(modes.interfaces) @ np.transpose(peaks))
-    return 2 / pi * float(peak)
 
 
 def estimate_hybrid_seconds(model: Model) -> float:
@@ -221,3 +210,19 @@ def prefers_time_steps(model: Model) -> bool:
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
+
+
+def refuse_long_hybrid_run(model: Model) -> None:
+    """Raise Missing if a run of the engine `hybrid` needs many more steps than the engine takes."""
+    steps = estimate_hybrid_steps(model)
+    cycles = model.rig.drive.cycles
+    if steps * cycles > MAX_STEPS_EXCESS * (cases.MAX_STEPS + cases.MAX_CYCLE_STEPS * cycles):
+        march = ""
+        if estimate_march_seconds(model) < estimate_hybrid_seconds(model):
+            march = ', or use accuracy.method = "march"'
+        raise Missing(
+            f"the motion from event to event would need about {steps:.2g} steps per cycle, set by events, the fastest free "
+            f"vibration and the friction law, far more than the limit of {cases.MAX_STEPS:.0g} steps of a run; lower "
+            f"drive.cycles or the stiffness of modes and elements{march}",
+            "",
+        )

@@ -39,7 +39,7 @@ from ...structure.drive_sizes import (
     is_sinusoidal,
 )
 from ...structure.histories import find_accelerations
-from . import strips
+from . import engines, strips
 from .evaluation import (
     RunEvaluator,
     compute_sampled_work,
@@ -225,7 +225,9 @@ class LumpedEvaluator(RunEvaluator):
         elif outcome is not None:
             message = describe_escape(self.model.rig, travel)
         elif motion.status != Status.DONE:
-            raise NotConverged(motion.message)
+            is_marched = not engines.MARCH.find_unsupported_feature(self.model)
+            march = ', or use accuracy.method = "march"' if is_marched else ""
+            raise NotConverged(motion.message + march)
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period

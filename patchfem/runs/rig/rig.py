@@ -24,7 +24,7 @@ from .. import refine
 from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
-from . import bond_lists, decays, flutter, levels
+from . import bond_lists, costs, decays, flutter, levels
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
@@ -108,7 +108,8 @@ def run_rig(inputs: RunInputs) -> Result:
     Raises
     ------
     Missing
-        If the time steps are too long for the vibration of the block on its bonds.
+        If the run would need far too many steps, or if its time steps do not resolve the vibration of the block on its
+        bonds.
     PatchfemError
         If the drive excites no mode.
     """
@@ -121,7 +122,9 @@ def run_rig(inputs: RunInputs) -> Result:
         )
 
     numerics = choose_numerics(model)
-    if numerics.engine == "march":
+    if numerics.engine == "hybrid":
+        costs.refuse_long_hybrid_run(model)
+    elif numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
     run, shortage = run_refined(inputs, numerics)
 
@@ -203,7 +206,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     model = inputs.plan.model
     engine = ENGINES[numerics.engine]
     size = model.rig.displacement_scale
-    runner = Runner(inputs, numerics)
+    runner = Runner(inputs)
     first = runner.solve(numerics)
     inputs.seconds.update({"march": first.seconds} | (first.prepare or {}))
 

@@ -328,3 +328,14 @@ def test_refuses_motion_that_does_not_converge():
     balance = HarmonicBalance(modes, LawGroup(modes, Jenkins([10.0], [0.08])), 256)
     with pytest.raises(NotConverged, match="did not converge in"):
         balance.solve(np.full(15, 3.0), 1.0, 1.0, max_steps=2)
+
+
+@pytest.mark.parametrize("harmonics", [64, 129, 150, 300])
+def test_exact_given_number_of_harmonics_has_enough_samples(harmonics):
+    """A balance with any number of harmonics is solved; the amplitude is that of 31 harmonics within the stated error."""
+    modes, law = make_five_modes(), Jenkins(*make_elements())
+    drive = SineDrive(1.5, 1.0)
+    rough, fine = (find_steady_motion(modes, drive, law, harmonics=h) for h in (31, harmonics))
+    amplitudes = [motion.amplitude(modes.output) for motion in (rough, fine)]
+    assert fine.harmonics == harmonics
+    assert amplitudes[1] == pytest.approx(amplitudes[0], rel=1e-3)
