@@ -12,9 +12,21 @@ MAX_LISTED_LENGTH = 200  # largest number of characters of a list of values in a
 
 
 def find_cells(columns: Mapping[str, Sequence], name: str, path: Path) -> Sequence:
-    """Return the cells of the column `name` of the table `path`.
+    """Return the cells of a column by which rows can be selected.
 
-    `columns` are the cells of those columns by which rows can be selected. PatchfemError is raised for any other one.
+    Parameters
+    ----------
+    columns : Mapping
+        Column -> its cells, of those columns by which rows can be selected.
+    name : str
+        Column that the user names.
+    path : Path
+        Table, for messages.
+
+    Raises
+    ------
+    PatchfemError
+        If rows cannot be selected by this column.
     """
     if name not in columns:
         known = ", ".join(columns) or "a new column of labels, such as `run`"

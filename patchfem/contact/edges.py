@@ -273,7 +273,8 @@ def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
     Parameters
     ----------
     x, force : (m,) ndarray
-        Positions [m] and forces [N]; the ends of the interface that carry load are ends of intervals.
+        Positions [m] and forces [N]. Only the first and the last count: an end of the interface that carries load is an
+        end of an interval.
     edges : list of ContactEdge
         Edges of the set by increasing x.
     """

@@ -80,12 +80,11 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
     # The rows of all files are those of the sorted degrees of freedom.
     if with_places:
         places, index = _rank_dofs(np.vstack([matrix.places for matrix in matrices]))
-        ends = np.cumsum([len(matrix.places) for matrix in matrices])
-        parts = np.split(index, ends[:-1])
-        return [
-            Matrix(_spread_rows(matrix.values, rows, len(places)), places)
-            for matrix, rows in zip(matrices, parts)
-        ]
+        aligned = []
+        for matrix in matrices:
+            rows, index = np.split(index, [len(matrix.places)])
+            aligned.append(Matrix(_spread_rows(matrix.values, rows, len(places)), places))
+        return aligned
 
     # A file without size may end before the last row, which then has no entry.
     n = max(matrix.values.shape[0] for matrix in matrices)

@@ -187,7 +187,15 @@ def _check_by_reading(read: Callable[[Path], object]) -> Callable[..., None]:
     """
 
     def check_file(path: Path, tables, *, is_valid: bool) -> None:
-        """Read the file `path`; `tables` and `is_valid` have no effect."""
+        """Read the file.
+
+        Parameters
+        ----------
+        path : Path
+            File to check.
+        tables, is_valid
+            Tables of the scene, and whether they are free of mistakes. Both have no effect.
+        """
         read(path)
 
     return check_file

@@ -242,11 +242,8 @@ def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
 
     The trace is placed over the nodes x (m,) [m], and must cover them.
     """
-    trace = read_trace(path)
-    try:
-        return clean(place_over_patch(trace, x), max_gap)
-    except PatchfemError as error:
-        raise type(error)(str(error), error.key or "contact.profile.file") from None
+    with name_key("contact.profile.file"):
+        return clean(place_over_patch(read_trace(path), x), max_gap)
 
 
 _read_profile = cache_by_file(read_profile)

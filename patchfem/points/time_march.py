@@ -329,8 +329,9 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     laws = [point_set.law for point_set in contact.point_sets]
     counts = [law.numbers[0].size for law in laws]
     numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
-    memory = _join_columns(N_MEMORY, [law.memory for law in laws])
-    loads = _join_columns(1, [law.load + 0 * law.numbers[0] for law in laws])[0]
+    n_memory = max([N_MEMORY, *(len(law.memory) for law in laws)])
+    memory = _join_columns(n_memory, [law.memory for law in laws])
+    loads = np.hstack([np.zeros(0), *(law.load + 0 * law.numbers[0] for law in laws)])
     values = np.zeros((len(Point), max(loads.size, n_nodes)))
     values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : loads.size] = loads
 
@@ -382,8 +383,10 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 
 
 def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
-    """Return the columns of all points from the rows of each law, (n_rows,) for one point or (n_rows, c)."""
-    return np.hstack([np.zeros((n_rows, 0)), *(part.reshape(n_rows, -1) for part in parts)])
+    """Return the columns (n_rows, m) of all points from the rows of each law, (k,) for one point or (k, c), k <= n_rows."""
+    columns = [part.reshape(len(part), -1) for part in parts]
+    padded = [np.pad(part, ((0, n_rows - len(part)), (0, 0))) for part in columns]
+    return np.hstack([np.zeros((n_rows, 0)), *padded])
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:

@@ -24,7 +24,7 @@ class CoarserRuns(NamedTuple):
     - rule: function (values of the reference run, *values of the coarse runs) that returns errors by
       measure name.
     - reference: settings of the reference run to which they are compared; None: the fine run.
-    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds", "cells" or
+    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds" or
       "samples"; "own" if no key of a scene sets it.
     """
 

@@ -53,15 +53,15 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             with np.load(path, allow_pickle=False) as file:
                 return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
         variables = read_variables(path)
-    arrays = {name: variables[name] for name in ARRAY_NAMES if name in variables}
-    for name, values in arrays.items():
-        _refuse_large(name, values.shape)
 
     # MATLAB has no vectors: a matrix with a single row or column stands for one.
-    full = {
-        name: values.toarray() if issparse(values) else values for name, values in arrays.items()
-    }
-    return {name: values.ravel() if 1 in values.shape else values for name, values in full.items()}
+    arrays = {}
+    for name in filter(variables.__contains__, ARRAY_NAMES):
+        values = variables[name]
+        _refuse_large(name, values.shape)
+        full = values.toarray() if issparse(values) else values
+        arrays[name] = full.ravel() if 1 in full.shape else full
+    return arrays
 
 
 def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:

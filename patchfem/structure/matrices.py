@@ -97,11 +97,10 @@ def build_basis(
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
     # Rows of the interfaces and of the output; the sign of each mode follows from them.
-    faces = (
-        np.zeros((0, n))
-        if faces is None
-        else np.atleast_2d(read_row(faces, "slide", n, allows_rows=True))
-    )
+    if faces is None:
+        faces = np.zeros((0, n))
+    else:
+        faces = np.atleast_2d(read_row(faces, "slide", n, allows_rows=True))
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
     output = read_row(output, "output", n)
@@ -118,7 +117,7 @@ def build_basis(
 
     slides = faces @ phi
     return make_basis(
-        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        tuple(names or map(str, range(1, n + 1))),
         1.0,
         omega=omega,
         zeta=zeta,

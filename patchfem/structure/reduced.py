@@ -421,7 +421,7 @@ def build_basis(
     # Boundary and drive in the coordinates of the reduction.
     motion = reduction.boundary @ selection
     force = -selection.T @ reduction.base_load if driven_mass is None else motion[driven_mass - 1]
-    boundary_names = names or [str(k + 1) for k in range(n_boundary)]
+    boundary_names = names or map(str, range(1, n_boundary + 1))
     mode_names = [f"mode {k + 1}" for k in range(len(mass) - n_boundary)]
 
     basis = matrices.build_basis(

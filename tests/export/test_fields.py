@@ -2,7 +2,6 @@
 
 import csv
 import shutil
-import tomllib
 
 import h5py
 import meshio
@@ -12,8 +11,8 @@ import pyvista
 from command_line import run_cli
 from exported import frame_values, write_small_series
 from scene_texts import CROWNED_BENCH
+from vtk_frames import read_with_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
 from patchfem.export.fields.blocks import FIELDS
@@ -22,19 +21,6 @@ from patchfem.export.fields.vtkhdf import NAME, read_frames
 PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file
 MAX_ESTIMATE_ROUNDING = 1e-2  # that of stress_error, which is an estimate itself
-
-
-def read_with_vtk(path) -> list:
-    """Return the frames of a file as VTK reads them."""
-    reader = vtkHDFReader()
-    reader.SetFileName(str(path))
-    reader.UpdateInformation()
-    frames = []
-    for number in range(reader.GetNumberOfSteps()):
-        reader.SetStep(number)
-        reader.Update()
-        frames.append((reader.GetTimeValue(), pyvista.wrap(reader.GetOutputDataObject(0)).copy()))
-    return frames
 
 
 def assert_block_equal(grid, block, number: int) -> None:
@@ -73,15 +59,6 @@ def test_exact_vtk_reads_pieces(tmp_path, capfd):
         np.testing.assert_allclose(
             grids["interface"]["worn_depth"], worn.mean(axis=0), 2 * MAX_ROUNDING
         )
-
-
-def test_exact_load_of_file_is_load_of_run(bench_folder):
-    """In every frame areas times pressure of the file add up to the load within 1e-10."""
-    line = read_frames(bench_folder / NAME).blocks["interface"]
-    scene = tomllib.loads((bench_folder / "scene.resolved.toml").read_text("utf-8"))
-    load = float(scene["contact"]["load"].removesuffix(" N"))
-    for pressure in line.point_data["normal_stress"]:
-        assert line.point_data["weight"][0] @ pressure == pytest.approx(load, rel=1e-10)
 
 
 def test_exact_coating_carries_load_and_friction(bench_folder):

@@ -31,7 +31,9 @@ def test_exact_probe_measures_what_the_plan_does_not_predict(tmp_path, monkeypat
     found = run(load(PROBED), estimate=False).measures["normal_stiffness"].value
     assert probed["probe"]["normal_stiffness"] == pytest.approx(found, rel=1e-9)
     text = " ".join(probed["probe"]["sentences"])
-    assert "slide.cycles" in text and "contact.element_size" in text and "drive.cycles" not in text
+    assert "contact.element_size" in text and "drive.cycles" not in text
+    # a motion that takes less than half a millisecond takes no measurable time
+    assert ("slide.cycles" in text) == (stages["bench"] > 0)
 
 
 FORCED = (

@@ -66,6 +66,8 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
     first = next(iter(selected.values()))
+    if chart.style == "line" and first[_find_x(first, chart)].values.size == 1:
+        chart = replace(chart, style="points")  # a line through a single point is not visible
     axes = _make_axes(list(selected.values()), chart)
     if chart.style == "map":
         return _make_map(first, chart, *axes)
@@ -127,8 +129,9 @@ def _select(data: Variables, chart: Chart) -> Variables:
     names = [name for name, _ in _split_names(chart.y)]
     if not x_name or not any(name in data and np.any(data[name].values) for name in names):
         return {}
-    if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
-        return {}  # a single point, or a curve over another variable
+    x_values = np.asarray(data[x_name].values, float)
+    if chart.style == "line" and x_values.size > 1 and np.ptp(x_values) == 0:
+        return {}  # a curve over another variable
     if chart.style == "map" and "frame_time" in data:
         # frame 0 is the pressed state; the slip rate of frame 1 would need an earlier frame of the motion
         data = _take(data, "frame", np.arange(2, data["frame_time"].values.size))

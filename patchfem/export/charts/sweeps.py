@@ -3,8 +3,6 @@
 They take answers of kind "sweep", from memory or from their folders.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import NamedTuple

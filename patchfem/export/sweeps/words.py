@@ -1,7 +1,5 @@
 """The sentences of a sweep: largest change, limit or peak, ranking, and what limits the trust."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis

@@ -67,6 +67,8 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
+# Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
+CHANGE_ROUND_OFF = 1e-12
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
@@ -300,10 +302,11 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
         # the value of a measure or to the terms of a difference.
         sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
         relative = np.array([errors[name] / sizes[name] for name in errors])
-        relative = np.where((relative > 0) & (relative < 1), relative, np.nan)
-        typical = np.nanmedian(relative, axis=0) / 2**MAX_ORDER
+        is_change = (relative > CHANGE_ROUND_OFF) & (relative < 1)
+        typical = np.nanmedian(np.where(is_change, relative, np.nan), axis=0) / 2**MAX_ORDER
         for name, error in errors.items():
-            error = np.where(error > 0, np.fmax(error, typical * sizes[name]), error)
+            least = typical * sizes[name] * (error > CHANGE_ROUND_OFF * sizes[name])
+            error = np.fmax(error, least)
             errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
     return errors
 

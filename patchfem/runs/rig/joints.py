@@ -164,14 +164,11 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
 
     static = model.friction.static
     length = record.make_law(model.friction, load.mean).element(load.mean).length
-    if patch.strips is None:
-        found = jenkins_elements.elements(patch, static, length)
-        return [(load, (found.stiffness, found.yield_displacement, found))]
-    parts = jenkins_elements.strip_elements(patch, static, length)
+    parts = jenkins_elements.list_elements(patch, static, length)
     if slide_apart:
         return [(load, part) for part in parts]
     # Strips of a patch that does not yaw have the same displacement.
-    return [(load, tuple(map(np.concatenate, zip(*parts))))]
+    return [(load, jenkins_elements.join_elements(parts))]
 
 
 # ---- engine `hybrid`

@@ -234,15 +234,20 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
     (levels, forms, m) array
         Deviance of the best flank of each form.
     """
+    # Distances (m, n) from the beginning of each flank to the middle, 0 outside.
     distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
     is_inside = distance > 0
     deviance = np.empty((len(depths), len(FLANK_POWERS), places.size))
     for form, powers in enumerate(FLANK_POWERS):
+        # Least squares for all places and levels at once: a form is a sum of powers of the distance. Places with too few
+        # samples inside have a singular normal matrix, which the small multiple of the unit matrix makes regular.
         base = is_inside[..., None] * distance[..., None] ** np.array(powers)
         normal = np.einsum("mni,mnj->mij", base, base)
         normal += 1e-12 * np.eye(len(powers)) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
+
+        # A large residual counts as MAX_SQUARED_RESIDUAL, so that single outliers do not decide.
         residual = depths.T - fitted
         deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_RESIDUAL).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.

@@ -144,3 +144,18 @@ def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):
         "Only one case has a result, so that no change is known.",
         "The only case settled and meets the tolerance.",
     )
+
+
+def test_exact_plot_of_a_selected_value_is_its_line(folders):
+    """The plot of a sweep of two keys at a value of one key has the values there; it once ended in a fault."""
+    with xr.open_dataset(folders["two keys"] / "sweep.nc") as data:
+        line = data.isel(drive_acceleration=1)
+        drawn = pf.plot.sweep(line, "loop_area").get_lines()[0]
+        expected = (
+            line.friction_static.values,
+            line.loop_area.values / line.loop_area.values.max(),
+        )
+        np.testing.assert_allclose(drawn.get_xdata(), expected[0])
+        np.testing.assert_allclose(drawn.get_ydata() / drawn.get_ydata().max(), expected[1])
+        with pytest.raises(pf.PatchfemError, match="a single case"):
+            pf.plot.sweep(line.isel(friction_static=0), "loop_area")
