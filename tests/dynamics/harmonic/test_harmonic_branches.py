@@ -18,7 +18,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 from yielding_points import jenkins_forces
 
-from patchfem import plan, run
 from patchfem.core import G_N, NotConverged, SineDrive
 from patchfem.dynamics import (
     LawGroup,
@@ -353,46 +352,3 @@ def test_exact_backbone_of_duffing_oscillator_agrees_with_closed_form():
         frequency = np.sqrt(1 + c) / (4 * ellipk(c / (2 * (1 + c))))
         assert motion.omega / (2 * np.pi) == pytest.approx(frequency, rel=1e-4)
         assert abs(motion.zeta) < 1e-9
-
-
-BENCH = """\
-[normal]
-load = "100 N"
-[friction]
-{law}
-[slide]
-kind = "sine"
-amplitude = "{amplitude} um"
-frequency = "10 Hz"
-cycles = 4
-[accuracy]
-steps_per_cycle = 600
-"""
-
-
-@pytest.mark.parametrize(
-    "text, law",
-    [
-        (
-            'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"',
-            Jenkins([30 / 2e-6], [2e-6]),
-        ),
-        ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', make_bond_law(30.0, 2e-6)),
-    ],
-    ids=["elastic-plastic", "bonds"],
-)
-def test_exact_backbone_agrees_with_bench_loops(text, law):
-    """With one harmonic, frequency, damping and loss of the backbone agree with the stiffness and
-    the area of the loop of a bench, within 3e-4."""
-    omega = W
-    amplitudes = np.array([4.0])
-    motions = find_backbone(RIG, law, amplitudes * 1e-6, 1)
-    for motion, amplitude in zip(motions, amplitudes):
-        result = run(plan(BENCH.format(law=text, amplitude=amplitude)))
-        stiffness = result.measures["equivalent_stiffness"].value
-        area = result.measures["loop_area"].value
-        w = np.sqrt(omega**2 + stiffness / MASS)
-        assert motion.omega == pytest.approx(w, rel=2e-4)
-        loss = area / (2 * np.pi * MASS * w * w * (amplitude * 1e-6) ** 2)
-        assert motion.zeta == pytest.approx(0.003 * omega / w + loss, rel=3e-4)
-        assert motion.loss == pytest.approx(area, rel=3e-4)
