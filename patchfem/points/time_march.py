@@ -585,7 +585,6 @@ class March:
         """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
         totals = self.system.totals
         totals[:] = 0.0
-        totals[Total.IS_DIRTY] = 1.0
         self.work_sums[:] = 0.0
         self.done = 0
         self.shift = 0.0

@@ -6,6 +6,7 @@ found by bisection, and the joined run.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -201,14 +202,11 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         return solve(level, runs[number] if number >= 0 else None)[1]
 
-    def report(fraction: float) -> None:
-        """Report the completed fraction of all levels from that of the present one."""
-        if progress is not None:
-            progress((len(runs) + fraction) / len(amplitudes))
-
     # Each level goes on from the end of the one before; a run that ends early is the last one.
+    n_levels = len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
-        is_last = k + 1 == len(amplitudes)
+        report = None if progress is None else partial(_report_fraction, progress, k, n_levels)
+        is_last = k + 1 == n_levels
         run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)
         level_results.append(result)
@@ -217,6 +215,14 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 
     joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
+
+
+def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
+    """Report the completed fraction of all levels to the progress callback.
+
+    `level` counts the levels from 0, and `fraction` is the completed part of this level.
+    """
+    progress((level + fraction) / n_levels)
 
 
 def join_runs(runs, duration: float):
