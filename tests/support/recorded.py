@@ -290,7 +290,7 @@ def clean(results: dict, folder: Path) -> dict:
         if UNSTABLE_KEYS.search(key):
             continue
         key, value = (
-            re.sub(r"(?<![.\w])(?=\d*[a-f])[0-9a-f]{12,}\b", "HASH", text)
+            re.sub(r"(?<![.\w])((?=\d*[a-f])[0-9a-f]{12,}|\d{16}(?!\.))\b", "HASH", text)
             if isinstance(text, str)
             else text
             for text in (key, value)
