@@ -426,10 +426,9 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
             f"{measured.name} was given without an interval, so that of the coefficient does not contain the error of the "
             f'measurement; give both ends, such as "{measured.name}=2.5 um..3.5 um"'
         )
-    if fit.model_error is not None:
-        parts.append(
-            f"the numerical error of the computed depth, {format_length(fit.model_error, 2)}"
-        )
+    error = fit.model.error
+    if error is not None:
+        parts.append(f"the numerical error of the computed depth, {format_length(error, 2)}")
     else:
         warnings.append(
             "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
@@ -440,15 +439,15 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
         "measured": Path(measured.source).name,
         "quantity": measured.name,
         "runs": fit.runs,
-        "model": fit.model,
-        "model_error": fit.model_error,
+        "model": fit.model.value,
+        "model_error": error,
         "data": ends,
         "warnings": warnings,
     }
     return Parts(
-        residual or f"The computed depth is {format_length(fit.model)}.",
+        residual or f"The computed depth is {format_length(fit.model.value)}.",
         details,
-        {"fitted_depth": Quantity(fit.model, "m", fit.model_error)},
+        {"fitted_depth": Quantity(fit.model.value, "m", error)},
         make_columns("point", points) | make_columns("curve_coefficient", curve),
     )
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ...core import Missing, NotConverged, PatchfemError
+from ...core import Measure, Missing, NotConverged, PatchfemError
 from ...model.model import Model
 from ...runs.patch import mesh_levels
 from ...runs.patch.press import nodal_areas
@@ -24,8 +24,9 @@ from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 
+MAX_DEPTH = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
-QUANTITIES = ("worn_depth_mean", "worn_depth_max")
+QUANTITIES = ("worn_depth_mean", MAX_DEPTH)
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
@@ -60,10 +61,8 @@ class FittedCoefficient:
         Coefficient [m2/N] and its interval, which contains those of the measured and of the computed depth.
     measured : MeasuredDepth
         Wear depth to which the coefficient is fitted.
-    model : float
-        Wear depth that is computed with the fitted coefficient [m].
-    model_error : float or None
-        Numerical error of this depth [m], or None if it is unknown. The interval then lacks it.
+    model : Measure
+        Wear depth that is computed with the fitted coefficient [m]. If its error is unknown, the interval lacks it.
     bounds : Range
         Bounds of the search.
     runs : int
@@ -76,8 +75,7 @@ class FittedCoefficient:
     low: float
     high: float
     measured: MeasuredDepth
-    model: float
-    model_error: float | None
+    model: Measure
     bounds: Range
     runs: int
     curve: np.ndarray
@@ -248,8 +246,7 @@ def fit_wear(
         low=float(value * max(low - error, 0.0)),
         high=float(value * (high + error)),
         measured=target,
-        model=computed_depth,
-        model_error=model_error,
+        model=Measure(computed_depth, "m", model_error),
         bounds=bounds,
         runs=n_runs + 1,
         curve=np.array([bounds.high * curve.fraction, curve.depth]),
@@ -288,9 +285,11 @@ def _estimate_depth_error(
         return None
 
     # the mean depth is the worn volume over the area
-    name, divisor = target.name, 1.0
-    if name == "worn_depth_mean":
-        name, divisor = "worn_volume", area
+    name = target.name
+    divisor = 1.0
+    if name != MAX_DEPTH:
+        name = "worn_volume"
+        divisor = area
     measure = result.measures.get(name)
     if measure is None or measure.error is None:
         return None
@@ -309,6 +308,6 @@ def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, prog
         raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
     area = nodal_areas(model.patch, patch.pieces.interface).ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
-    depth = depths.max(axis=1) if name == "worn_depth_max" else depths @ area / area.sum()
+    depth = depths.max(axis=1) if name == MAX_DEPTH else depths @ area / area.sum()
     fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles
     return WearCurve(fraction, depth)
