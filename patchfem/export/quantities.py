@@ -271,9 +271,8 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
     half_width = (ends[1] - ends[0]) / 2
     is_shown = half_width > MIN_SHOWN_WIDTH * max(map(abs, ends))
     digits = INTERVAL_DIGITS if is_shown else MAX_SIGNIFICANT_DIGITS
-    text, low, high = (
-        round_to_error(number, half_width, max_digits=digits)[0] for number in (value, *ends)
-    )
+    numbers = (value, *ends)
+    text, low, high = (round_to_error(n, half_width, max_digits=digits)[0] for n in numbers)
     return f"{text} {unit} ({low} to {high})".replace("  ", " ")
 
 
