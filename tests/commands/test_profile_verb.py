@@ -137,7 +137,7 @@ def test_wear_of_traces_over_a_cylinder_is_measured_without_the_circle(tmp_path,
     flat = []
     for name, start, worn in (("before", 0, 0.0), ("after", 37, wear)):
         circle = np.sqrt(radius**2 - (x + start - 2000) ** 2) - radius
-        noise = np.random.default_rng(start).normal(0, 0.005, x.size)
+        noise = random.normal(0, 0.005, x.size)
         rows = np.column_stack([x, circle + rough[start : start + x.size] - worn + noise])
         files.append(tmp_path / f"{name}.csv")
         np.savetxt(files[-1], rows, "%.6f", ",", header="x [um],z [um]", comments="")
@@ -148,5 +148,7 @@ def test_wear_of_traces_over_a_cylinder_is_measured_without_the_circle(tmp_path,
     for pair in (files, flat):
         area = pf.compare(*pair)["worn_area"]
         widths.append(np.inf if area["value"] is None else area["high"] - area["low"])
-    assert area["value"] == pytest.approx(640e-12, rel=0.03)
+    assert area["low"] < 640e-12 < area["high"] and area["value"] == pytest.approx(
+        640e-12, rel=0.01
+    )
     assert widths[1] < 0.7 * widths[0]
