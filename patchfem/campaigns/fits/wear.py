@@ -281,7 +281,7 @@ def _estimate_depth_error(
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     try:
         result = run(model, progress=progress)
-    except NotConverged:
+    except (NotConverged, Missing):
         return None
 
     # the mean depth is the worn volume over the area
