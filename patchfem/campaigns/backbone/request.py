@@ -43,7 +43,7 @@ class BackboneCases(NamedTuple):
 
     - axis: the key with its values, or None for a single backbone.
     - backbones: a backbone for each value.
-    - source: source of the first one.
+    - source: source of the scene without the values of the key; of the first backbone if that scene is not valid.
     """
 
     axis: Axis | None
@@ -119,4 +119,19 @@ def compute_cases(
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
-    return BackboneCases(axis, backbones, models[0].source)
+    source = models[0].source
+    if axis is not None:
+        source = _find_base_source(build, request.modes) or source
+    return BackboneCases(axis, backbones, source)
+
+
+def _find_base_source(build: Callable[..., Model], modes: str | Iterable) -> Source | None:
+    """Return the source of the scene without the values of `over`, or None if it needs one of them to be valid.
+
+    A scene with the first value would state it as the condition of the modal test, and another joint would be
+    subtracted from bolted modes. `build` and `modes` are as in `compute_cases`.
+    """
+    try:
+        return prepare_model(build, modes, ()).model.source
+    except PatchfemError:
+        return None
