@@ -170,6 +170,27 @@ def test_scene_written_by_a_backbone_over_load_has_the_load_of_the_modal_test(
     assert again["balance_frequency"].values == pytest.approx(frequency, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    "joint, key, values, end",
+    [
+        ("written", "contact.load", ["3.2 kN", "4 kN"], "the modal test."),
+        ("written", "normal.load", ["3.2 kN", "4 kN"], "the modal test."),
+        ("written", "normal.load", ["3.2 kN", "4.8 kN"], "; no curve has this value."),
+        ("case", "normal.load", ["3.2 kN", "4 kN"], None),
+        ("written", "structure.moving_mass", ["1.3 kg", "1.5 kg"], None),
+    ],
+)
+def test_backbone_over_load_states_the_load_of_the_modal_test(joint, key, values, end):
+    """A note names the load of the scene, and says if no curve has it; none does where no other joint is subtracted."""
+    text = (ROUGH if key == "contact.load" else POINT) + MODE + DRIVE
+    text = text.replace('"stuck"', f'"stuck"\nmeasured_joint = "{joint}"')
+    curves = pf.backbone(text, amplitudes="10 um", method="balance", over={key: values})
+    notes = [note for note in curves.attrs["notes"] if "count as measured" in note]
+    assert len(notes) == (end is not None)
+    for note in notes:
+        assert f"{key} = 4 kN, the value in the scene" in note and note.endswith(end)
+
+
 def test_backbone_over_a_key_that_its_scene_lacks_has_the_scene_of_the_first_value():
     """Free modes do not need the scene as written, so a scene may have its load by the values of `over` only."""
     text = (POINT + MODE + DRIVE).replace('load = "4 kN"\n', "").replace('"stuck"', '"free"')
