@@ -188,3 +188,34 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
             path,
             parse_ranges([f"{key}={low}..{high}" for key, (low, high) in free.items()]),
         )
+
+
+def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
+    """Errors that the table does not give are two standard deviations of the residual of the reported fit.
+
+    The quasi-static curve, which starts the search, differs in gross slip from that of the balance by far more than the
+    0.05 % by which the measured frequency scatters.
+    """
+    scene = POINT + make_friction_table("elastic-plastic") + KILOGRAM + DRIVE
+    amplitudes = np.geomspace(1e-6, 1e-4, 8)
+    truth = pf.backbone(scene, amplitudes=amplitudes, method="balance")
+    signs = np.array([1, -1, -1, 1, -1, 1, 1, -1])
+    rows = np.column_stack(
+        [
+            amplitudes,
+            truth.balance_frequency * (1 + 5e-4 * signs),
+            truth.balance_damping * (1 + 1e-2 * signs[::-1]),
+        ]
+    )
+    path = tmp_path / "curve.csv"
+    header = "amplitude [m],frequency [Hz],damping"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    free = {"friction.static": (0.1, 1.0)}
+    result = pf.fit(scene, to=path, free=free, starts=1, out=tmp_path / "out")
+    with xr.open_dataset(tmp_path / "out/result.nc") as data:
+        for name in ("frequency", "damping"):
+            relative_error = data[f"{name}_error"].values / data[name].values
+            # one parameter takes up half a degree of freedom of each of the two quantities
+            scatter = result["rms"][name] * np.sqrt(8 / 7.5)
+            assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.1), name
+    assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.3)
