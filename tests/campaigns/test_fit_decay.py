@@ -90,6 +90,28 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     assert any(f"the amplitude falls by up to {loss:.2g} %" in note for note in result["notes"])
 
 
+def test_common_factor_of_stated_errors_has_no_effect_on_the_intervals(tmp_path):
+    """Stated errors that are ten times larger give the same value and interval, and a note states the smaller residual."""
+    path = write_decay(tmp_path / "decay.csv", IWAN, 1e-2)
+    head, *rows = path.read_text().splitlines()
+    wide = tmp_path / "wide.csv"
+    cells = np.array([row.split(",") for row in rows], float) * [1, 1, 10, 1, 10]
+    np.savetxt(wide, cells, delimiter=",", header=head, comments="")
+    scene = IWAN.replace("chi = -0.35", "chi = -0.6")
+    narrow, wide = (
+        pf.fit(scene, to=file, free={"friction.chi": (-0.9, -0.05)}, starts=1)
+        for file in (path, wide)
+    )
+    fitted, same = (fit["values"]["friction.chi"] for fit in (narrow, wide))
+    for name in ("value", "low", "high"):
+        assert same[name] == pytest.approx(fitted[name], rel=1e-3)
+    ratios = []
+    for fit in (narrow, wide):
+        (note,) = (note for note in fit["notes"] if "the stated errors are weights" in note)
+        ratios.append(float(note.partition("rms is ")[2].split()[0]))
+    assert ratios[1] == pytest.approx(ratios[0] / 10, rel=0.05)
+
+
 def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):
     """The command fits a curve from a file and refuses tables that are no single valid curve."""
     monkeypatch.chdir(tmp_path)

@@ -106,6 +106,18 @@ class MeasuredCurve(NamedTuple):
             parts.append(f"{size} % of each {name} (no column {name}_error)")
         return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 
+    def describe_given_errors(self, rms: float) -> str:
+        """Return a sentence on the effect of errors that the table gives; "" if it lacks one of both columns.
+
+        `rms` is the root mean square of the residual in standard deviations.
+        """
+        if self.assumed.any():
+            return ""
+        return (
+            "the stated errors are weights, of which only the ratios count: the intervals follow from the scatter around "
+            f"the fit, whose rms is {format_number(rms, 2)} times the stated standard deviations (half of each error of 95 %)"
+        )
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedCurve:
@@ -434,6 +446,7 @@ def fit_curve(
     notes = [
         *(f"the fit is by {reference} alone: {name}: {reasons[name]}" for name in reasons),
         measured.describe_assumed_errors(),
+        measured.describe_given_errors(fit.rms),
         _note_different_methods(reference, measured),
     ]
     return FittedCurve(
