@@ -115,7 +115,7 @@ class MeasuredCurve(NamedTuple):
             return ""
         return (
             "the stated errors are weights, of which only the ratios count: the intervals follow from the scatter around "
-            f"the fit, whose rms is {format_number(rms, 2)} times the stated standard deviations (half of each error of 95 %)"
+            f"the fit, whose rms is {format_number(rms, 2)} times the stated standard deviations (half the errors of 95 %)"
         )
 
 
