@@ -121,10 +121,11 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_smallest_amplitude"] = _take(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
         out["largest_damping"] = _take(curve, "damping", largest)
-        # The peak lies between both neighbours; at an end of the curve nothing encloses it.
+        # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
+        # curve nothing encloses the peak.
         error = None
         if 0 < largest < curve.amplitude.size - 1:
-            error = np.diff(curve.amplitude[largest - 1 : largest + 2]).max()
+            error = np.diff(curve.amplitude[largest - 1 : largest + 2]).max() / 2
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m", error)
 
     # a missing frequency is shown with its reason, other missing values are left out

@@ -94,7 +94,7 @@ QUANTITIES: dict[str, Definition] = {
     ),
     "amplitude_of_largest_damping": Definition(
         "m",
-        "amplitude of the recommended curve with the largest damping ratio; the error is the distance to its neighbours",
+        "amplitude of the curve with the largest damping ratio; the error is half the distance to its neighbours",
     ),
     "free_frequency": Definition(
         "Hz", "frequency of the mode without its contact; a bonded spring is included"
