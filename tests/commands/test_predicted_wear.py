@@ -78,14 +78,6 @@ def artificial_pair(tmp_path_factory) -> tuple:
     return folder, traces, truth, middle - starts[1]
 
 
-@pytest.fixture(scope="module")
-def crowned_run(tmp_path_factory) -> Path:
-    """Return the folder of a run in which the contact of a crown grows by wear."""
-    folder = tmp_path_factory.mktemp("crowned") / "wear"
-    pf.run(RUN, **COARSE).save(folder)
-    return folder
-
-
 def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp_path):
     """The intervals of the wear coefficient and of the patch centre cover the true values."""
     folder, traces, truth, centre = artificial_pair
@@ -115,11 +107,12 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
     assert "Computed and measured wear" in page
 
 
-def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
+def test_exact_wear_coefficient_follows_run_history(tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
     The depth is not proportional to the coefficient there.
     """
+    crowned_run = pf.run(RUN, **COARSE).save(tmp_path / "wear")
     with xarray.open_dataset(crowned_run / "result.nc") as result:
         frame = 8
         place = result.x.values
