@@ -82,7 +82,7 @@ QUANTITIES: dict[str, Definition] = {
         "N", "force at the output that holds the phase resonance at the largest amplitude"
     ),
     "compared_amplitude": Definition(
-        "m", "amplitude at the output at which the change of the key has the largest effect"
+        "m", "common amplitude of the curves at which the change of the key has the largest effect"
     ),
     "frequency_change": Definition(
         "Hz", "frequency for the last value of the key minus that for the first value"
@@ -97,7 +97,8 @@ QUANTITIES: dict[str, Definition] = {
         "1", "largest damping ratio among the amplitudes of the recommended curve"
     ),
     "amplitude_of_largest_damping": Definition(
-        "m", "amplitude at the output with the largest damping ratio"
+        "m",
+        "amplitude of the curve with the largest damping ratio; the error is half the distance to its neighbours",
     ),
     "free_frequency": Definition(
         "Hz", "frequency of the mode without its contact; a bonded spring is included"
@@ -106,10 +107,12 @@ QUANTITIES: dict[str, Definition] = {
         "Hz", "frequency of the mode while the contact sticks with its own stiffness"
     ),
     "exponent_micro": Definition(
-        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+        "1",
+        "exponent of the energy loss per cycle over the amplitude, from the smallest to the largest amplitude in micro-slip",
     ),
     "exponent_gross": Definition(
-        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+        "1",
+        "exponent of the energy loss per cycle over the amplitude, between the two largest ones in gross slip; 1 in theory",
     ),
     # fit; of keys of a scene, see FITTED_KEY
     "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
