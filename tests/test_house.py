@@ -126,7 +126,7 @@ def test_exact_comments_and_docstrings_are_not_counted():
 
 def test_refuses_count_above_baseline(tmp_path):
     """A count above the baseline is reported with the file and the line of the new breach."""
-    module = tmp_path / "patchfem" / "contact" / "gaps.py"
+    module = tmp_path / "patchfem/contact/gaps.py"
     module.parent.mkdir(parents=True)
     (tmp_path / "tests").mkdir()
     module.write_text(CLEAN + "def settled(): pass\n", "utf-8")

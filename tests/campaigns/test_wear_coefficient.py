@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
@@ -34,11 +34,9 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path
     value = {"worn_depth_mean": measures["worn_volume"].value / length**2}.get(name) or measures[
         name
     ].value
-    answer = run_cli(
+    content = run_successfully(
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
-    )
-    assert answer.code == 0, answer.err
-    content = json.loads(answer.out)
+    ).content
     fitted = content["values"]["wear.coefficient"]
     assert fitted["value"] == pytest.approx(3e-15, rel=1e-3)
     assert "without an interval" in content["warnings"][0]
@@ -51,7 +49,7 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path
         deviation = abs(fitted[end] / fitted["value"] - 1)
         assert relative_error * (1 - 1e-2) <= deviation <= 1.5 * relative_error + 1e-3
     assert fitted["low"] <= 3e-15 <= fitted["high"]
-    refitted = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
+    refitted = pf.run(tmp_path / "fit/scene.fitted.toml").measures
     assert refitted["worn_volume"].value == pytest.approx(measures["worn_volume"].value, rel=1e-3)
 
 
@@ -69,8 +67,7 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
             }
         )
     )
-    answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
-    content = json.loads(answer.out)
+    content = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json").content
     fitted = content["values"]["wear.coefficient"]
     assert fitted["low"] / fitted["value"] == pytest.approx(0.75, rel=2e-3)
     assert fitted["high"] / fitted["value"] == pytest.approx(1.5, rel=2e-3)
@@ -83,8 +80,9 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
 def test_warns_of_an_unknown_numerical_error(scene):
     """On a mesh so coarse that its error cannot be estimated, the fit says that its interval lacks this error."""
     coarse = ("--set", "contact.element_size=2 mm")
-    answer = run_cli("fit", scene, *coarse, "--to", "worn_depth_mean=15 nm..30 nm", *FREE, "--json")
-    content = json.loads(answer.out)
+    content = run_cli(
+        "fit", scene, *coarse, "--to", "worn_depth_mean=15 nm..30 nm", *FREE, "--json"
+    ).content
     assert content["model_error"] is None
     assert content["warnings"] == [
         "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"

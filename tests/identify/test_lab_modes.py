@@ -48,12 +48,16 @@ def test_exact_free_decay_frequency_damping_and_amplitude(amplitudes):
 
 
 def test_always_noisy_decay_is_within_stated_error():
-    """The damping from a decay with noise is within 1.6 times its stated error."""
+    """At least 85 % of 40 damping ratios from decays with 3 % noise are within their stated 95 % errors.
+
+    The errors are not far too wide.
+    """
     time, value = free_decay()
-    rng = np.random.default_rng(4)
-    for _ in range(2):
-        modes = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
-        assert (np.abs(modes.damping - ZETA) < 1.6 * modes.damping_error).all()
+    noise = 0.01 * np.random.default_rng(4).normal(size=(20, time.size))
+    fits = [fit_decay(time, value + one) for one in noise]
+    ratios = np.array([np.abs(modes.damping - ZETA) / modes.damping_error for modes in fits])
+    assert np.mean(ratios <= 1) >= 0.85
+    assert np.median(ratios) > 0.15  # 0.34 for normal errors
 
 
 def test_always_friction_decay_is_reported_as_not_exponential():

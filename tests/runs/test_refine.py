@@ -122,7 +122,7 @@ def test_exact_passes_of_a_run_end_where_it_would_need_more_time(excess, passes,
 
 def test_exact_steps_of_a_rig_are_refined_within_its_time():
     """The steps of a rig are refined until its main measures meet the tolerance, or else a finding names axis and key."""
-    scene = (files(pf) / "scene" / "templates" / "rig.toml").read_text("utf-8")
+    scene = (files(pf) / "scene/templates/rig.toml").read_text("utf-8")
     march = {"accuracy.method": "march"}
     once = pf.run(scene, **march, **{"accuracy.max_seconds": 1e-6})
     done = pf.run(scene, **march)

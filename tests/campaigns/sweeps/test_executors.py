@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_successfully
 from deadly_cases import KillingMeasure
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
@@ -153,7 +153,7 @@ def whole_sweep(tmp_path_factory):
     place = tmp_path_factory.mktemp("whole")
     (place / "rig.toml").write_text(RIG, encoding="utf-8")
     over = "friction.static=0.05..0.6:20lin"
-    assert run_cli("sweep", place / "rig.toml", "--over", over, "-o", place / "whole").code == 0
+    run_successfully("sweep", place / "rig.toml", "--over", over, "-o", place / "whole")
     return place / "rig.toml", over, place / "whole"
 
 
@@ -165,7 +165,7 @@ def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
         0 < len(stored) < len(file_names(expected / "cases")) and not (out / "sweep.csv").exists()
     )
     assert all((one / "summary.json").read_text().endswith("}\n") for one in stored)
-    assert run_cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
+    run_successfully("sweep", path, "--over", over, "-o", out, "--resume")
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (expected / name).read_bytes()
     assert file_names(out / "cases") == file_names(expected / "cases") and file_names(
@@ -179,7 +179,7 @@ def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
     out = tmp_path / "swept"
     process = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
     assert process.returncode == -signal.SIGKILL
-    incomplete = out / "cases" / ".0123456789abcdef.1"  # an incomplete case of a killed process
+    incomplete = out / "cases/.0123456789abcdef.1"  # an incomplete case of a killed process
     incomplete.mkdir()
     (incomplete / "summary.json").write_text('{"patchf')
     assert_resumes_to_same_files(whole_sweep, out)
