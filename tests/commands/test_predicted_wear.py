@@ -108,12 +108,17 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
     assert "Computed and measured wear" in page
 
 
-def test_exact_wear_coefficient_follows_run_history(tmp_path):
+@pytest.fixture(scope="module")
+def crowned_run(tmp_path_factory):
+    """Folder of the run of a crowned patch."""
+    return pf.run(RUN, **COARSE).save(tmp_path_factory.mktemp("crowned"))
+
+
+def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
     The depth is not proportional to the coefficient there.
     """
-    crowned_run = pf.run(RUN, **COARSE).save(tmp_path / "wear")
     with xarray.open_dataset(crowned_run / "result.nc") as result:
         frame = 8
         place = result.x.values
