@@ -126,9 +126,10 @@ class Chunks:
         for path in reversed(self.list_files()):
             names, results = read_chunk(path)
             distinct, rows = np.unique(names, return_index=True)
-            is_kept = ~np.isin(distinct, all_names)
+            # Sorted, because the other method of NumPy 2.0 overflows for names of 64 bits.
+            is_kept = ~np.isin(distinct, all_names, kind="sort")
             if removes_others:
-                is_kept &= np.isin(distinct, self.distinct)
+                is_kept &= np.isin(distinct, self.distinct, kind="sort")
             if is_kept.any():
                 rows = np.sort(rows[is_kept])
                 parts.append((all_names.size + np.arange(rows.size), results.select(rows)))
