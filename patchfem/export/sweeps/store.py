@@ -121,21 +121,27 @@ class Chunks:
         outdated = set(self.list_files())
         if len(outdated) < 2:
             return
-        all_names = np.empty(0, np.uint64)
-        parts = []
-        for path in reversed(self.list_files()):
-            names, results = read_chunk(path)
-            distinct, rows = np.unique(names, return_index=True)
+        chunks = [read_chunk(path) for path in reversed(self.list_files())]
+        names = np.concatenate([chunk_names for chunk_names, _ in chunks])
+        distinct, newest = np.unique(names, return_index=True)
+        if removes_others:
             # Sorted, because the other method of NumPy 2.0 overflows for names of 64 bits.
-            is_kept = ~np.isin(distinct, all_names, kind="sort")
-            if removes_others:
-                is_kept &= np.isin(distinct, self.distinct, kind="sort")
-            if is_kept.any():
-                rows = np.sort(rows[is_kept])
-                parts.append((all_names.size + np.arange(rows.size), results.select(rows)))
-                all_names = np.append(all_names, names[rows])
+            newest = newest[np.isin(distinct, self.distinct, kind="sort")]
+
+        # The rows that are kept, chunk by chunk, from the newest file to the oldest one.
+        is_kept = np.zeros(names.size, bool)
+        is_kept[newest] = True
+        cases = np.cumsum(is_kept) - 1
+        ends = np.cumsum([chunk_names.size for chunk_names, _ in chunks])
+        parts = []
+        for end, (chunk_names, results) in zip(ends, chunks):
+            rows = np.arange(end - chunk_names.size, end)
+            rows = rows[is_kept[rows]]
+            if rows.size:
+                parts.append((cases[rows], results.select(rows - end + chunk_names.size)))
         if parts:
             # the new file may have the name of an old one
+            all_names = names[is_kept]
             results = join_case_results(all_names.size, parts)
             outdated.discard(write_chunk(self.folder, all_names, results))
         for path in outdated:
