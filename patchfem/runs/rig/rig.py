@@ -44,8 +44,6 @@ MIN_RELATIVE_ERROR = 1e-9
 MAX_OTHER_WORK = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0
-# Expected ratio of the CPU times of runs with twice the steps, or a hundredth of the step error.
-FINER_RUN_RATIO = 2.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -318,7 +316,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         numerics.finer(),
         axis,
         seconds=run.solution.seconds,
-        cost_ratio=FINER_RUN_RATIO,
+        cost_ratio=refine.STEP_COST_RATIO,
         max_passes=max_passes,
     )
 
