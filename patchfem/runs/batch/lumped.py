@@ -303,7 +303,9 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
         sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
         relative = np.array([errors[name] / sizes[name] for name in errors])
         is_change = (relative > CHANGE_ROUND_OFF) & (relative < 1)
-        typical = np.nanmedian(np.where(is_change, relative, np.nan), axis=0) / 2**MAX_ORDER
+        relative = np.where(is_change, relative, np.nan)
+        relative[:, ~is_change.any(axis=0)] = 0.0
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_ORDER
         for name, error in errors.items():
             least = typical * sizes[name] * (error > CHANGE_ROUND_OFF * sizes[name])
             error = np.fmax(error, least)

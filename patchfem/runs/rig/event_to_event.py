@@ -225,8 +225,11 @@ class LumpedEvaluator(RunEvaluator):
         elif outcome is not None:
             message = describe_escape(self.model.rig, travel)
         elif motion.status != Status.DONE:
-            is_marched = not engines.MARCH.find_unsupported_feature(self.model)
-            march = ', or use accuracy.method = "march"' if is_marched else ""
+            march = ""
+            if not engines.MARCH.find_unsupported_feature(self.model):
+                # Some messages end with a remedy of their own.
+                before = ", or" if ";" in motion.message else ";"
+                march = f'{before} use accuracy.method = "march"'
             raise NotConverged(motion.message + march)
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
