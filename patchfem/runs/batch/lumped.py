@@ -181,7 +181,10 @@ def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResult
 
 
 def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults:
-    """Compute the case results of models by marches with more and more steps."""
+    """Compute the case results of models by marches with more and more steps, and by single runs where these are better.
+
+    `report` takes a line of text on the progress of a single run.
+    """
     begin = perf_counter()
     cases, scales = collect_cases(models)
     results = CaseResults.blank(len(models))
@@ -283,7 +286,9 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarse = _select(fine, ~is_done)
 
 
-def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[str, np.ndarray]:
+def estimate_errors(
+    fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], count: int, fewer: int
+) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name from the values of two marches with `count` and `fewer` steps per cycle.
 
     Instants are resolved to the shortest steps. Motions that differ by SAME_CASE_CYCLE from cycle to cycle count as
@@ -313,7 +318,7 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
     return errors
 
 
-def find_floor(name: str, values: dict, scales: Scales) -> np.ndarray:
+def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
     """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
 
     Parameters

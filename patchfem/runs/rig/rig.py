@@ -161,9 +161,7 @@ def _make_result(run: CoupledRun) -> Result:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
     moved = ()
     if model.has_interface_patches:
-        snapshots = [
-            snapshot for snapshot in solution.snapshots if isinstance(snapshot, ElementSnapshot)
-        ]
+        snapshots = [frame for frame in solution.snapshots if isinstance(frame, ElementSnapshot)]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(

@@ -228,9 +228,7 @@ class BalanceFinder:
         if not stable_motions:
             return StableMotion(motion, stability)
 
-        sizes = ", ".join(
-            format_length(steady_motion.amplitude(output), 3) for steady_motion in motions
-        )
+        sizes = ", ".join(format_length(state.amplitude(output), 3) for state in motions)
         note = (
             f"at this drive {len(motions)} steady motions exist (amplitudes {sizes}), "
             f"{len(stable_motions)} of them stable"
