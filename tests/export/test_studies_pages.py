@@ -117,6 +117,8 @@ def test_exact_backbone_files_agree(folders):
         "force_frequency [Hz]",
     ]
     assert list(rows[0])[: len(heads)] == heads
+    verdict = read_json(folders / "single backbone/summary.json")["verdict"]
+    assert verdict[0].startswith("Frequency is ") and len(verdict) == 3
     # the rows of the recommended method come first
     assert rows[0]["method"] == "balance" and rows[-1]["method"] == "quasi-static"
     with xr.open_dataset(folder / "backbone.nc") as data:
