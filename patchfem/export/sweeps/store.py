@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runs.batch.case_results import CaseResults
+from ...runs.batch.case_results import CaseResults, join_case_results
 from ..answer import Variable, encode
 from ..netcdf import read_netcdf, write_arrays
 
@@ -132,18 +132,19 @@ class Chunks:
         is_kept = np.zeros(names.size, bool)
         is_kept[newest] = True
         ends = np.cumsum([chunk_names.size for chunk_names, _ in chunks])
-        merged = CaseResults.blank(newest.size)
-        end = 0
+        parts = []
+        count = 0
         for chunk_is_kept, (_, results) in zip(np.split(is_kept, ends[:-1]), chunks, strict=True):
             rows = np.flatnonzero(chunk_is_kept)
             if rows.size:
-                end += rows.size
-                merged.insert(range(end - rows.size, end), results.select(rows))
+                parts.append((count + np.arange(rows.size), results.select(rows)))
+                count += rows.size
 
         outdated = set(files)
-        if newest.size:
+        if parts:
             # the new file may have the name of an old one
-            outdated.discard(write_chunk(self.folder, names[is_kept], merged))
+            results = join_case_results(count, parts)
+            outdated.discard(write_chunk(self.folder, names[is_kept], results))
         for path in outdated:
             path.unlink()
 
