@@ -10,6 +10,9 @@ from .keys.types import list_keys
 from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
 
+# File name extensions of universal files, by which every reader knows them
+UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
+
 
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
     """Return (dotted key, file) for every file that a scene, or its tables, names.
