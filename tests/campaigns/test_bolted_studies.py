@@ -110,7 +110,7 @@ def test_exact_backbone_over_load_has_stuck_frequency_of_each_load(contact, key)
         assert curves.attrs["free_frequency"] == pytest.approx(
             free_frequency(stiffnesses[1]), rel=1e-9
         )
-        assert "the scene as written" in str(curves.attrs["notes"])
+        assert f"without --set of {key};" in str(curves.attrs["notes"])
 
 
 def test_exact_modes_given_beside_the_scene_keep_their_slide():

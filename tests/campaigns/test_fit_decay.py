@@ -240,5 +240,5 @@ def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
             relative_error = data[f"{name}_error"].values / data[name].values
             # one parameter takes up half a degree of freedom of each of the two quantities
             scatter = result["rms"][name] * np.sqrt(8 / 7.5)
-            assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.1), name
-    assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.3)
+            assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.01), name
+    assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.01)

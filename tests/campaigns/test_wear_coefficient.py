@@ -26,14 +26,17 @@ def scene(tmp_path):
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("name", ["worn_depth_max", "worn_depth_mean"])
-def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path, name):
+@pytest.mark.parametrize(
+    "name, source, area",
+    [("worn_depth_max", "worn_depth_max", 1), ("worn_depth_mean", "worn_volume", 12.7e-3**2)],
+)
+def test_exact_wear_coefficient_is_recovered_from_computed_depth(
+    scene, tmp_path, name, source, area
+):
     """The wear coefficient is recovered from the computed worn depth within 1e-3."""
     measures = pf.run(load(WORN)).measures
-    length = 12.7e-3
-    value = {"worn_depth_mean": measures["worn_volume"].value / length**2}.get(name) or measures[
-        name
-    ].value
+    measure = measures[source]
+    value = measure.value / area
     content = run_successfully(
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
     ).content
@@ -42,7 +45,6 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path
     assert "without an interval" in content["warnings"][0]
 
     # A depth without an interval leaves the numerical error of the run, to which the rounding of the fit is added.
-    measure = measures["worn_volume" if name == "worn_depth_mean" else name]
     relative_error = measure.error / measure.value
     assert relative_error > 0
     for end in ("low", "high"):
@@ -63,6 +65,7 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
         json.dumps(
             {
                 "worn_depth_max": None,
+                "measures": {"loop_area": {}},
                 "worn_depth_mean": {"value": 20e-9, "low": 15e-9, "high": 30e-9, "unit": "m"},
             }
         )
@@ -75,6 +78,11 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
     error = content["model_error"] / 20e-9
     assert 0 < error < 2e-3 and not content["warnings"]
     assert fitted["low"] / fitted["value"] < 0.75 < 1.5 < fitted["high"] / fitted["value"]
+    low = ("--free", "wear.coefficient=1e-16 m^2/N..8e-15 m^2/N")
+    content = run_cli("fit", scene, "--to", page, *low, "-o", tmp_path / "fit", "--json").content
+    assert "raise the high bound" in content["warnings"][0]
+    page.write_text('{"common_length": {}, "worn_depth_max": {}}')
+    assert "--predicted" in run_cli("fit", scene, "--to", page, *FREE).err
 
 
 def test_warns_of_an_unknown_numerical_error(scene):

@@ -32,7 +32,7 @@ def test_exact_force_of_universal_file_by_data_type(tmp_path, kind):
     A missing quantity is refused.
     """
     sets = [SI, make_record(TIME, SLIDE, 12), make_record(TIME, FORCE, kind)]
-    path = write_universal(tmp_path / "a.uff", sets)
+    path = write_universal(tmp_path / "a.58", sets)
     assert np.array_equal(read_signal(path, "force")[1], FORCE)
     if kind:
         assert np.array_equal(read_signal(path, "acceleration")[1], SLIDE)
