@@ -55,7 +55,7 @@ def test_exact_pair_equals_single_comparison(pairs_table, pairs_answer):
     assert "3 pairs: 2 worn, 0 not, 1 failed." in read_page(out)
 
 
-def test_exact_table_has_a_line_for_each_pair(pairs_table, pairs_answer):
+def test_exact_table_has_a_line_for_each_pair(pairs_answer):
     """The written table and the stored answer have the values and the labels of each pair."""
     answer, out = pairs_answer
     lines = list(csv.DictReader((out / "pairs.csv").read_text().splitlines()))

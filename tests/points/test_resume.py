@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import read_json, run_cli, run_successfully
+from command_line import list_names, read_json, run_cli, run_successfully
 from limits import limit_file_size
 from scene_texts import (
     BENCH,
@@ -98,10 +98,7 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     command = ("run", scene, "--no-page", "-o")
     run_successfully(*command, tmp_path / "whole")
     n_saves = len(save_counter.saved)
-    assert n_saves >= 10 and sorted(path.name for path in tmp_path.iterdir()) == [
-        "scene.toml",
-        "whole",
-    ]
+    assert n_saves >= 10 and list_names(tmp_path) == {"scene.toml", "whole"}
     out = tmp_path / "out"
     partial = tmp_path / "out.partial"
     # Numbers are counted from the previous interruption; march_2: at the first state of the second march.
@@ -118,7 +115,7 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     save_counter.stop = 0
     assert run_cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
     assert_same_results(out, tmp_path / "whole")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
+    assert list_names(tmp_path) == {"out", "scene.toml", "whole"}
     assert not any(is_state(path.name) for path in out.iterdir())
 
 
@@ -153,7 +150,7 @@ def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter, m
         answer.code == 2
         and "out: this folder contains no interrupted run; run without --resume" in answer.err
     )
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
+    assert list_names(tmp_path) == {"scene.toml"}
     save_counter.stop = 5
     assert run_cli(*command[:-1]).code == 130
     save_counter.stop = 0
@@ -199,7 +196,7 @@ def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_co
         answer = run_cli("run", scene, "--no-page", "-o", tmp_path / "out")
     # the results do not fit; the missing state alone does not end the run
     assert answer.code == 4 and "result.nc: cannot be written (File too large)" in answer.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
+    assert list_names(tmp_path) == {"scene.toml"}
 
 
 @pytest.mark.parametrize(
@@ -229,7 +226,7 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
         time.sleep(0.005)
     process.send_signal(number)
     message = process.communicate()[1]
-    remaining = {path.name for path in tmp_path.iterdir()} - {"scene.toml"}
+    remaining = list_names(tmp_path) - {"scene.toml"}
     if number == signal.SIGKILL:
         assert process.returncode == -9 and remaining == {"out.partial", ".out.writer"}
     else:
@@ -240,5 +237,5 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
             and len(message.splitlines()) == 1
         )
     run_successfully("run", scene, "--no-page", "-q", "-o", out, "--resume")
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
+    assert list_names(tmp_path) == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000

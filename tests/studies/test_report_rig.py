@@ -43,7 +43,9 @@ def test_figure_8_piece_sticks_on_almost_every_swing(figure):
 def test_figure_8_study_gives_its_stated_figures(figure, tmp_path, capsys):
     """Peaks, static friction coefficient and length from the loops are those stated in the study."""
     loops = {loop.frequency: loop for loop in figure.main(tmp_path / "x.svg")}
-    assert_contains(figure.ANSWER, f"{loops[20].peak:.2f} times at 20 Hz")
+    assert_contains(
+        figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz"
+    )
     as_rigid = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
     assert all(
         f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06

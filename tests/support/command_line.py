@@ -58,6 +58,11 @@ def read_json(path):
     return json.loads(Path(path).read_text("utf-8"))
 
 
+def list_names(folder) -> set[str]:
+    """Return the names of the files and folders in a folder."""
+    return {path.name for path in folder.iterdir()}
+
+
 def read_page(folder) -> str:
     """Return the page of a results folder."""
     return (folder / "report.html").read_text("utf-8")

@@ -6,9 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import run_successfully
+from command_line import list_names, run_successfully
 from scene_texts import BENCH
 from study_module import ROOT
+from sweep_tables import assert_same_files
 
 SBATCH = """\
 #!{python}
@@ -73,8 +74,5 @@ def test_exact_job_array_writes_files_of_single_sweep(submission_log, tmp_path):
     assert process.returncode == 0, process.stderr
     first, second = submission_log.read_text().splitlines()
     assert "--array=1-2" in first and "--dependency=afterany:7 " in second
-    for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (expected / name).read_bytes()
-    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
-        one.name for one in (expected / "cases").iterdir()
-    )
+    assert_same_files(out, expected)
+    assert list_names(out / "cases") == list_names(expected / "cases")

@@ -9,7 +9,7 @@ import xarray as xr
 from command_line import run_cli, run_successfully
 from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
-from sweep_tables import make_table, read_rows
+from sweep_tables import assert_same_files, make_table, read_rows
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
@@ -38,12 +38,6 @@ def swept(scene_file):
     return folder
 
 
-def assert_same_tables(folder, other) -> None:
-    """Assert that the files of two sweeps are identical byte for byte."""
-    for name in TABLES:
-        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
-
-
 def test_exact_chunks_are_small_netcdf_files(swept):
     """The chunks take less than 600 bytes per case, and xarray reads the numbers of sweep.csv from them."""
     files = list((swept / "chunks").iterdir())
@@ -70,7 +64,7 @@ def test_always_cases_of_damaged_chunk_run_again(swept, scene_file, tmp_path, mo
     words = ("sweep", scene_file, *OVER, "-o", folder, "--keep", "none", "--resume")
     assert run_cli(*words).code == 3
     assert len(computed) == 110
-    assert_same_tables(folder, swept)
+    assert_same_files(folder, swept, TABLES)
 
 
 def test_exact_resumed_sweep_computes_what_is_missing(scene_file, tmp_path, monkeypatch):
@@ -105,7 +99,7 @@ def test_exact_shards_give_same_files(swept, scene_file, tmp_path):
     assert early.code == 4 and "37 of 110 cases have no answer" in early.err
     run_successfully(*words, "-o", tmp_path / "shards", "--shard", "3/3")
     assert run_cli(*words, "-o", tmp_path / "shards", "--collect").code == 3
-    assert_same_tables(tmp_path / "shards", swept)
+    assert_same_files(tmp_path / "shards", swept, TABLES)
 
 
 def test_exact_interrupted_sweep_that_is_run_anew_is_named(scene_file, tmp_path):
