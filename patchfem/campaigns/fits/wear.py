@@ -234,8 +234,9 @@ def fit_wear(
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
 
-    # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth into that
-    # of the coefficient. The error of the computed depth adds to both sides, by the slope of the curve.
+    # The depth depends almost only on the product of coefficient and cycles, so that the curve of the depth gives the
+    # coefficient at both ends of the measured interval. The numerical error of the computed depth, over the slope of
+    # the curve, widens this interval on both sides.
     middle = float(inverse(target.value))
     low, high = inverse(np.minimum([target.low, target.high], max_depth)) / middle
     area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
