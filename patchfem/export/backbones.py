@@ -217,11 +217,9 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
     data = {}
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
+    all_bands = [backbone.band for backbone in backbones]
     for method in METHODS:
-        bands = [
-            backbone.band if backbone.band and backbone.band.method == method else None
-            for backbone in backbones
-        ]
+        bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
         if axis is not None:
             curves = [curve if band else None for curve, band in zip(curves, bands, strict=True)]

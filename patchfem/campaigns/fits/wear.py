@@ -233,8 +233,8 @@ def fit_wear(
     area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
     error = _estimate_depth_error(model, value, target, area, progress)
 
-    # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth, widened by
-    # the error of the computed depth, into that of the coefficient.
+    # The depth depends almost only on the product of coefficient and cycles. So the curve of the depth gives the
+    # coefficients at both ends of the measured interval, which the error of the computed depth widens.
     curve = found.curve
     ends = np.array([target.low - (error or 0.0), target.high + (error or 0.0)])
     ends = found.inverse(np.clip(ends, curve.depth[0], curve.depth[-1]))
