@@ -131,8 +131,10 @@ def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     return _pack(Law.INTERLOCK, (stiffness, wavelength))
 
 
-def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
+def make_point_law(friction, load) -> PointLaw:
     """Return the law that the keys of a table [friction] define, under a load [N].
+
+    Bonds of the law "nonlocal" do not grow.
 
     Parameters
     ----------
@@ -140,9 +142,6 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         Keys in SI units; floats, or arrays (c,) of the values of c points.
     load : float or (c,)
         Normal load [N].
-    bonds : Bonds, optional
-        Bonds of the law "nonlocal" with their rest speed; without them the bonds have the keys `static` and
-        `bond_length` alone.
     """
     name = friction.law
     load = np.maximum(load, MIN_LOAD)
@@ -160,7 +159,7 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         return make_jenkins(friction.static, length, load)
 
     if name == "nonlocal":
-        return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
+        return make_bonds(Bonds(friction.static, friction.bond_length), load)
 
     if name == "iwan":
         length = max_yield_displacement(limit, friction.stiffness, friction.chi, friction.beta)

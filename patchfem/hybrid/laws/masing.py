@@ -296,9 +296,11 @@ def from_keys(friction, load, speed):
     """
     limit = friction.static * load
     if friction.law == "iwan":
+        from ...friction.laws.iwan import max_yield_displacement
+
         chi = friction.chi
         beta = friction.beta
-        length = limit * (1 + beta) / (friction.stiffness * (beta + (chi + 1) / (chi + 2)))
+        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
         numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
         return LawNumbers("masing", numbers, length=limit / friction.stiffness)
     length = friction.bond_length or limit / friction.stiffness
