@@ -63,7 +63,9 @@ class SurfaceRuns(NamedTuple):
         for name in COMPARED_MEASURES:
             by_side = {side: one.measures.get(name) for side, one in self.results.items()}
             if any(one is not None and one.value is not None for one in by_side.values()):
-                measures[name] = {side: _measure_to_dict(by_side.get(side)) for side in SURFACE_NAMES}
+                measures[name] = {
+                    side: _measure_to_dict(by_side.get(side)) for side in SURFACE_NAMES
+                }
         warnings = []
         for side, result in self.results.items():
             texts = [*result.warnings, *result.notes]

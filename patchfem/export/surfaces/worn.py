@@ -106,7 +106,8 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
             "removed": dict.fromkeys(SURFACE_NAMES, 0),
             "runs": sides,
             "measures": {
-                name: {side: sides[side]["measures"].get(name) for side in SURFACE_NAMES} for name in names
+                name: {side: sides[side]["measures"].get(name) for side in SURFACE_NAMES}
+                for name in names
             },
             "notes": warnings,
         },
