@@ -258,9 +258,7 @@ def fit_hysteresis_loop(
     loop = read_loop(loop_file)
     held_out = np.zeros(loop.reading.size, bool)
     for selector in options.hold:
-        held_out |= select_held_out(
-            selector, loop.path, loop.labels, _has_label, lambda _, label: label
-        )
+        held_out |= select_held_out(selector, loop.path, loop.labels)
     time, notes = _find_row_times(scene, loop)
     keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
     keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
@@ -299,22 +297,6 @@ def fit_hysteresis_loop(
         steps_per_row=bench.steps_per_row,
     )
     return replace(fitted, keys=keys.make_fitted_keys(fit, _warn_of_doubtful_fit(fitted)))
-
-
-def _has_label(column: str, label: str, text: str) -> bool:
-    """Return whether a label is that of the option --hold; texts of numbers are compared as numbers.
-
-    `column` is that of the label.
-    """
-    return _parse_label(label) == _parse_label(text)
-
-
-def _parse_label(text: str) -> float | str:
-    """Return the text of a label as a number if it is one, or else unchanged."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
