@@ -113,11 +113,11 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
     `matrix_name` is "stiffness", "mass" or "damping", whose usual names are in `MATRIX_NAMES`. `path` is for the
     message.
     """
-    short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
+    names = list(names)
+    short_names = {name.rpartition(".")[2].lower(): name for name in reversed(names)}
     for known in MATRIX_NAMES[matrix_name]:
         if known in short_names:
             return short_names[known]
-    names = list(names)
     if len(names) != 1:
         contents = list_some(names) or "none"
         raise PatchfemError(
