@@ -383,6 +383,23 @@ def test_bonds_without_closed_loop_state_the_method_to_use():
     assert not compute_backbone(bonds, "", [3e-7], ("quasi-static",)).missing
 
 
+def test_always_loops_of_growing_bonds_run_until_they_are_steady():
+    """Bonds that grow over tens of cycles have the frequency that follows from the last of 600 cycles of a bench."""
+    law = (
+        'law = "nonlocal"\nkinetic = 0.2\nbond_length = "1 um"\nrest_growth = "0.02 m/s^2"\n'
+        'slip_growth = "20 um"\nrest_speed = "1 mm/s"'
+    )
+    backbone = compute_backbone(build_block(law), "", [2e-6], ("quasi-static",))
+    frequency = float(backbone.frequencies.stuck)
+    slide = f'[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "{frequency!r} Hz"\ncycles = 600\n'
+    bench = make_shaken_block(law).partition("[structure]")[0] + slide
+    stiffness = pf.run(bench).measures["secant_stiffness"].value
+    curve = backbone.curves["quasi-static"]
+    omega = np.sqrt(OMEGA**2 + stiffness / 0.5)
+    assert curve.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
+    assert curve.frequency_error < 1e-4 * curve.frequency
+
+
 def test_quasi_static_curve_ends_at_maximum_force():
     """The quasi-static curve ends where the force of an interlock is largest.
 
