@@ -78,11 +78,11 @@ def format_cell(value, unit):
     return value if value == "" else repr(float(value) / unit)
 
 
-def linear_response(f, level, own=141.0, zeta=0.03):
-    """Return absolute acceleration and relative displacement of a driven oscillator in closed form."""
+def linear_response(f, level):
+    """Return absolute acceleration and relative displacement of a driven oscillator of 141 Hz in closed form."""
     w = 2 * np.pi * f
-    wn = 2 * np.pi * own
-    z = -level / (wn**2 - w**2 + 2j * zeta * wn * w)
+    wn = 2 * np.pi * 141.0
+    z = -level / (wn**2 - w**2 + 2j * 0.03 * wn * w)
     return float(abs(level - w**2 * z)), float(abs(z))
 
 
@@ -93,10 +93,10 @@ def read_free_keys(*texts):
     return found
 
 
-def fit_to_rows(scene, path, wanted, seed=0, **beside):
+def fit_to_rows(scene, path, wanted, **beside):
     """Fit a scene to rows and return the result."""
     options = FitOptions(**{"starts": 2} | beside)
-    return fit_rows(scene, path, wanted, options, seed=seed)
+    return fit_rows(scene, path, wanted, options, seed=0)
 
 
 LINEAR_FREE = (
@@ -104,14 +104,12 @@ LINEAR_FREE = (
 )
 
 
-def make_linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
-    """Return rows of an oscillator at five frequencies, with noise and gains."""
-    draw = np.random.default_rng(seed)
+def make_linear_rows(scale=1.0, seen=1.0):
+    """Return rows of an oscillator at five frequencies, with gains."""
     out = []
     for f in (120.0, 135.0, 143.0, 150.0, 160.0):
         a, y = linear_response(f, 20.0)
-        spread = np.exp(noise * draw.standard_normal(2))
-        out.append((f, 20.0, a * scale * spread[0], y * seen * spread[1], ""))
+        out.append((f, 20.0, a * scale, y * seen, ""))
     return out
 
 
