@@ -134,11 +134,8 @@ def test_masing_memory_of_nested_loops(slide):
         stretch = np.clip(stretch + increment, -limits, limits)
         history.append(stretch @ stiffness)
     motion = runs.run_case(make_bench(law, time, np.array(slide), samples=time[1:]))
-    is_sample = (
-        np.isin(motion.rows[:, 0], time[1:]) & (motion.rows[:, -1] == 0) & (motion.rows[:, -2] == 0)
-    )
-    n = motion.case.y.size
-    by_time = {row[0]: row[1 + n] for row in motion.rows[is_sample]}
+    times, _, force = forces(motion)
+    by_time = dict(zip(times, force))
     assert [by_time[t] for t in time[1:]] == pytest.approx(history, abs=1e-12)
 
 
