@@ -167,8 +167,10 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     Raises PatchfemError if the header is not that of the format, `form`.
     """
     names = table.names
-    quoted = shorten(table.header, MAX_LINE_LENGTH)
-    expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{quoted}'"
+    expected = (
+        f"{table.path}:1: a header like `{form.example}` is needed, not "
+        f"'{shorten(table.header, MAX_LINE_LENGTH)}'"
+    )
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")
 

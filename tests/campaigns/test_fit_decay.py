@@ -1,7 +1,5 @@
 """Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -18,7 +16,6 @@ import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
 from patchfem.campaigns.fits.problem import parse_ranges
-from patchfem.campaigns.fits.request import choose_kind
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -142,11 +139,22 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
     assert "The errors of the measured values are their scatter around the fit." in answer.out
     for name in ("fit.json", "report.html"):
         assert "from their scatter around the fit: " in (tmp_path / "out" / name).read_text("utf-8")
-    # a table of no kind is refused with the header of each kind
-    (tmp_path / "decay.csv").write_text("a [m],f [Hz],z\n1e-6,100,0.1\n")
-    answer = run_cli(*command)
-    for header in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
-        assert answer.code == 2 and f"`{header}" in answer.err
+    # a table of no kind and a record over time are refused with the header of each kind, and how to make the first
+    for header in (
+        "time [s],velocity [m/s]",
+        "Time [ms],displacement [m],force [N]",
+        "a [m],f [Hz],z",
+        "MATLAB",
+    ):
+        command[3] = "ring.mat" if header == "MATLAB" else "decay.csv"
+        (tmp_path / command[3]).write_text(f"{header}\n1,2,3\n")
+        answer = run_cli(*command)
+        for text in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
+            assert answer.code == 2 and f"`{text}" in answer.err
+        assert (
+            f"records over time is fitted as the table that `patchfem import {command[3]} --decay"
+            in answer.err
+        )
     table = tmp_path / "backbone.csv"
     table.write_text(
         "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"
@@ -245,23 +253,3 @@ def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
             scatter = result["rms"][name] * np.sqrt(8 / 7.5)
             assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.01), name
     assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    "header",
-    [
-        "time [s],displacement [m]",
-        "Time [ms],velocity [m/s]",
-        "time [s],relative_displacement [m],friction_force [N]",
-    ],
-)
-def test_refuses_time_record_with_advice(tmp_path, header):
-    """A record over time is refused with the command that fits its frequency and damping."""
-    path = tmp_path / "ring.csv"
-    path.write_text(header + "\n" + ("1,2,3"[: 2 * header.count(",") + 1] + "\n") * 3)
-    (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
-    for file in (path, tmp_path / "ring.mat"):
-        with pytest.raises(
-            PatchfemError, match=rf"records over time.*`patchfem import {file} --decay"
-        ):
-            choose_kind(SimpleNamespace(wear=None, kind="rig"), file)

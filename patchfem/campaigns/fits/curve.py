@@ -6,7 +6,7 @@ result at its starting points, the other is used.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -275,10 +275,7 @@ class CurveModel(FreeKeys):
             """Return the residual (2k,) of the curve for values of the keys, over the standard deviations."""
             return ((self.compute(values, method) - measured.value) / measured.error).ravel()
 
-        problem = self.make_problem(residual)
-        if start is not None:
-            problem = replace(problem, start=start)
-        return problem.solve(starts, kind)
+        return self.make_problem(residual, start).solve(starts, kind)
 
     def weight_by_scatter(
         self, measured: MeasuredCurve, method: str, fit: Fit
