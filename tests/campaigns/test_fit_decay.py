@@ -1,5 +1,7 @@
 """Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -16,6 +18,7 @@ import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
 from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.fits.request import choose_kind
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -242,3 +245,23 @@ def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
             scatter = result["rms"][name] * np.sqrt(8 / 7.5)
             assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.01), name
     assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time [s],displacement [m]",
+        "Time [ms],velocity [m/s]",
+        "time [s],relative_displacement [m],friction_force [N]",
+    ],
+)
+def test_refuses_time_record_with_advice(tmp_path, header):
+    """A record over time is refused with the command that fits its frequency and damping."""
+    path = tmp_path / "ring.csv"
+    path.write_text(header + "\n" + ("1,2,3"[: 2 * header.count(",") + 1] + "\n") * 3)
+    (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
+    for file in (path, tmp_path / "ring.mat"):
+        with pytest.raises(
+            PatchfemError, match=rf"records over time.*`patchfem import {file} --decay"
+        ):
+            choose_kind(SimpleNamespace(wear=None, kind="rig"), file)

@@ -160,6 +160,10 @@ class FreeKeys:
         high = [bound.high for bound in self.ranges]
         return Problem(residual, low, high, self.start())
 
+    def widen(self, fit: Fit, changes: np.ndarray) -> Fit:
+        """Return a fit with intervals that contain the effect of numerical errors of the model (`Fit.widen`)."""
+        return fit.widen(changes, [(bound.low, bound.high) for bound in self.ranges])
+
     def make_fitted_keys(self, fit: Fit, warnings: Sequence[str] = ()) -> FittedKeys:
         """Return the fitted values with their intervals and all warnings, after those of this kind of fit."""
         undetermined = describe_fit(fit, [bound.key for bound in self.ranges])
