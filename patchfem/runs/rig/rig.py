@@ -233,9 +233,8 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         time_runs = engine.list_time_runs(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = runner.list_step_runs(numerics, solution, time_runs)
-        step_values = [run.values for run in step_runs]
         measures = add_errors(
-            solution.values, errors, step_values, min_relative_error=MIN_RELATIVE_ERROR, size=size
+            solution.values, errors, min_relative_error=MIN_RELATIVE_ERROR, size=size
         )
         if solution.levels or model.rig.drive.kind == "free":
             coarser_runs = [*time_runs, *space_runs]
