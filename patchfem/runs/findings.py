@@ -15,8 +15,7 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
-from ..response import rows
-from ..response.errors import MAX_ORDER
+from ..response import errors, rows
 from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
@@ -274,7 +273,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
-    halvings = ceil(log2(missed.excess[missed.worst]) / MAX_ORDER)
+    halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_ORDER)
 
     # A rig doubles its steps while this reduces the errors, or needs none, unless the scene fixes them.
     model = missed.model
