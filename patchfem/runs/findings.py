@@ -29,12 +29,6 @@ MAX_FIXED_HALVINGS = 4
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
 MAX_PROPOSED_STRIPS = 64
-# Measures whose error is of first order in the width of the strips: the pressure peak of the outermost strip is
-# computed at its centre.
-FIRST_ORDER_MEASURES = (
-    "pressure_peak",
-    "loaded_fraction",
-)
 # Measures from samples, whose error does not depend on the number of harmonics.
 SAMPLED_MEASURES = (
     "stick_fraction",
@@ -188,9 +182,8 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
 
 
 def _advise_strips(patch_model, excess: Mapping) -> Advice:
-    """Return the advice to use as many strips as the tolerance requires."""
-    orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
-    ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
+    """Return the advice to use as many strips as second order requires, at least twice as many."""
+    ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_ORDER))
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_PROPOSED_STRIPS:
         return NO_ADVICE
