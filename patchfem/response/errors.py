@@ -196,7 +196,7 @@ class FrictionScale(NamedTuple):
     cycle_work: float
 
 
-def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Values:
+def friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
     The error of a measure is `fraction` times a reference value: the friction limit, the bond
@@ -209,9 +209,14 @@ def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Va
         Values of the measures by name.
     fraction : float
         Error of the friction force relative to the friction limit [1].
-    scale : FrictionScale
-        Reference values of force, length and work.
+    law
+        Law with its coefficient of static friction and its bond length [m].
+    load : float
+        Largest normal load [N].
+    works : (2,)
+        Sums of the absolute friction work in the whole run and in a cycle [J].
     """
+    scale = FrictionScale(law.static, law.static * load, law.bond_length, *works)
     errors = {}
     for name, value in values.items():
         find_scale = find_definition(name).friction_scale

@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, stationary
-from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun
+from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
 from ...response.decay_curve import DecayCurve
 from ...response.errors import absolute_change, add_errors, add_run_error_estimates
 from ...response.measures import Measures
@@ -229,7 +229,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
             inputs.seconds["march"] = solution.seconds
         time_runs = engine.list_time_runs(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
-        step_runs = runner.list_step_runs(numerics, solution, time_runs)
+        step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
             solution.values, errors, min_relative_error=MIN_RELATIVE_ERROR, size=size
         )
