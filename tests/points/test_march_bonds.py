@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, follow_path, make_one_mode
+from march_paths import OMEGA, follow_path
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
@@ -157,7 +158,7 @@ def test_order_two_against_integrated_rate_equations(growth):
     errors = []
     for steps in (100, 800, 6400):
         result = march(
-            make_one_mode(OMEGA, 0.003, 1.0),
+            make_modal_basis(OMEGA, 0.003),
             SineDrive(drive, OMEGA),
             make_bond_contact(law, 98.0665, ROW),
             2,
@@ -184,7 +185,7 @@ def march_list(law, capacity, monkeypatch):
     monkeypatch.setattr(engine.list_numbers, "estimate_list_capacity", lambda *_: capacity)
     contact = make_lists(law, 98.0665, None, np.inf, 0.0)
     return march(
-        make_one_mode(OMEGA, 0.01, 1.0), SineDrive(49.0, OMEGA), contact, 3, 100, window=3, frames=4
+        make_modal_basis(OMEGA, 0.01), SineDrive(49.0, OMEGA), contact, 3, 100, window=3, frames=4
     )
 
 
