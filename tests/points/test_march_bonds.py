@@ -37,12 +37,6 @@ def make_shear(shape, stiffness):
     )
 
 
-def reversing_path(steps: int) -> np.ndarray:
-    """Return a path with five reversals at different slides [m]."""
-    t = np.linspace(0, 1, steps + 1)
-    return 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)
-
-
 def check_balance(found, path, rel=1e-12) -> None:
     """Check that at every sample the work equals the change of the stored energy plus the loss."""
     work = found.forces[:-1, 1] * np.diff(path)
@@ -94,7 +88,8 @@ def test_exact_energy_balance_over_reversals(reading, order, growth):
     The reading by stretch creates no energy beyond round-off.
     """
     law = Bonds(0.4, 1e-6, order, reading, **growth)
-    path = reversing_path(160)
+    t = np.linspace(0, 1, 161)
+    path = 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)  # five reversals at different slides [m]
     rng = np.random.default_rng(3)
     shape = rng.normal(size=(4, 3)) / np.sqrt(0.4 * FORCE)[:, None]
     found = follow_path(make_lists(law, FORCE, make_shear(shape, [1e6, 3e6, 1e7])), path, 1e-3)
