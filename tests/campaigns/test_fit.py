@@ -348,21 +348,23 @@ def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
 
 
 def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
-    """The fitted scene states the rest speed, a thousandth of the largest measured speed.
+    """The fitted scene states the rest speed, a thousandth of the largest measured speed; a warning states its step error.
 
     The scene leaves the rest speed v_h out, so that it follows from the motion.
     """
-    time, slide = sine_path(24, 1)
+    time, slide = sine_path(12, 1)
     scene = load_scene(tmp_path, "growth", "friction.rest_speed=1 m/s")
     scene = loads(
         scene.text.replace('rest_speed = "0.01 mm/s"\n', ""),
         tmp_path / "scene.toml",
-        ["accuracy.steps_per_cycle=24"],
+        ["accuracy.steps_per_cycle=12"],
     )
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     )
     result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
+    change = result.step_error / np.abs(result.loop.reading).max()
+    assert f"changes by {change:.1g} of its peak" in result.keys.warnings[-1]
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
     text = format_fitted_scene(result, scene, ["Fitted.", "Two."], tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)

@@ -24,7 +24,7 @@ from patchfem.structure import make_release
 EVENT_ERROR = 1e-6  # an event is located within 1/2048 of a step
 
 
-def make_chain(stiffness, mass=1.0, zeta=0.0, faces=None):
+def make_chain(stiffness, zeta=0.0, faces=None):
     """Return the modes of unit masses in a row.
 
     Spring i connects mass i to the mass before it, spring 0 to the base; the last mass has a free end.
@@ -47,7 +47,7 @@ def make_chain(stiffness, mass=1.0, zeta=0.0, faces=None):
         rows[0],
         shape.T @ np.ones(n),
         shape[0],
-        mass,
+        1.0,
         None,
         rows,
         shapes=shape,

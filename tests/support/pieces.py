@@ -62,10 +62,11 @@ def make_coated_pair(cells: int) -> Compliance:
 
 
 @cache
-def make_bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
+def make_bare_pair(cells: int, young: float = TITANIUM[0]) -> Compliance:
     """Return the compliance of uncoated blocks of the size of the test specimen."""
     return make_compliance(
-        graded_grid(LENGTH, HEIGHT, LENGTH / cells), make_bare_layers((young, TITANIUM[1]), plane)
+        graded_grid(LENGTH, HEIGHT, LENGTH / cells),
+        make_bare_layers((young, TITANIUM[1]), "strain"),
     )
 
 

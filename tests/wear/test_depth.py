@@ -59,12 +59,12 @@ def flat_contact():
     )
 
 
-def run_wear(problem, tolerance=1e-3, count=None):
+def run_wear(problem, tolerance=1e-3):
     """Return the last state and the number of steps of a complete wear run."""
     state = make_initial_wear_state(problem)
     jumps = 0
     while state.cycle < problem.cycles:
-        state = take_jump(problem, state, tolerance, count)
+        state = take_jump(problem, state, tolerance)
         jumps = jumps + 1
     return state, jumps
 
