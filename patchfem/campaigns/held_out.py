@@ -97,17 +97,18 @@ def format_cell(name: str, cell: float | str) -> str:
 def _has_value(name: str, cell: float | str, text: str) -> bool:
     """Return whether a cell in the column `name` has the value that a text of the option --hold states.
 
-    Numbers, also those of labels, are equal but for round-off. The flags of a row need only contain the text.
+    Labels that are numbers are compared as numbers, and frequencies and inputs but for round-off. The flags of a row need
+    only contain the text.
     """
     if name == "flag":
         return text in cell
+    if isinstance(cell, str):
+        try:
+            return float(cell) == float(text)
+        except ValueError:
+            return cell == text
     try:
-        if not isinstance(cell, str):
-            value = parse_quantity(text, NUMBER_UNITS[name][0])
-        else:
-            cell, value = float(cell), float(text)
+        value = parse_quantity(text, NUMBER_UNITS[name][0])
     except ValueError as error:
-        if isinstance(cell, str):
-            return text == cell
         raise PatchfemError(f"--hold {name}={text}: {error}") from None
     return abs(cell - value) <= EQUAL_TOL * abs(value)
