@@ -308,7 +308,15 @@ def hold(rig, state, acceleration):
 
 @njit(**NJIT_KERNEL)
 def find_strength(rig, i):
-    """Return the largest modal force of a rigid interface at rest under its mean load."""
+    """Return the largest modal force [N] of a rigid interface at rest under its mean load.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    i : int
+        Number of the interface.
+    """
     row = rig.rows[0, i]
     return rig.faces[i, Face.NUMBERS] * rig.faces[i, Face.MEAN] * np.sqrt(project(row, row))
 
