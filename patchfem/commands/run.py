@@ -110,7 +110,7 @@ def _report_missing_page(fault: BaseException, target: Path) -> None:
     if isinstance(fault, KeyboardInterrupt):
         reason = "interrupted while the page was drawn"
     elif isinstance(fault, MemoryError):
-        reason = f"{target / store.PAGE}: out of memory"
+        reason = f"{target / store.PAGE_FILE}: out of memory"
     elif isinstance(fault, core.PatchfemError | OSError):
         reason = str(fault)
     else:

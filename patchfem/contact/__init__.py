@@ -25,7 +25,7 @@ PUBLIC = {
     "conjugate_gradients": ("fit_motion", "solve_by_gradients"),
     "contact_sets": ("ContactSets",),
     "edges": (
-        "MIN_RELATIVE_PRESSURE",
+        "MIN_CONTACT_PRESSURE_RATIO",
         "contact_intervals",
         "edge_offset",
         "find_pressure_edges",
@@ -56,8 +56,8 @@ PUBLIC = {
     ),
     "press_path_kernels": ("path_mean",),
     "set_arrays": (
-        "REFERENCE_LOAD",
-        "REFERENCE_MOMENT",
+        "REFERENCE_LOAD_INDEX",
+        "REFERENCE_MOMENT_INDEX",
         "SetArrays",
         "make_set_arrays",
         "hash_set",
@@ -67,5 +67,5 @@ PUBLIC = {
         "tangential_stiffness",
     ),
     "strip_compliance": ("StripCompliance",),
-    "unilateral": ("INDEFINITE_MESSAGE",),
+    "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

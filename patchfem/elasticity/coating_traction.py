@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.grading import LENGTH_TOL
+from ..mesh.grading import EQUAL_LENGTH_TOL
 from ..mesh.pieces import find_edges
 from .elasticity import CellPoints, hooke
 from .recovery import Cells, make_points
@@ -138,7 +138,7 @@ def interpolate_coating_traction(
     if traction is None:
         return {}
     line_x = cells.points[traction.node, 0]
-    tolerance = LENGTH_TOL * np.ptp(line_x)
+    tolerance = EQUAL_LENGTH_TOL * np.ptp(line_x)
     is_outside = (x < line_x[0] - tolerance) | (x > line_x[-1] + tolerance)
     out = {}
     for name, values in (("normal_bond", traction.normal), ("shear_bond", traction.shear)):

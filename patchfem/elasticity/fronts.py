@@ -15,12 +15,12 @@ from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
 MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
-DIRECTIONS = np.arange(2)  # numbers of the displacements of a node, along x and inward
+DISPLACEMENT_COMPONENTS = np.arange(2)  # numbers of the displacements of a node, along x and inward
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
 # Largest residual of a solution, relative to the largest load, that is not refined
-SAFE_RESIDUAL = 1e-8
+MAX_UNREFINED_RESIDUAL = 1e-8
 # Largest relative change of the displacements by one step of refinement; factors with a larger
 # change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
@@ -109,7 +109,7 @@ class Fronts:
         -------
         float
             Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
-            `SAFE_RESIDUAL`.
+            `MAX_UNREFINED_RESIDUAL`.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Fronts:
         load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
         u = self.solve(load)
         residual = load - self.compute_forces(u)
-        if np.abs(residual).max() <= SAFE_RESIDUAL * np.abs(load).max():
+        if np.abs(residual).max() <= MAX_UNREFINED_RESIDUAL * np.abs(load).max():
             return 0.0
         change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
         if not change <= MAX_REFINEMENT_CHANGE:
@@ -340,7 +340,9 @@ def _add_stiffnesses(terms, order, position) -> np.ndarray:
 
 def _number_unknowns(nodes) -> np.ndarray:
     """Return the numbers (..., 2 k) of the unknowns of nodes (..., k), node by node along x and inward."""
-    return (2 * nodes[..., None] + DIRECTIONS).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
+    return (2 * nodes[..., None] + DISPLACEMENT_COMPONENTS).reshape(
+        *nodes.shape[:-1], 2 * nodes.shape[-1]
+    )
 
 
 def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.grading import LENGTH_TOL, tributary_lengths
+from ..mesh.grading import EQUAL_LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
 
@@ -138,7 +138,7 @@ def _join_nodes(lower_x, upper_x) -> np.ndarray:
     of the pieces, which have the same ends.
     """
     end = lower_x[-1]
-    tolerance = LENGTH_TOL * (end - lower_x[0])
+    tolerance = EQUAL_LENGTH_TOL * (end - lower_x[0])
     grid = [lower_x[0]]
     while grid[-1] < end - tolerance:
         following = []

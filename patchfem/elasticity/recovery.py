@@ -17,9 +17,9 @@ from .elasticity import CellPoints, Layers, Piece, evaluate_cells, hooke
 
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
 # patch with a smaller one is extended by the neighbouring cells
-MIN_PLANE_DETERMINANT = 0.1
+MIN_PLANE_FIT_DETERMINANT = 0.1
 # Elements of first order by the number of their corners, by which recovered stresses are interpolated
-LINEAR_ELEMENTS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
+ELEMENTS_BY_CORNERS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -237,7 +237,7 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
     gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
-    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_DETERMINANT
+    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_FIT_DETERMINANT
 
     # Value of the plane at the node: mean of the values, less the slopes times the mean offset
     mean = gram[:, 0, 1:] / counts[:, None]
@@ -317,7 +317,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
             at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
             first_cell = part.stop
             first_corner = first_corner + len(at_corners)
-            shape = LINEAR_ELEMENTS[n_corners].evaluate(ELEMENTS[kind].gauss).values
+            shape = ELEMENTS_BY_CORNERS[n_corners].evaluate(ELEMENTS[kind].gauss).values
             at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
 
             # Squared difference from the computed components, integrated over each cell

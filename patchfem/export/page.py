@@ -25,7 +25,7 @@ from .columns import Table, make_tables
 from .quantities import format_quantity
 
 # what a file beside a page is, by its name or its ending
-FILE_TEXTS = {
+FILE_DESCRIPTIONS = {
     "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
     "interfaces": "fields of every interface that has a patch of its own, in the same format",
     "summary.json": "verdict, quantities with their errors, warnings and notes, in SI units",
@@ -38,8 +38,8 @@ FILE_TEXTS = {
 MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
-MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
-COMPRESSION = 6  # level of the compression of the figures in a page
+MAX_SCENE_VALUE_CHARACTERS = 80  # largest number of characters of a value of a scene
+FIGURE_COMPRESSION_LEVEL = 6  # of zlib, from 1 (fast) to 9 (small)
 
 
 def write_page(folder: Path) -> Path:
@@ -73,7 +73,9 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
         If the page cannot be written.
     """
     text = make_page([Path(folder) for folder in folders])
-    path = Path(out or (Path(folders[0]) / store.PAGE if len(folders) == 1 else store.PAGE))
+    path = Path(
+        out or (Path(folders[0]) / store.PAGE_FILE if len(folders) == 1 else store.PAGE_FILE)
+    )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -95,13 +97,14 @@ def make_page(folders: list[Path]) -> str:
         tables = make_tables(first)
         paths = sorted(folders[0].glob("[!.]*"))
         texts = {
-            path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths
+            path.name: FILE_DESCRIPTIONS.get(path.name) or FILE_DESCRIPTIONS.get(path.suffix)
+            for path in paths
         }
-        if (folders[0] / store.FIELDS).is_file():
+        if (folders[0] / store.FIELDS_FILE).is_file():
             # only a run with fields has the modules that read them
             from .fields.film import make_stress_panels
 
-            drawn += make_stress_panels(folders[0] / store.FIELDS)
+            drawn += make_stress_panels(folders[0] / store.FIELDS_FILE)
     else:
         tables = list_scene_differences(answers)
         texts = {}
@@ -117,7 +120,7 @@ def make_page(folders: list[Path]) -> str:
         measures=measures,
         zeros=zeros,
         files=[(name, text) for name, text in texts.items() if text],
-        data=_encode(gzip.compress(packed.encode(), COMPRESSION, mtime=0)),
+        data=_encode(gzip.compress(packed.encode(), FIGURE_COMPRESSION_LEVEL, mtime=0)),
         library=read_library() if drawn else "",
     )
 
@@ -206,7 +209,7 @@ def list_scene_differences(answers: Answers) -> list[Table]:
     for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
         texts = [str(scene.get(key, "-")) for scene in scenes.values()]
         if len(set(texts)) > 1:
-            rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
+            rows.append([key, *(shorten(text, MAX_SCENE_VALUE_CHARACTERS) for text in texts)])
     table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
     return [table] if rows else []
 

@@ -50,7 +50,11 @@ def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
 def list_files(folder: Path, has_page: bool = True) -> list[str]:
     """Return a line for the results folder, and for its page, its fields and its main table if it has them."""
     lines = [f"results: {folder}{'' if has_page else ' (without report.html: --no-page)'}"]
-    for label, name in (("page", store.PAGE), ("fields", store.FIELDS), ("table", "sweep.csv")):
+    for label, name in (
+        ("page", store.PAGE_FILE),
+        ("fields", store.FIELDS_FILE),
+        ("table", "sweep.csv"),
+    ):
         if (folder / name).is_file():
             lines.append(f"{label}: {folder / name}")
     inside = sorted(folder.glob("interfaces/*"))

@@ -22,14 +22,14 @@ PUBLIC = {
         "write_mesh",
     ),
     "grading": (
-        "LENGTH_TOL",
+        "EQUAL_LENGTH_TOL",
         "Layout",
         "divide_into_columns",
         "divide_into_rows",
         "tributary_lengths",
     ),
     "grid": (
-        "ROW_SLOPE",
+        "ROW_HEIGHT_GROWTH",
         "TensorGrid",
         "graded_grid",
         "row_scale",

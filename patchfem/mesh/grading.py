@@ -8,7 +8,7 @@ import numpy as np
 from ..core import frozen_array
 
 # Largest difference of lengths that count as equal, as a fraction of the interface length
-LENGTH_TOL = 1e-9
+EQUAL_LENGTH_TOL = 1e-9
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,14 +17,14 @@ from ..core import frozen_array
 from .ends import SHARP_END, End
 from .grading import Layout, divide_into_rows, tributary_lengths
 
-COLUMN_GROWTH = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
+COLUMN_LENGTH_RATIO = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
 # Number of equal columns beyond which the rows become shorter with the columns; with fewer columns
 # the rows stay as short, which costs little
 N_REFERENCE_COLUMNS = 32
 # Growth of the rows with the distance from a face, for N_REFERENCE_COLUMNS columns; with 0.2 there
 # are a fifth more rows for the same error of the compliance
-ROW_SLOPE = 0.3
-COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
+ROW_HEIGHT_GROWTH = 0.3
+N_COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
 MIN_PIECE_ROWS = 6  # smallest number of rows of a piece
 
 
@@ -182,7 +182,7 @@ class TensorGrid:
             outer=frozen_array(change(self.outer)),
         )
 
-    def extend(self, length: float, end: End, growth: float = COLUMN_GROWTH) -> "TensorGrid":
+    def extend(self, length: float, end: End, growth: float = COLUMN_LENGTH_RATIO) -> "TensorGrid":
         """Return the grid of a piece of which this one is the part over the interface.
 
         The interface lies in the middle of the piece. The first column beyond the interface is as long
@@ -213,7 +213,7 @@ class TensorGrid:
 
 
 def graded_rows(
-    start: float, total: float, growth: float = COLUMN_GROWTH, min_rows: int = 1
+    start: float, total: float, growth: float = COLUMN_LENGTH_RATIO, min_rows: int = 1
 ) -> np.ndarray:
     """Compute heights of rows that grow with a constant ratio and add up to a total.
 
@@ -279,10 +279,10 @@ def graded_grid(
     # The stress is singular at the ends of the far face, so that the rows are short there as well.
     bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
     if coating > 0:
-        bands.append((coating, coating, min(reference_cell, coating / COATING_ROWS)))
+        bands.append((coating, coating, min(reference_cell, coating / N_COATING_ROWS)))
     max_row = height / MIN_PIECE_ROWS
     rows = Layout(
-        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_SLOPE
+        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_HEIGHT_GROWTH
     ).scale_cells(scale)
 
     x = np.linspace(-length / 2, length / 2, n_columns + 1)

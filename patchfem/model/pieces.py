@@ -7,7 +7,7 @@ from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
 from ..mesh import pieces as piece_meshes
-from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
+from ..mesh.grid import ROW_HEIGHT_GROWTH, TensorGrid, graded_grid, row_scale
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
 from .source import name_key
@@ -46,7 +46,7 @@ def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     grid = graded_grid(
         patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
     )
-    growth = 1 + ROW_SLOPE * row_scale(grid.x.size - 1)
+    growth = 1 + ROW_HEIGHT_GROWTH * row_scale(grid.x.size - 1)
     return extend_grid(patch, piece, grid, growth)
 
 

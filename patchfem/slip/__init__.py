@@ -14,7 +14,7 @@ PUBLIC = {
     "edge_springs": ("add_edge_springs",),
     "fields": ("element_fields",),
     "mesh_correction": (
-        "SPREAD_FACTOR",
+        "ERROR_TO_SPREAD_CHANGE",
         "spread_elements",
     ),
     "shear_modes": (

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact.unilateral import INDEFINITE_MESSAGE
+from ..contact.unilateral import INDEFINITE_COMPLIANCE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thread
 
@@ -271,7 +271,7 @@ def _factorise(c: np.ndarray) -> np.ndarray:
     """
     factor, fault = dpotrf(c.T, lower=1)
     if fault:
-        raise PatchfemError(INDEFINITE_MESSAGE)
+        raise PatchfemError(INDEFINITE_COMPLIANCE_MESSAGE)
     return factor
 
 

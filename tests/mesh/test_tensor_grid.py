@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
+from patchfem.mesh import ROW_HEIGHT_GROWTH, graded_grid, row_scale
 from patchfem.mesh.grid import MIN_PIECE_ROWS
 
 
@@ -36,8 +36,8 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     assert rows.min() > 0 and rows.max() <= height / MIN_PIECE_ROWS * (1 + 1e-5)
     columns = grid.x.size - 1
     for face_row in (rows[0], rows[-1]):
-        assert face_row <= length / columns * (1 + ROW_SLOPE)
-    growth = 1.1 + ROW_SLOPE * row_scale(columns)
+        assert face_row <= length / columns * (1 + ROW_HEIGHT_GROWTH)
+    growth = 1.1 + ROW_HEIGHT_GROWTH * row_scale(columns)
     for layer in (rows[: grid.coating_rows], rows[grid.coating_rows :]):
         ratio = layer[1:] / layer[:-1]
         assert np.all(ratio <= growth) and np.all(ratio >= 1 / growth)

@@ -11,9 +11,9 @@ from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
-SWEEP_STYLES = ("relative", "menu", "maps")
-MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
-MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
+SWEEP_CHART_STYLES = ("relative", "menu", "maps")
+N_MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
+MAX_CHARTED_INTERFACES = 6  # largest number of interfaces with charts of their own
 
 
 def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
@@ -41,7 +41,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
 
 def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
-    numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
+    numbers = [number for number in range(1, MAX_CHARTED_INTERFACES + 1) if f"x_{number}" in data]
     if chart.x != "x" or "x" in data or not numbers:
         return [chart]
     charts = []
@@ -54,11 +54,11 @@ def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
 
 def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     """Return the panel of a chart, or None if no answer has data for it."""
-    if chart.style in SWEEP_STYLES:
+    if chart.style in SWEEP_CHART_STYLES:
         # only the page of a sweep loads this module
-        from .sweeps import STYLES
+        from .sweeps import STYLE_FUNCTIONS
 
-        return STYLES[chart.style](answers, chart)
+        return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
         chart = replace(chart, by="")
     selected = {name: _select(answer.data, chart) for name, answer in answers.items()}
@@ -160,8 +160,8 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
         size = pressure.values.shape[-1]
         loaded = np.flatnonzero((pressure.values.reshape(-1, size) > 0).any(axis=0))
         if loaded.size:
-            first = max(loaded[0] - MARGIN_NODES, 0)
-            return np.arange(first, min(loaded[-1] + MARGIN_NODES + 1, size))
+            first = max(loaded[0] - N_MARGIN_NODES, 0)
+            return np.arange(first, min(loaded[-1] + N_MARGIN_NODES + 1, size))
     return None
 
 

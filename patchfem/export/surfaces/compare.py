@@ -25,7 +25,8 @@ from .sentences import to_answers
 from .variables import band, make_variables, maps
 
 SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
-STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
+# Meanings of the codes of the variable `state`
+WEAR_STATES = ("not used", "unworn", "worn", "grown")
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
     "worn_depth_within",
@@ -216,7 +217,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
-        content["reason"] = sentences.REASONS[_explain_no_roughness(comparison)]
+        content["reason"] = sentences.MISSING_VALUE_REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
 
 
@@ -243,7 +244,7 @@ def _make_data(comparison: Comparison) -> Variables:
         data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
         data |= band("x", "depth", curves.depth, SIDE * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
-        data["state"] = Variable(("x",), state, "", "state of each height", STATES)
+        data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 

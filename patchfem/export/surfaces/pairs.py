@@ -10,12 +10,10 @@ from ...core import PatchfemError
 from ...surface.compare.compare import DEFAULTS, Options
 from ..answer import Answer, JsonObject, Variables, make_columns
 from . import compare, worn
-from .variables import TEXTS
+from .variables import VARIABLE_TEXTS
 
-CHARTED_QUANTITIES = {
-    "worn_depth_mean": "m",
-    "amplitude_ratio": "1",
-}  # quantities of the charts and their units
+# Quantities of the charts and their units
+CHARTED_QUANTITIES = {"worn_depth_mean": "m", "amplitude_ratio": "1"}
 
 
 def answer_pairs(
@@ -98,7 +96,7 @@ def _count(rows: list[JsonObject]) -> str:
 
 def _make_data(rows: list[JsonObject]) -> Variables:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    columns = {"line": ([float(row["line"]) for row in rows], "1", TEXTS["line"])}
+    columns = {"line": ([float(row["line"]) for row in rows], "1", VARIABLE_TEXTS["line"])}
     for name, unit in CHARTED_QUANTITIES.items():
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             columns[name + suffix] = ([row.get(name, {}).get(key) for row in rows], unit)

@@ -5,7 +5,7 @@ import numpy as np
 from ..answer import Variable, Variables
 
 MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
-TEXTS = {
+VARIABLE_TEXTS = {
     "x": "position along the surface; in the second trace of a comparison",
     "y": "position across; middle of a strip",
     "before": "height before wear",
@@ -37,7 +37,9 @@ def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
     data = {}
     for name, values in arrays.items():
         values, unit = values if isinstance(values, tuple) else (values, "m")
-        data[name] = Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
+        data[name] = Variable(
+            (dimension,), values, unit, VARIABLE_TEXTS.get(name, name.replace("_", " "))
+        )
     return data
 
 
@@ -68,5 +70,5 @@ def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
     data = make_variables("x", x=x[columns]) | make_variables("y", y=y[rows])
     for name, values in heights.items():
         shown = values[rows, columns].astype(np.float32)
-        data[name] = Variable(("y", "x"), shown, "m", TEXTS[name])
+        data[name] = Variable(("y", "x"), shown, "m", VARIABLE_TEXTS[name])
     return data

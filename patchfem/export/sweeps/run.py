@@ -196,7 +196,7 @@ def write_tables(
     if n_missing == len(table):
         return None
 
-    folder.remove_tables("sweep.csv", answers.PAGE)
+    folder.remove_tables("sweep.csv", answers.PAGE_FILE)
     names = folder.case_folder_names()
     if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
         write_csv(cases, table, names, folder.target / "sweep.csv")

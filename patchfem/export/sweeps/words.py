@@ -12,7 +12,7 @@ from ...response import rows
 from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value
 
-SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
+MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
 
 
@@ -135,7 +135,7 @@ def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
     parts = [
         f"{index.key} {100 * index.total:.0f} % ({100 * index.low:.0f} to {100 * index.high:.0f} %)"
         for index in indices[:MAX_NAMED_KEYS]
-        if index.total >= SMALLEST_SHARE
+        if index.total >= MIN_NAMED_VARIANCE_FRACTION
     ]
     return f"Shares of the variance of {_label(name)}: {', '.join(parts)}."
 

@@ -290,7 +290,9 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     pressure = state.pressure
     if skin is not None and skin.law != "linear":
-        pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+        pressure = np.where(
+            pressure > edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max(), pressure, 0.0
+        )
 
     # The fields of a patch are means over its strips; the gap is the smallest one.
     mean_state = ContactState(
@@ -419,4 +421,4 @@ def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
     if skin.law == "linear":
         return np.broadcast_to(1 / (skin.normal_stiffness * state.layout.weight), state.force.shape)
     stiffness = np.maximum(state.stiffness * state.layout.weight, 1e-300)
-    return 1 / np.maximum(stiffness, edges.MIN_RELATIVE_PRESSURE * stiffness.max())
+    return 1 / np.maximum(stiffness, edges.MIN_CONTACT_PRESSURE_RATIO * stiffness.max())
