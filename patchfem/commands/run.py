@@ -84,7 +84,7 @@ def _report_complete_run(target: Path, output: Output) -> None:
         print_message(
             f"{target}: this run is already complete; to run it again, leave out --resume"
         )
-    answer = store.read(target)
+    answer = store.read_answer(target)
     if output.json_:
         print(json.dumps(store.make_summary(answer), ensure_ascii=False), flush=True)
     _end_run(answer, output.quiet)

@@ -16,7 +16,7 @@ of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
 
 # Names that other folders use, by module
 PUBLIC = {
-    "active_set": ("patch_problem",),
+    "active_set": ("make_patch_problem",),
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
@@ -27,7 +27,7 @@ PUBLIC = {
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
         "contact_intervals",
-        "edge_offset",
+        "compute_edge_offset",
         "find_pressure_edges",
         "parabola_change",
         "snap_to_steps",
@@ -47,7 +47,7 @@ PUBLIC = {
         "StripModel",
         "press_strips",
         "split_into_strips",
-        "strip_offsets",
+        "compute_strip_offsets",
     ),
     "press_kernels": (
         "compute_energy",

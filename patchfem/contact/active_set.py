@@ -52,7 +52,7 @@ class ContactProblem(NamedTuple):
         return 1 + len(self.free_rotations)
 
 
-def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
+def make_patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
     """Return the contact problem of a patch that consists of a single strip.
 
     Parameters
@@ -209,10 +209,10 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
     if not (error > OPENING_ROUND_OFF / 10 * solution.scale[active]).any():
         return solution
     refined = solve_on_set(compliance, problem, active, N_REFINEMENT_STEPS)
-    return refined if relative_violation(refined) < relative_violation(solution) else solution
+    return min(solution, refined, key=compute_relative_violation)
 
 
-def relative_violation(solution: SetSolution) -> float:
+def compute_relative_violation(solution: SetSolution) -> float:
     """Return the largest relative violation of the contact conditions [1] by a `SetSolution`.
 
     Openings in contact and overlaps are relative to the terms of the opening, tensile forces to the load.

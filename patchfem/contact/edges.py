@@ -17,7 +17,7 @@ from .strip_compliance import StripCompliance
 MIN_CONTACT_PRESSURE_RATIO = 1e-13
 # Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
 MIN_EDGE_PRESSURE_RATIO = 1e-287
-# Largest ratio of first-row height to cell length for which `edge_offset` was measured
+# Largest ratio of first-row height to cell length for which `compute_edge_offset` was measured
 MAX_CELL_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
 # triangles and quadrilaterals with aspects 0.3 to 2.4, within 0.03
@@ -40,7 +40,7 @@ class ContactEdge(NamedTuple):
     position: float
 
 
-def edge_offset(
+def compute_edge_offset(
     inner, outer, fraction, row_height: float | None = None, *, is_quadratic: bool = False
 ):
     """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
@@ -164,7 +164,7 @@ def find_edges(
         `inner` and `outer` are the lengths [m] of the cells before and beyond the node. An asperity layer reduces the
         offset by its part of the compliance, because it has its edge at the node itself.
         """
-        offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
+        offset = compute_edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
         return (
             offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
         )

@@ -20,9 +20,9 @@ from .active_set import (
     OPENING_ROUND_OFF,
     ContactProblem,
     SetSolution,
+    compute_relative_violation,
     find_rest_motion,
     guess_contact_set,
-    relative_violation,
     solve_primal,
     solve_primal_dual,
 )
@@ -78,7 +78,7 @@ def _solve_by_fallbacks(
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
-    if solution is not None and relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
+    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
         return solution, n_first
 
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
@@ -86,7 +86,7 @@ def _solve_by_fallbacks(
     is_loaded = force > 1e-9 * force.max()
     solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
     n_iterations = n_first + n_second + n_third
-    if solution is not None and relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
+    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
         return solution, n_iterations
     solution, n_last = solve_primal(compliance, problem, force)
     return solution, n_iterations + n_last
@@ -194,7 +194,7 @@ def solve(
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
         solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
-        if solution is None or not relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
+        if solution is None or not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more
     return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..mesh.grading import EQUAL_LENGTH_TOL
 from ..mesh.pieces import find_edges
-from .elasticity import CellPoints, hooke
+from .elasticity import CellPoints, compute_stress
 from .recovery import Cells, make_points
 
 
@@ -107,7 +107,7 @@ def _nodal_forces(coating: Cells, gauss_points: list[CellPoints], u) -> np.ndarr
     for nodes, points in zip(coating.groups.values(), gauss_points):
         strain = points.strain(u[nodes])
         xx, yy, _, xy = np.moveaxis(
-            hooke(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
+            compute_stress(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
         )
         tensor = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
         forces = (points.weights[..., None, None] * tensor @ points.gradients).sum(axis=1)

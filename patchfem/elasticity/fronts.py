@@ -158,7 +158,7 @@ class _Stiffness(NamedTuple):
     matrix: np.ndarray
 
 
-def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
+def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
     """Halve cells at positions (t, 2) across the longer side of each part.
 
     Returns
@@ -190,7 +190,7 @@ def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
     return parts, leaves
 
 
-def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
+def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
@@ -215,7 +215,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """
     # A node is eliminated in the smallest part that contains all of its cells
     blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
-    parts, leaves = _dissect(positions)
+    parts, leaves = _bisect_cells(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
     position = np.empty(len(is_fixed) + 1, np.int64)
@@ -229,7 +229,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
                 terms = [stiffnesses.pop(half) for half in part.halves]
             else:
                 terms = _select_cells(blocks, leaves[part.first_leaf])
-            nodes = _unite([term.nodes for term in terms])
+            nodes = _merge_nodes([term.nodes for term in terms])
             is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
             own = nodes[is_own]
             boundary = nodes[~is_own]
@@ -296,7 +296,7 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
     return selected
 
 
-def _unite(parts) -> np.ndarray:
+def _merge_nodes(parts) -> np.ndarray:
     """Return the different nodes of several arrays of nodes, sorted.
 
     `np.unique` takes several times as long for few nodes.

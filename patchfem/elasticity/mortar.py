@@ -70,8 +70,8 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     Mortar
     """
     x = _join_nodes(lower.x, upper.x)
-    to_lower = transfer_matrix(x, lower.x)
-    to_upper = transfer_matrix(x, upper.x)
+    to_lower = compute_transfer_matrix(x, lower.x)
+    to_upper = compute_transfer_matrix(x, upper.x)
     nn, tt, nt = (
         to_lower @ low @ to_lower.T + sign * (to_upper @ high @ to_upper.T)
         for low, high, sign in zip(lower.compliance, upper.compliance, (1, 1, -1))
@@ -86,7 +86,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     )
 
 
-def transfer_matrix(x, piece_x) -> np.ndarray:
+def compute_transfer_matrix(x, piece_x) -> np.ndarray:
     """Integrate the matrix T that transfers displacements from the nodes of a body to a grid.
 
     Parameters

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core import frozen_array
 from ..mesh.elements import ELEMENTS
-from .elasticity import CellPoints, Layers, Piece, evaluate_cells, hooke
+from .elasticity import CellPoints, Layers, Piece, compute_stress, evaluate_cells
 
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
 # patch with a smaller one is extended by the neighbouring cells
@@ -75,7 +75,7 @@ def make_points(cells: Cells, kind: str) -> list[CellPoints]:
     return out
 
 
-def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
+def compute_centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     """Compute the stress at the centres of cells, the superconvergent points of bilinear quads.
 
     Parameters
@@ -97,7 +97,7 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
             points.strain(motion[nodes])[..., 0]
             for points, nodes in zip(centres, cells.groups.values())
         ]
-        frame[:] = hooke(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
+        frame[:] = compute_stress(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
     return out
 
 
@@ -289,7 +289,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
     u : (frames, N, 2) ndarray
         Displacements [m].
     stress : (frames, t, 4) ndarray
-        From `centre_stress` [Pa].
+        From `compute_centre_stress` [Pa].
     gauss_points : list of CellPoints
         Points of `make_points`, by element, at which the error is integrated.
 
@@ -298,7 +298,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
     StressError
     """
     cells = recovery.cells
-    lam, mu = cells.layers.lame(cells.is_coating)
+    lam, mu = cells.layers.lame_constants(cells.is_coating)
     # The energy is (lam + mu) (exx + eyy)^2 + mu (exx - eyy)^2 + 4 mu exy^2, in components whose squares add up.
     bulk = np.sqrt(lam + mu)
     shear = np.sqrt(mu)

@@ -119,9 +119,9 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     if curve is not None:
         largest = int(np.argmax(curve.damping))
         for name in VALUES:
-            out[f"{name}_at_smallest_amplitude"] = _take(curve, name, 0)
-            out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
-        out["largest_damping"] = _take(curve, "damping", largest)
+            out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
+            out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
+        out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
         # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
         # curve nothing encloses the peak.
         error = None
@@ -142,11 +142,8 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     return {name: one for name, one in out.items() if one.value is not None or one.reason}
 
 
-def _take(curve: Curve, name: str, k: int) -> Quantity:
-    """Return a value of point k of a curve with its error.
-
-    `name` is a column of the curve, such as "frequency" or "damping".
-    """
+def _make_point_quantity(curve: Curve, name: str, k: int) -> Quantity:
+    """Return the value and the error of a column of a curve, such as "frequency" or "damping", at its point k."""
     return Quantity(
         getattr(curve, name)[k], BACKBONE_UNITS[name], getattr(curve, f"{name}_error")[k]
     )
@@ -156,7 +153,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
-        """Return a quantity as text."""
+        """Return a measure as text, such as "143.2 ± 0.1 Hz"."""
         return quantities.format_quantity(name, measures[name])
 
     curve = backbone.best
@@ -212,10 +209,11 @@ def _exceeds(quantity: Quantity, other: Quantity) -> bool:
 
 
 def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Variables:
-    """Return the curves of the methods, each with the band of tests around it if it is recommended.
+    """Return frequency, damping ratio and force of each method over the amplitude, and the band of the recommended one.
 
-    Of several backbones, one for each value of the key `axis`, there are only the recommended curves, at common amplitudes
-    with NaN where a backbone has no motion. The band of a single backbone has variables of its own, too.
+    Names begin with that of the method, such as balance_frequency. A single backbone has the band also as
+    band_frequency_low and so on. Several backbones, one for each value of the key `axis`, have the recommended curves
+    alone, on the union of their amplitudes; NaN stands where a backbone has no motion.
     """
     data = {}
     if axis is not None:
@@ -253,7 +251,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
 
 
 def _find_unit(name: str) -> str:
-    """Return the SI unit of a column."""
+    """Return the SI unit of a column, such as "force_frequency" or "damping_low"."""
     return BACKBONE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
@@ -351,7 +349,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     for name, (step, error) in changes.items():
         measures[f"{name}_change"] = Quantity(step[point], BACKBONE_UNITS[name], error[point])
 
-    ends = {name: [_take(curve, name, point).value for curve in (start, end)] for name in VALUES}
+    ends = {name: [getattr(curve, name)[point] for curve in (start, end)] for name in VALUES}
     parts = [
         _describe_step(name, measures[f"{name}_change"], ends[name]) for name in SENTENCE_NAMES
     ]

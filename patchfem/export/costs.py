@@ -23,7 +23,7 @@ from .answer import (
     Quantity,
     Remarks,
     Variables,
-    encode,
+    encode_texts,
     make_columns,
     to_plain,
 )
@@ -223,5 +223,5 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     # a colour for each varied setting and for runs that miss the tolerance
     has_several = rows[0].knob != rows[-1].knob
     texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
-    data["result"] = encode("run", texts)
+    data["result"] = encode_texts("run", texts)
     return data

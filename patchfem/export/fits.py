@@ -29,7 +29,7 @@ from .answer import (
     Quantity,
     Remarks,
     Variables,
-    encode,
+    encode_texts,
     make_columns,
 )
 from .quantities import format_quantity
@@ -399,7 +399,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
         unstable = ", unstable in the test" * ("U" in row["flag"])
         uses.append(f"{'held out' if is_held_out else 'fitted'}{unstable}")
     drives = [f"{row['frequency']:.6g} Hz" for row in entries]
-    codes = {"use": encode("row", uses), "drive": encode("row", drives)}
+    codes = {"use": encode_texts("row", uses), "drive": encode_texts("row", drives)}
     return entries, codes | data | make_columns("row", columns)
 
 

@@ -147,12 +147,12 @@ class Folder:
             RESUMABLE_FOLDERS.append(self.path)
         for part in self.path.iterdir():
             if part not in states:
-                remove(part)
+                remove_path(part)
         with suppress(OSError):  # it contains a state
             self.path.rmdir()
 
 
-def remove(path: Path) -> None:
+def remove_path(path: Path) -> None:
     """Remove a file or a folder with its content, as far as this is possible."""
     shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
@@ -161,17 +161,17 @@ def remove_partial_files(folder: Path) -> None:
     """Remove the partial files in a folder and its subfolders, which only a killed writer leaves."""
     for path in folder.rglob(".*"):
         if is_partial_name(path.name):
-            remove(path)
+            remove_path(path)
 
 
-def is_state(name: str) -> bool:
+def is_state_file(name: str) -> bool:
     """Return whether a file with this name contains the saved state of an interrupted run."""
     return STATE_FILE_PATTERN.fullmatch(name) is not None
 
 
 def list_states(folder: Path) -> list[Path]:
     """Return the files with the saved state of an interrupted run in a folder, which may not exist."""
-    return [path for path in folder.glob("*.npz") if is_state(path.name)]
+    return [path for path in folder.glob("*.npz") if is_state_file(path.name)]
 
 
 def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
@@ -200,7 +200,7 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
         path.name
         for path in folder.iterdir()
         if path.name not in allowed
-        and not (is_partial_name(path.name) or is_state(path.name))
+        and not (is_partial_name(path.name) or is_state_file(path.name))
         and not (dots and path.name.startswith("."))
     )
     if other_files:

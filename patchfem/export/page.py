@@ -42,25 +42,12 @@ MAX_SCENE_VALUE_CHARACTERS = 80  # largest number of characters of a value of a 
 FIGURE_COMPRESSION_LEVEL = 6  # of zlib, from 1 (fast) to 9 (small)
 
 
-def write_page(folder: Path) -> Path:
-    """Write report.html into a folder from the other files of the folder, and return its path.
-
-    Raises
-    ------
-    PatchfemError
-        If the folder has no complete result.
-    Missing
-        If the page cannot be written.
-    """
-    return write_report([folder])
-
-
-def write_report(folders: list[Path], out: Path | None = None) -> Path:
+def write_report(*folders: Path, out: Path | None = None) -> Path:
     """Write the page of one folder, or of several folders side by side, and return its path.
 
     Parameters
     ----------
-    folders : list of Path
+    *folders : Path
         Results folders, of answers of the same kind.
     out : Path, optional
         The page; by default report.html in a single folder, else in the current folder.
@@ -109,10 +96,10 @@ def make_page(folders: list[Path]) -> str:
         tables = list_scene_differences(answers)
         texts = {}
 
-    figures = [plotly.draw(panel) for panel in drawn]
-    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack)
+    figures = [plotly.make_plotly_figure(panel) for panel in drawn]
+    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack_array)
     measures, zeros = _list_measures(answers)
-    return _template().render(
+    return _read_template().render(
         answers=answers,
         first=first,
         panels=drawn,
@@ -120,7 +107,7 @@ def make_page(folders: list[Path]) -> str:
         measures=measures,
         zeros=zeros,
         files=[(name, text) for name, text in texts.items() if text],
-        data=_encode(gzip.compress(packed.encode(), FIGURE_COMPRESSION_LEVEL, mtime=0)),
+        data=_encode_base64(gzip.compress(packed.encode(), FIGURE_COMPRESSION_LEVEL, mtime=0)),
         library=read_library() if drawn else "",
     )
 
@@ -130,10 +117,10 @@ def _read_all(folders: list[Path]) -> Answers:
     if not folders:
         raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
-        return {"": store.read(folders[0])}
+        return {"": store.read_answer(folders[0])}
     answers = {}
     for folder in folders:
-        answer = store.read(folder)
+        answer = store.read_answer(folder)
         # a case of a sweep is named by its keys, any other answer by its folder
         case = answer.details.get("case") if answer.is_run else None
         name = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in (case or {}).items())
@@ -160,7 +147,7 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
         reasons = dict.fromkeys(entry.reason for entry in entries if entry and entry.value is None)
         kind = next(iter(answers.values())).kind
         missing = [f"No value: {reason}." for reason in reasons if reason]
-        rows.append((name, texts, " ".join([quantities.describe(name, kind), *missing])))
+        rows.append((name, texts, " ".join([quantities.describe_quantity(name, kind), *missing])))
     return rows, zeros
 
 
@@ -202,7 +189,7 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
 def list_scene_differences(answers: Answers) -> list[Table]:
     """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does, or [] without any."""
     scenes = {
-        name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
+        name: _flatten_tables(tomllib.loads(answer.origin.get("resolved", "")))
         for name, answer in answers.items()
     }
     rows = []
@@ -214,7 +201,7 @@ def list_scene_differences(answers: Answers) -> list[Table]:
     return [table] if rows else []
 
 
-def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
+def _flatten_tables(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
     """Return nested tables of a scene as dotted keys.
 
     Tables of a list are named by their name or number.
@@ -227,11 +214,11 @@ def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
         return {prefix: table}
     flat = {}
     for name, entry in pairs:
-        flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
+        flat |= _flatten_tables(entry, f"{prefix}.{name}" if prefix else str(name))
     return flat
 
 
-def _encode(content: bytes) -> str:
+def _encode_base64(content: bytes) -> str:
     """Return bytes in base64."""
     return base64.b64encode(content).decode()
 
@@ -239,11 +226,13 @@ def _encode(content: bytes) -> str:
 @cache
 def read_library() -> str:
     """Return the compressed bundle of plotly.js in base64."""
-    return _encode((files(__package__) / "plotly" / "plotly-cartesian.min.js.gz").read_bytes())
+    return _encode_base64(
+        (files(__package__) / "plotly" / "plotly-cartesian.min.js.gz").read_bytes()
+    )
 
 
 @cache
-def _template():
+def _read_template():
     """Return the template of all pages."""
     from jinja2 import Environment
 

@@ -14,7 +14,7 @@ from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
 from ..runs.pieces import compute_pieces
-from .charts.axes import save
+from .charts.axes import save_figure
 from .fields.blocks import make_blocks
 from .fields.film import contact_window, last_frames
 from .fields.vtkhdf import Frames
@@ -241,7 +241,7 @@ def write_picture(frames: Frames, number: int, title: str, magnify: float | None
     """
     with write_atomically(out) as partial:
         figure, _ = draw_pieces(frames, np.array([number]), title, magnify)
-        save(figure, partial, out.suffix[1:].lower(), 1.5 * PIXELS_PER_INCH)
+        save_figure(figure, partial, out.suffix[1:].lower(), 1.5 * PIXELS_PER_INCH)
     last = len(frames.times) - 1
     return f"{out}: {title}, frame {number} of 0 to {last}, {frames.times[number]:.6g} s"
 

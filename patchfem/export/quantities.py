@@ -165,9 +165,9 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     if "." in name:
         return Definition("1", FIT_KEY_TEXT)
     if kind in SURFACE_ANSWER_KINDS:
-        return surface_definitions.find(name) or surface_definitions.find(
-            rows.remove_interface_number(name)
-        )
+        return surface_definitions.find_surface_definition(
+            name
+        ) or surface_definitions.find_surface_definition(rows.remove_interface_number(name))
     # quantities of a sweep: limits of its key, and extremes of measures
     measure = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(measure)
@@ -176,7 +176,7 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     return found and Definition(found.unit, found.text)
 
 
-def describe(name: str, kind: str = "") -> str:
+def describe_quantity(name: str, kind: str = "") -> str:
     """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
     definition = find_definition(name, kind)
     if definition is None:
@@ -241,7 +241,7 @@ def _find_digits(name: str) -> int | None:
     base_name = rows.remove_interface_number(name)
     if base_name in rows.TABLE or base_name in patch_rows.TABLE:
         return None
-    return SURFACE_QUANTITY_DIGITS if surface_definitions.find(name) else None
+    return SURFACE_QUANTITY_DIGITS if surface_definitions.find_surface_definition(name) else None
 
 
 def format_value(value: float | str, unit: str, digits: int = 4, name: str = "") -> str:
@@ -299,7 +299,7 @@ def is_zero(name: str, quantity: Quantity) -> bool:
     return format_quantity(name, quantity).partition(" ")[0] == "0"
 
 
-def choose_key(quantities: Quantities) -> Quantities:
+def choose_key_quantities(quantities: Quantities) -> Quantities:
     """Return the quantities that a page shows in tiles, at most MAX_KEY_QUANTITIES; none that is missing or 0."""
     names = [name for name in KEY_QUANTITY_NAMES if name in quantities]
     # the quantities of a verb without key names are shown in their own order

@@ -22,7 +22,7 @@ from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Quantities, Quantity, Variable, Variables, encode, make_columns
+from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
 
 # Largest difference of the drive frequencies of a run and of a measured row that belongs to it
 MAX_FREQUENCY_DIFFERENCE_HZ = 0.5
@@ -436,7 +436,7 @@ def _collect_regimes(result: Result) -> Variables:
     curve = None if result.motion.steady is None else result.motion.steady.curve
     if curve is None:
         return {}
-    regimes = encode("curve_point", curve["regime"], "regime of the steady motion")
+    regimes = encode_texts("curve_point", curve["regime"], "regime of the steady motion")
     folds = np.asarray(curve.get("folds", ()), float)
     unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
     columns = {"curve_fold": (folds, unit, "where the curve turns back")} if folds.size else {}

@@ -91,7 +91,7 @@ def run_into(
 def draw_page(folder: Path) -> BaseException | None:
     """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
     try:
-        page.write_page(folder)
+        page.write_report(folder)
     except BaseException as fault:
         return fault
     return None
@@ -158,7 +158,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     answer = make_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})
-    store.write(answer, folder)
+    store.write_answer(answer, folder)
     return answer
 
 

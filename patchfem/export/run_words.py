@@ -110,8 +110,8 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
     for name, text in HEADLINE_PARTS[kind]:
         if name == "loop_area":
             parts += _describe_interfaces(result, measures, text)
-        elif _is_shown(measures, name):
-            part = text.format(_format(name, measures))
+        elif _is_nonzero(measures, name):
+            part = text.format(_format_measure(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
             parts.append(part)
@@ -133,7 +133,7 @@ def _choose_headline(result: Result, measures: Quantities) -> str:
     return result.plan.kind if result.plan.kind in ("patch", "bench") else "rig"
 
 
-def _is_shown(measures: Quantities, name: str) -> bool:
+def _is_nonzero(measures: Quantities, name: str) -> bool:
     """Return whether a measure has a value that is not displayed as 0."""
     measure = measures.get(name)
     return (
@@ -149,7 +149,7 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     names = [
         name
         for name in measures
-        if remove_interface_number(name) == "loop_area" and _is_shown(measures, name)
+        if remove_interface_number(name) == "loop_area" and _is_nonzero(measures, name)
     ]
     if not names:
         return []
@@ -159,7 +159,7 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-    return [text.format(_format(names[0], measures)) + where]
+    return [text.format(_format_measure(names[0], measures)) + where]
 
 
 def describe_outcome(result: Result, measures: Quantities, details: JsonObject) -> str:
@@ -360,7 +360,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     visible = {
         name: ratio
         for name, ratio in ratios.items()
-        if name not in RUN_CHECK_MEASURES and "±" in _format(name, measures)
+        if name not in RUN_CHECK_MEASURES and "±" in _format_measure(name, measures)
     }
     if not visible:
         return f"All errors are within the tolerance {tolerance:g}."
@@ -368,11 +368,11 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     largest = format_number(100 * visible[name], 2)
     return (
         f"All errors are within the tolerance {tolerance:g}; the largest is {largest} % of what it allows "
-        f"({name}: {_format(name, measures)})."
+        f"({name}: {_format_measure(name, measures)})."
     )
 
 
-def _format(name: str, measures: Quantities) -> str:
+def _format_measure(name: str, measures: Quantities) -> str:
     """Return a measure as text with its error."""
     return quantities.format_quantity(name, measures[name])
 

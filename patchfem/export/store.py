@@ -1,4 +1,4 @@
-"""Files of an answer: `write` puts them into a folder, `read` returns the answer from them.
+"""Files of an answer: `write_answer` puts them into a folder, `read_answer` returns the answer from them.
 
 A folder contains summary.json (verdict, quantities, remarks, origin), the JSON file of the verb with the keys that scripts
 read, the arrays as netCDF, a CSV file for each curve, and report.html, which is made from the other files.
@@ -49,12 +49,12 @@ class Summary(BaseModel):
     origin: dict[str, Any]
 
 
-def data_file(kind: str) -> str:
+def name_data_file(kind: str) -> str:
     """Return the name of the netCDF file of a kind of answer."""
     return DATA_FILES.get(kind, "result.nc")
 
 
-def write(answer: Answer, folder: Path) -> None:
+def write_answer(answer: Answer, folder: Path) -> None:
     """Write all files of an answer except its page into an existing folder.
 
     OSError or WriteError is raised if this fails.
@@ -65,7 +65,7 @@ def write(answer: Answer, folder: Path) -> None:
         data = {
             name: variable for name, variable in answer.data.items() if name != CPU_TIMES_VARIABLE
         }
-        write_netcdf(replace(answer, data=data), folder / data_file(answer.kind))
+        write_netcdf(replace(answer, data=data), folder / name_data_file(answer.kind))
     for name, text in format_curves(answer).items():
         write_text(folder / name, text)
     if not answer.is_run:
@@ -105,7 +105,7 @@ def make_summary(answer: Answer) -> JsonObject:
     return summary | details | {"origin": origin}
 
 
-def read(folder: Path) -> Answer:
+def read_answer(folder: Path) -> Answer:
     """Read an answer from the files in a folder.
 
     PatchfemError is raised if it has no complete result or a damaged file.
@@ -120,7 +120,7 @@ def read(folder: Path) -> Answer:
             details = json.loads((folder / DETAIL_FILES[summary.kind]).read_text("utf-8"))
         if (folder / SCENE_FILE).is_file():
             origin = origin | {"resolved": (folder / SCENE_FILE).read_text("utf-8")}
-        path = folder / data_file(summary.kind)
+        path = folder / name_data_file(summary.kind)
         data = read_netcdf(path)[0] if path.is_file() else {}
         if CPU_TIMES_VARIABLE in details:
             times = np.array(details[CPU_TIMES_VARIABLE], float)

@@ -29,7 +29,7 @@ def _collect_definitions() -> dict[str, Definition]:
 SURFACE_QUANTITIES = _collect_definitions()
 
 
-def find(name: str) -> Definition | None:
+def find_surface_definition(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none.
 
     Quantities of a track have the names of those of a whole comparison behind "track_".

@@ -31,8 +31,8 @@ PUBLIC = {
     "grid": (
         "ROW_HEIGHT_GROWTH",
         "TensorGrid",
-        "graded_grid",
-        "row_scale",
+        "make_graded_grid",
+        "compute_row_scale",
     ),
     "pieces": ("PieceMesh",),
 }

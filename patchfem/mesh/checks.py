@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ..core import PatchfemError
 from .elements import ELEMENTS
 from .grading import EQUAL_LENGTH_TOL
-from .pieces import CellEdges, PieceMesh, find_edges, freeze_piece, signed_areas
+from .pieces import CellEdges, PieceMesh, compute_signed_areas, find_edges, freeze_piece
 
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
@@ -240,7 +240,7 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
     turned clockwise.
     """
     n = ELEMENTS[kind].n_corners
-    is_clockwise = signed_areas(points[cells[:, :n]]) < 0
+    is_clockwise = compute_signed_areas(points[cells[:, :n]]) < 0
     # In the reversed order the middle of the edge from one corner to the next changes its place, too.
     order = np.arange(cells.shape[1])
     order[:n] = order[:n][::-1]

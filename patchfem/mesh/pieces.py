@@ -131,7 +131,7 @@ class PieceMesh:
         """Return the areas of the cells (t,) [m2] between straight edges."""
         parts = []
         for kind, cells in self.blocks.items():
-            parts.append(signed_areas(self.points[cells[:, : ELEMENTS[kind].n_corners]]))
+            parts.append(compute_signed_areas(self.points[cells[:, : ELEMENTS[kind].n_corners]]))
         return np.concatenate(parts)
 
     def tributary_lengths(self) -> np.ndarray:
@@ -259,7 +259,7 @@ def raise_order(
     return points, out, _tag_inner_points(tagged, len(points))
 
 
-def signed_areas(corners) -> np.ndarray:
+def compute_signed_areas(corners) -> np.ndarray:
     """Return the areas (t,) of cells with corners (t, n, 2), positive if these are counterclockwise."""
     # Coordinates relative to a corner of the cell lose no digits if the origin is far away.
     a = corners - corners[:, :1]

@@ -19,7 +19,7 @@ from ..edges import ContactEdge, parabola_change, place_edges
 MIN_KEPT_COMPLIANCE_RATIO = 1e-9
 # Relative residual of the equations on the active points at which their solution has converged
 ACTIVE_POINTS_RESIDUAL_TOL = 1e-10
-# Offset of a contact edge (see `edges.edge_offset`) relative to the cell length, measured to 0.001
+# Offset of a contact edge (see `edges.compute_edge_offset`) relative to the cell length, measured to 0.001
 # for Hertz contact on 24 rows of points
 POINT_EDGE_OFFSET_FRACTION = 0.189
 # Largest number of points that are counted to find the longest contact; longer contacts count as

@@ -39,10 +39,10 @@ METADATA_WITHOUT_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 PANEL_SIZE_INCHES = (6.4, 4.2)  # width and height
 
 
-def draw(panel: Panel, axes):
+def draw_panel(panel: Panel, axes):
     """Draw a panel on matplotlib Axes and return them; of a menu, the first choice."""
     if panel.choices:
-        return draw(panel.choices[0], axes)
+        return draw_panel(panel.choices[0], axes)
     if panel.style in ("map", "film"):
         _draw_map(panel, axes)
     else:
@@ -116,7 +116,7 @@ def make_figure(panels: list[Panel]):
         figure = Figure(figsize=(PANEL_SIZE_INCHES[0] * columns, PANEL_SIZE_INCHES[1] * rows))
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, axes in zip(panels, grid, strict=False):
-            draw(panel, axes)
+            draw_panel(panel, axes)
     for axes in grid[len(panels) :]:
         axes.remove()
     for element in (figure, *figure.axes):
@@ -124,7 +124,7 @@ def make_figure(panels: list[Panel]):
     return figure
 
 
-def save(figure, target, ending: str, dpi: float = 150.0) -> None:
+def save_figure(figure, target, ending: str, dpi: float = 150.0) -> None:
     """Write a figure of matplotlib such that equal figures give equal files.
 
     Parameters
@@ -147,7 +147,7 @@ def save(figure, target, ending: str, dpi: float = 150.0) -> None:
 def _to_svg(figure) -> str:
     """Return a figure as SVG, the form in which a notebook shows it."""
     text = io.StringIO()
-    save(figure, text, "svg")
+    save_figure(figure, text, "svg")
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
@@ -174,7 +174,7 @@ def write_plot(answer: Answer, path: Path) -> None:
         raise PatchfemError(f"{path}: this answer has no chart")
     with write_atomically(path) as partial:
         figure = make_figure(panels[: N_PICTURE_CHARTS.get(answer.kind, 1)])
-        save(figure, partial, ending)
+        save_figure(figure, partial, ending)
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
@@ -214,7 +214,7 @@ def draw_panels(panels: list[Panel], axes, caller: str):
         Function that the message about wrong `axes` names.
     """
     check_axes(axes, caller)
-    return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
+    return draw_panel(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 
 
 def check_axes(axes, caller: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...formatting import format_number, needs_log_scale
 from ..answer import Answers, Variable, Variables
-from .panel import Axis, Curve, Panel, join_names, make_axis, thin
+from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
@@ -61,7 +61,7 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
         return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
         chart = replace(chart, by="")
-    selected = {name: _select(answer.data, chart) for name, answer in answers.items()}
+    selected = {name: _select_span(answer.data, chart) for name, answer in answers.items()}
     selected = {name: data for name, data in selected.items() if data}
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
@@ -123,7 +123,7 @@ def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
     return axes[0], axes[1]
 
 
-def _select(data: Variables, chart: Chart) -> Variables:
+def _select_span(data: Variables, chart: Chart) -> Variables:
     """Return the variables restricted to the span of a chart; {} if the chart has nothing to show."""
     x_name = _find_x(data, chart)
     names = [name for name, _ in _split_names(chart.y)]
@@ -134,12 +134,12 @@ def _select(data: Variables, chart: Chart) -> Variables:
         return {}  # a curve over another variable
     if chart.style == "map" and "frame_time" in data:
         # frame 0 is the pressed state; the slip rate of frame 1 would need an earlier frame of the motion
-        data = _take(data, "frame", np.arange(2, data["frame_time"].values.size))
+        data = _take_indices(data, "frame", np.arange(2, data["frame_time"].values.size))
     keep = _find_span(data, chart.span, x_name)
     if keep is None:
         return data
     dimension = "time" if chart.span == "cycles" else x_name
-    return _take(data, dimension, keep) if keep.size else {}
+    return _take_indices(data, dimension, keep) if keep.size else {}
 
 
 def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
@@ -165,7 +165,7 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
     return None
 
 
-def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
+def _take_indices(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
     """Return the variables at some indices along a dimension.
 
     Variables without this dimension are unchanged.
@@ -208,7 +208,7 @@ def _make_curves(
     for number, (label, row) in enumerate(zip(labels, np.atleast_2d(values), strict=True)):
         x = x_values[number] if x_values.ndim == 2 else x_values
         # every case has points of its own
-        keep = np.flatnonzero(np.isfinite(row)) if first == "case" else thin(row)
+        keep = np.flatnonzero(np.isfinite(row)) if first == "case" else select_curve_points(row)
         parts = (row, *(np.atleast_2d(band)[number] for band in bands))
         curves.append(Curve(label, x[keep], *(one[keep] * axes[1].scale for one in parts)))
         if chart.by in data and not first and name == chart.y.split()[0]:

@@ -28,7 +28,7 @@ MENU_POSITION = {
 }
 
 
-def draw(panel: Panel) -> Figure:
+def make_plotly_figure(panel: Panel) -> Figure:
     """Return the figure of a panel: `data`, `layout`, and `frames` of a film."""
     figure = {"data": _make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
@@ -194,7 +194,7 @@ def _add_slider(figure: Figure, names: list[str]) -> None:
     figure["layout"] |= {"sliders": [slider], "updatemenus": [menu]}
 
 
-def pack(values: np.ndarray) -> Figure | list[str]:
+def pack_array(values: np.ndarray) -> Figure | list[str]:
     """Return an array in the binary form that plotly.js reads; strings and short arrays as a list."""
     values = np.asarray(values)
     if values.dtype.kind in "UO":

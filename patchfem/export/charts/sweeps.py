@@ -14,7 +14,7 @@ from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
 from ..answer import Answer, Answers, Variables
 from ..quantities import format_value
-from .panel import Axis, Curve, Panel, join_names, make_axis, thin
+from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
@@ -139,7 +139,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
                 continue
             values = view.split_lines(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
-                keep = thin(values, MAX_DRAWN_CASES // 2)
+                keep = select_curve_points(values, MAX_DRAWN_CASES // 2)
                 label = join_names(title, name.replace("_", " "))
                 curves.append(Curve(label, x[keep], values[keep] / values[0]))
     if not curves:
@@ -202,7 +202,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         labels = view.name_lines()
         lines = spread_indices(len(values), MAX_CHART_LINES)
         for line in lines:
-            keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
+            keep = select_curve_points(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, low, high, marks = (array[line][keep] for array in arrays)
             curve = Curve(join_names(title, labels[line]), x[keep], y)
             if not np.isnan(high).all():

@@ -81,7 +81,7 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
     return {
         "lower": _piece_block(pieces.lower),
         "upper": _piece_block(pieces.upper),
-        "interface": Block(_pad(x[:, None], 3), segments, _store(fields), {}),
+        "interface": Block(_pad_components(x[:, None], 3), segments, _convert_fields(fields), {}),
     }
 
 
@@ -95,16 +95,21 @@ def _piece_block(piece: PieceFields) -> Block:
         "material": piece.is_coating[None],
     }
     point_data = {"displacement": piece.displacement}
-    return Block(_pad(piece.points, 3), cells, _store(point_data), _store(cell_data))
+    return Block(
+        _pad_components(piece.points, 3),
+        cells,
+        _convert_fields(point_data),
+        _convert_fields(cell_data),
+    )
 
 
-def _pad(values: np.ndarray, count: int) -> np.ndarray:
+def _pad_components(values: np.ndarray, count: int) -> np.ndarray:
     """Return values (..., k) with zeros for the other components (..., count)."""
     missing = (0, count - values.shape[-1])
     return np.pad(values, [*[(0, 0)] * (values.ndim - 1), missing])
 
 
-def _store(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _convert_fields(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return fields as they are stored: codes, or numbers in single precision.
 
     The pressure and the areas of the points stay as they are, so that their sum is the load.
@@ -113,7 +118,7 @@ def _store(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     for name, values in data.items():
         field = VTK_FIELDS[name]
         if field.shape:
-            values = _pad(values, *field.shape)
+            values = _pad_components(values, *field.shape)
         if name not in ("normal_stress", "weight"):
             values = values.astype(np.int8 if field.codes else np.float32)
         out[name] = values

@@ -36,7 +36,7 @@ def export_histories(folder: Path, out: Path) -> str:
     """
     if not folder.is_dir():
         raise Missing(f"{folder}: no such results folder")
-    answer = store.read(folder)
+    answer = store.read_answer(folder)
     columns = list_columns(answer)
     # a fitted loop may have no time
     histories = [column for column in columns if column.name != "time"]

@@ -79,14 +79,14 @@ def make_answer(rows: list[JsonObject], name: str) -> Answer:
     return Answer(
         kind="pairs",
         title=name,
-        verdict=(_count(rows),),
+        verdict=(_count_pairs(rows),),
         data=_make_data(rows),
         details={"patchfem": __version__, "pairs": rows},
         origin={"patchfem": __version__},
     )
 
 
-def _count(rows: list[JsonObject]) -> str:
+def _count_pairs(rows: list[JsonObject]) -> str:
     """Return the headline: numbers of pairs, of pairs with wear and of failed pairs."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     depths = [row.get("worn_depth_mean", {}) for row in rows]

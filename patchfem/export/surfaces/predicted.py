@@ -15,7 +15,7 @@ from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
 from . import sentences
 from .patches import read_patch, worn_depths
-from .variables import band, make_variables
+from .variables import make_band, make_variables
 
 # Smallest relative difference of the proportional coefficient that is reported.
 MIN_COEFFICIENT_DIFFERENCE = 0.01
@@ -49,7 +49,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     fitted = predicted.fit_wear(_measure_depth(comparison), read_history(folder, piece))
     numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
     values = sentences.to_answers(numbers)
-    sentence = describe(fitted)
+    sentence = describe_fit(fitted)
     notes = describe_reliability(fitted)
     warnings = warn_of_other_shape(fitted)
 
@@ -81,7 +81,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         computed_depth=depths.computed,
         depth_difference=depths.measured - depths.computed,
     )
-    data |= band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
+    data |= make_band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),
@@ -174,7 +174,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     )
 
 
-def describe(fitted: PredictedWear) -> str:
+def describe_fit(fitted: PredictedWear) -> str:
     """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
     return (

@@ -17,7 +17,7 @@ from ...surface.spectrum import BAND
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..quantities import format_value
 from . import sentences
-from .variables import make_variables, maps
+from .variables import make_maps, make_variables
 
 ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
 # Probability of the interval of a parameter of a single trace, from 5 to 95 %
@@ -86,13 +86,13 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         state = ""
         # Several surfaces of one kind give means, with a caution where these are of limited use.
         if len(members) > 1:
-            averages = _average(members)
+            averages = _average_parameters(members)
             caution = _find_caution(members)
             cautions += caution
             means.append(_means_to_dict(kind, len(members), averages, caution))
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
-        headlines.append(f"{state}{_state_main(values, members)}.")
+        headlines.append(f"{state}{_format_main_parameters(values, members)}.")
         quantities |= sentences.to_answers(values)
 
     notes = [text for report in reports for text in report.notes]
@@ -112,7 +112,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     )
 
 
-def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
+def _average_parameters(members: list[RoughnessReport]) -> dict[str, Mean]:
     """Return the means of the parameters that all files have, with 95 % intervals from the scatter of the files.
 
     Student's t of the logarithm keeps the interval of a positive parameter above 0. An interval that is wider than
@@ -167,7 +167,7 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     return content | {"measures": measures}
 
 
-def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
+def _format_main_parameters(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
     """Return the main parameters as text; a mean without an interval has the range of the files."""
     parts = []
     names = next(names for names in HEADLINE_PARAMETERS if names[0] in values)
@@ -254,7 +254,7 @@ def _make_data(reports: list[RoughnessReport]) -> Variables:
 
     surface = reports[0].surface
     if reports[0].kind == "areal":
-        return data | maps(surface.x, surface.y, height_map=surface.z)
+        return data | make_maps(surface.x, surface.y, height_map=surface.z)
     data |= make_variables("x", x=surface.primary.x, primary=surface.primary.z)
     if surface.roughness is not None:
         rough = surface.roughness

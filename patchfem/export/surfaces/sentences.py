@@ -157,7 +157,7 @@ def describe_region(comparison: Comparison) -> str:
     return "the common area" if comparison.is_areal else "the common length"
 
 
-def describe(comparison: Comparison) -> Words:
+def describe_comparison(comparison: Comparison) -> Words:
     """Return the sentences of a comparison."""
     values = comparison.values
     code, numbers = comparison.verdict

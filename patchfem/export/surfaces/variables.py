@@ -43,7 +43,7 @@ def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
     return data
 
 
-def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
+def make_band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
     """Return lengths with the ends of their band as the variables NAME, NAME_low and NAME_high.
 
     Parameters
@@ -64,7 +64,7 @@ def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Var
     return make_variables(dimension, **{name: values}, **ends)
 
 
-def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
+def make_maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
     """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
     rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
     data = make_variables("x", x=x[columns]) | make_variables("y", y=y[rows])

@@ -11,10 +11,10 @@ from ...wear.between_runs import Wear
 from .. import quantities
 from ..answer import Answer, Quantity, Variables
 from . import sentences
-from .compare import SURFACE_NAMES, build
+from .compare import SURFACE_NAMES, build_answer
 from .patches import PatchRun, read_patch
 from .sentences import format_value
-from .variables import make_variables, maps
+from .variables import make_maps, make_variables
 
 # measures of both runs that stand beside each other; the first three are in the verdict
 BEFORE_AND_AFTER_MEASURES = (
@@ -75,7 +75,7 @@ def answer_runs(before: Path, after: Path) -> Answer:
 
 def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear between two runs."""
-    verdict = describe(runs, wear)
+    verdict = describe_wear(runs, wear)
     sides = {}
     warnings = []
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
@@ -96,7 +96,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     stored = sides["before"]["measures"] | sides["after"]["measures"]
     names = [name for name in BEFORE_AND_AFTER_MEASURES if name in stored]
 
-    return build(
+    return build_answer(
         sources=[run.state.source for run in runs],
         words=sentences.Words(verdict, tuple(warnings), (BOTH_PIECES_NOTE,)),
         values=wear.values,
@@ -118,7 +118,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     )
 
 
-def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
+def describe_wear(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
     """Return the verdict: worn depth, worn part, hidden wear, and the main measures before and after."""
     values = wear.values
     if not values["worn_depth_mean"].value > 0:
@@ -173,7 +173,7 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
     state = runs[1].state
     before, after = wear.gaps
     if state.y is not None:
-        data = maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
+        data = make_maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
     else:
         line = np.interp(state.x, state.x[[0, -1]], wear.hidden)
         data = make_variables("x", x=state.x, gap_before=before, gap_after=after)

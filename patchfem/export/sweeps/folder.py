@@ -24,7 +24,7 @@ from ...model.model import Model
 from ...runs.batch.case_results import CaseResults
 from .. import store as answers
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks
-from ..folder import WRITER_LOCK_FILE, refuse_others, remove, remove_partial_files
+from ..folder import WRITER_LOCK_FILE, refuse_others, remove_partial_files, remove_path
 from .store import CHUNKS_FOLDER, Chunks, case_folder_name, write_chunk
 
 CASES_FOLDER = "cases"  # name of the folder with the results of single cases
@@ -285,6 +285,6 @@ class Folder:
             for path in (self.target / folder).glob("*"):
                 is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
                 if path not in stored and (is_incomplete or removes_others):
-                    remove(path)
+                    remove_path(path)
         with suppress(OSError):  # the folder does not exist, or still contains cases
             (self.target / CASES_FOLDER).rmdir()

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...runs.batch.case_results import CaseResults, join_case_results
-from ..answer import Variable, encode
+from ..answer import Variable, encode_texts
 from ..netcdf import read_netcdf, write_arrays
 
 CHUNKS_FOLDER = "chunks"
@@ -37,7 +37,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
     """
     data = {
         "name": Variable(("case",), np.asarray(names, np.uint64), ""),
-        "outcome": encode("case", results.outcome),
+        "outcome": encode_texts("case", results.outcome),
     }
     for part, kind in CHUNK_NUMBER_TYPES.items() if results.units else ():
         columns = [getattr(results, part)[measure] for measure in results.units]

@@ -34,8 +34,8 @@ def written(request, tmp_path_factory):
     """Return the answer of a comparison and the folder with its files and page."""
     answer = compare.make_answer(compare_pair(request.param == "scans"))
     folder = tmp_path_factory.mktemp(request.param)
-    store.write(answer, folder)
-    page.write_page(folder)
+    store.write_answer(answer, folder)
+    page.write_report(folder)
     return answer, folder
 
 
@@ -154,7 +154,7 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
     """The page is made again byte for byte; its verdict and its tiles are the texts of the numbers in summary.json."""
     _, folder = written
     text = read_page(folder)
-    page.write_page(folder)
+    page.write_report(folder)
     assert read_page(folder) == text
     summary = read_json(folder / "summary.json")
     for sentence in summary["verdict"]:
@@ -164,4 +164,4 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
     for label, shown in tiles.items():
         name = label.replace(" ", "_")
         assert quantities.format_quantity(name, parse(summary["measures"][name])) == shown
-        assert f'<div title="{quantities.describe(name, "compare")}">' in text
+        assert f'<div title="{quantities.describe_quantity(name, "compare")}">' in text
