@@ -70,11 +70,11 @@ class Outcome(StrEnum):
     @property
     def sentence(self) -> str:
         """Description of the outcome for the user, with advice where it exists."""
-        return _SENTENCES[self]
+        return _OUTCOME_SENTENCES[self]
 
 
 # Sentence about each outcome of a run
-_SENTENCES = {
+_OUTCOME_SENTENCES = {
     Outcome.DONE: "The run finished as requested.",
     Outcome.STEADY: "The motion is steady: it repeats within the tolerance.",
     Outcome.STUCK: "During the last cycles of the run the whole interface sticks all the time.",

@@ -497,7 +497,7 @@ def _contact_edge_position_error(pair, cell):
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
             cells = min(1.0, cell / grid.coating_thickness)
-            out = max(out, edges.edge_offset(cells, cells, 0.0) * contrast)
+            out = max(out, edges.compute_edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 

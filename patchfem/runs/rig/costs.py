@@ -169,8 +169,8 @@ def estimate_hybrid_seconds(model: Model) -> float:
     n_interfaces = len(model.rig.modes.interfaces) if model.rig.friction.interfaces else 0
     each = (
         cost_model.HYBRID_STEP_SECONDS
-        + cost_model.HYBRID_MODES_SECONDS * n_modes**2
-        + cost_model.HYBRID_INTERFACES_SECONDS * n_interfaces**2
+        + cost_model.HYBRID_MODE_PAIR_SECONDS * n_modes**2
+        + cost_model.HYBRID_INTERFACE_PAIR_SECONDS * n_interfaces**2
     )
     return HYBRID_RUNS * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
 
@@ -179,11 +179,11 @@ def estimate_march_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
     count = estimate_elements(model).count
     n_interfaces = len(model.rig.friction.interfaces)
-    step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
+    step = cost_model.MARCH_STEP_SECONDS + cost_model.MARCH_ELEMENT_STEP_SECONDS * count
     return (
         1.75
         * model.rig.drive.cycles
-        * (cost_model.CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
+        * (cost_model.MARCH_CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
     )
 
 
