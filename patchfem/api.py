@@ -448,7 +448,7 @@ def cost(
     ('200', True)
     """
     model = build(scene, **sets)
-    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
+    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)

@@ -18,7 +18,7 @@ PUBLIC = {
     "cost": (
         "Cost",
         "Judgement",
-        "TOLERANCE",
+        "TOLERANCE_SETTING",
         "describe_best_setting",
         "compute_setting_costs",
     ),

@@ -14,7 +14,7 @@ from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     OutputGroup,
     Progress,
@@ -163,7 +163,7 @@ def sweep(
         if counts["failed"] == counts["count"]:
             raise UsageError("sweep: no case could be run")
         if counts["failed"] or "not_converged" in counts["outcomes"]:
-            raise CommandExit(NOT_CONVERGED)
+            raise CommandExit(NOT_CONVERGED_EXIT_CODE)
     elif output.json_:
         print(json.dumps({"cases": len(cases), "folder": str(target)}))
     elif not output.quiet:

@@ -22,14 +22,15 @@ CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a 
 # Standard deviation of heights [m] below which they are round-off of a straight line.
 MIN_HEIGHT_DEVIATION = 1e-10
 # Largest standard deviation of the heights of a straight profile, relative to their range.
-STRAIGHT_TOL = 1e-5
+MAX_STRAIGHT_PROFILE_DEVIATION = 1e-5
 # Ratio (removed slope x length of the trace) / (range of the heights) above
 # which a note reports the slope.
 MAX_UNREPORTED_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # smallest number of samples per cut-off with which a trace is filtered
 # Largest difference of equal node spacings, as a fraction of the interface length.
-SPACING_TOL = 1e-9
-CELL_TOL = 1e-2  # largest relative difference of the node spacing from the averaging length
+NODE_SPACING_TOL = 1e-9
+# Largest relative difference of the node spacing from the averaging length
+AVERAGING_LENGTH_TOL = 1e-2
 
 
 class _LevelledProfile(NamedTuple):
@@ -205,7 +206,9 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
             "tilt, give [contact.tilt]",
         )
-    is_straight = np.std(trace.z) <= max(MIN_HEIGHT_DEVIATION, STRAIGHT_TOL * np.ptp(raw.z))
+    is_straight = np.std(trace.z) <= max(
+        MIN_HEIGHT_DEVIATION, MAX_STRAIGHT_PROFILE_DEVIATION * np.ptp(raw.z)
+    )
 
     # Beyond its ends the trace is continued at constant height.
     n_before = int(trace.x[0] > x[0])
@@ -218,8 +221,8 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
 
 def _is_evenly_spaced(x, size: float) -> bool:
     """Return whether the nodes x (m,) [m] are evenly spaced by a size [m]."""
-    is_uniform = np.ptp(np.diff(x)) <= SPACING_TOL * np.ptp(x)
-    return is_uniform and abs(x[1] - x[0] - size) <= CELL_TOL * size
+    is_uniform = np.ptp(np.diff(x)) <= NODE_SPACING_TOL * np.ptp(x)
+    return is_uniform and abs(x[1] - x[0] - size) <= AVERAGING_LENGTH_TOL * size
 
 
 def _fit_spline(trace: Profile):

@@ -37,19 +37,19 @@ if TYPE_CHECKING:
     from .patch import PatchModel
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
-MAX_TRAVEL = 1e3
+MAX_COMPUTED_DISPLACEMENT = 1e3
 # Smallest number of drive cycles in a run whose length is given as a duration.
 MIN_RUN_CYCLES = 0.25
 # Slide of the first mode per modal coordinate, relative to the largest one of all
 # modes, below which it is round-off.
-MIN_SLIDE_FRACTION = 1e-9
+MIN_MODE_SLIDE_FRACTION = 1e-9
 # Fraction of the squared motion of the output below which a mode moves the output by round-off only.
-MIN_MODE_FRACTION = 1e-12
+MIN_MODE_OUTPUT_FRACTION = 1e-12
 
 # Tables of the joint that was bolted when the modes were measured.
 JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 # The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
-JOINT_SCENES = {
+SCENES_OF_SUBTRACTED_JOINT = {
     None: "the scene as written",
     "written": "the scene as written",
     "case": "each case",
@@ -120,7 +120,7 @@ class RigSprings:
     - bonded: stiffness [N/m] of the bonded spring.
     - interlock: stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
     - cubic: stiffening at the output [N/m3].
-    - travel: largest displacement [m]: the stop of the scene, `MAX_TRAVEL` if a mode gains energy
+    - travel: largest displacement [m]: the stop of the scene, `MAX_COMPUTED_DISPLACEMENT` if a mode gains energy
       or a spring softens, else infinite.
     """
 
@@ -403,7 +403,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     """Build the springs of a rig beside its modes from the table [structure].
 
     They are the bonded spring and the cubic spring of the output. The travel [m] limits the motion: it is that of the
-    scene, or MAX_TRAVEL if the motion of the `modes` can grow without limit, else inf.
+    scene, or MAX_COMPUTED_DISPLACEMENT if the motion of the `modes` can grow without limit, else inf.
     """
     bonded = structure.bonded
     interlock = None
@@ -413,7 +413,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     travel = structure.travel
     if not travel:
         can_grow = find_decay_rate(modes) < 0 or (cubic or 0.0) < 0
-        travel = MAX_TRAVEL if can_grow else np.inf
+        travel = MAX_COMPUTED_DISPLACEMENT if can_grow else np.inf
     stiffness = bonded.stiffness if bonded is not None else None
     return RigSprings(stiffness, interlock, cubic, travel)
 
@@ -434,10 +434,10 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
     if mass is None or not (structure.mode or structure.file):
         squared = np.square(own_modes.output)
         total = max(float(squared.sum()), 1e-300)
-        moves_output = squared[first] > MIN_MODE_FRACTION * total
+        moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
         mass = float(own_modes.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
-    if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
+    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
         contact_mass = float(own_modes.mass / slide[first] ** 2)
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.
@@ -459,7 +459,7 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
     bolted = None
     if structure.measured == "stuck":
         bolted_scene = find_bolted_scene(scene)
-        bolted = BoltedJoint(JOINT_SCENES[structure.measured_joint])
+        bolted = BoltedJoint(SCENES_OF_SUBTRACTED_JOINT[structure.measured_joint])
         if joint is not None:
             bolted = bolted._replace(stiffness=(joint,))
         elif has_pressed_joint(bolted_scene):

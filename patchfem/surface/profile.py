@@ -7,9 +7,8 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 
-MEDIAN_WINDOW = (
-    7  # number of samples in the running median; groups of up to three samples can be spikes
-)
+# Number of samples in the running median; groups of up to three samples can be spikes
+MEDIAN_WINDOW = 7
 SPECK_WINDOWS = (15, 31)  # numbers of samples in the running medians that find wider specks of dust
 # Smallest height of a spike in robust standard deviations; heights of rough surfaces stay within 6.
 SPIKE_DEVIATIONS = 8.0
@@ -18,12 +17,10 @@ SPIKE_DEVIATIONS = 8.0
 FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
-MEDIANS_PER_CHUNK = (
-    131_072  # number of medians that are computed at a time, which limits the memory
-)
-MAX_TRACE_SAMPLES = (
-    2_097_152  # largest number of samples in a resampled trace, which limits the memory
-)
+# Number of medians that are computed at a time, which limits the memory
+MEDIANS_PER_CHUNK = 131_072
+# Largest number of samples in a resampled trace, which limits the memory
+MAX_TRACE_SAMPLES = 2_097_152
 EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 

@@ -16,9 +16,8 @@ ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a s
 # above which a warning is given.
 MAX_LOST = 0.1
 NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction, below which the elements represent a trace
-ELEMENTS_PER_CURVE = (
-    4  # number of elements on a wave that a smooth curve through the nodes represents
-)
+# Number of elements on a wave that a smooth curve through the nodes represents
+ELEMENTS_PER_CURVE = 4
 
 
 class WaveSpectrum(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_quantity
 from ...model.model import Model
-from ...model.rig import JOINT_SCENES, JOINT_TABLES
+from ...model.rig import JOINT_TABLES, SCENES_OF_SUBTRACTED_JOINT
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
 from ...scene.backbone_scene import BackboneTables, parse_modes
@@ -160,7 +160,7 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
         One for each value. If all have the same frequency with a sticking joint, the key does not change this joint.
     """
     bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
         return []
     stuck = [backbone.frequencies.stuck for backbone in backbones]
     if axis.key.startswith("structure.") or None in stuck or np.allclose(stuck, stuck[0], 1e-9, 0):
@@ -195,7 +195,7 @@ def _note_changed_joint(
     `compute_cases`.
     """
     bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
         return []
     sets = base.source.sets
     if not any(text.startswith(JOINT_TABLES) for text in sets):

@@ -16,9 +16,8 @@ from .statistics import estimate_correlation, find_box, split_tiles, subtract_pl
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
 # Smallest number of tiles that show the errors of the datum
 MIN_TILES = 6
-MIN_FREEDOM = (
-    3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
-)
+# Smallest number of independent tiles, as the correlation of few tiles is uncertain
+MIN_FREEDOM = 3.0
 # Smallest number of unworn heights in a tile that shows the errors of the datum
 MIN_DATUM_TILE_HEIGHTS = 5
 MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth

@@ -12,9 +12,8 @@ from ..profile import MAX_TRACE_SAMPLES, Profile, remove_spikes
 MIN_TRACE_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SCAN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
-MAX_PLACE_UNEVENNESS = (
-    0.1  # largest distance from even places, in steps, of a trace that is not resampled
-)
+# Largest distance from even places, in steps, of a trace that is not resampled
+MAX_PLACE_UNEVENNESS = 0.1
 
 
 class Raster(NamedTuple):

@@ -16,9 +16,8 @@ FALSE_POSITIVE_RATE = 1e-3
 TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
 WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
-MIN_NEIGHBOUR_FRACTION = (
-    0.2  # smallest weight of the neighbours in the mask that determines the level beside a height
-)
+# Smallest weight of the neighbours in the mask that determines the level beside a height
+MIN_NEIGHBOUR_FRACTION = 0.2
 MAX_FINISH_RATIO = 1.5  # short waves relative to the noise, below which no place can be found
 
 

@@ -9,9 +9,8 @@ from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
 from .tops import LOSS_TO_GROWTH_RATIO, find_worn_tops
 
 MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
-MIN_LOST_DEVIATIONS = (
-    4.0  # standard deviations of lost material that is reported beside as much growth
-)
+# Standard deviations of lost material that is reported beside as much growth
+MIN_LOST_DEVIATIONS = 4.0
 
 
 def find_sure_loss(depths: DepthMap) -> float:

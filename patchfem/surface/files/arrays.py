@@ -14,9 +14,8 @@ from .content import DAMAGED, Content
 from .table import Table
 from .units import HEADER_EXAMPLE
 
-MIN_MATRIX_ROWS = (
-    8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
-)
+# Smallest number of rows of a matrix in a .mat file that may be a table of columns
+MIN_MATRIX_ROWS = 8
 # Names of an array of heights in a MATLAB file, the first one that it has is read
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 

@@ -25,9 +25,8 @@ MIN_ROUNDED = 10  # smallest number of positions that show whether they are even
 # Largest distance from even positions in printed digits, half of which is rounding.
 MAX_ROUNDING = 0.75
 MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
-DIGIT_TOL = (
-    1e-4  # largest distance of a step from a multiple of the printed digit, relative to the digit
-)
+# Largest distance of a step from a multiple of the printed digit, relative to the digit
+DIGIT_TOL = 1e-4
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
 EVEN_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.

@@ -10,9 +10,8 @@ from ..quantity import read_definitions
 
 # Smallest number of samples in a trace; fewer give neither a spectrum nor a curvature.
 MIN_TRACE_SAMPLES = 16
-HEIGHT_ROUND_OFF = (
-    1e-12  # largest heights of a straight line after levelling, relative to those before
-)
+# Largest heights of a straight line after levelling, relative to those before
+HEIGHT_ROUND_OFF = 1e-12
 MIN_HEIGHT_FRACTION = 0.10  # smallest height of hills and dales that count, relative to Rz
 MIN_WIDTH_FRACTION = 0.01  # smallest width of hills and dales that count, relative to the section
 MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
