@@ -447,7 +447,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
     """
     if contact.asperities is not None:
         cutoff = find_shortest_wavelength(contact, pieces.length)
-        average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
+        average = cutoff and cutoff / profile.MIN_ELEMENTS_PER_WAVE
         return ProfileLengths(average, None)
     if contact.mesh is not None:
         return ProfileLengths(None, 0.0)
@@ -476,4 +476,4 @@ def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
     cutoff = contact.asperities.cutoff
     if cutoff is not None or contact.profile is None:
         return cutoff
-    return profile.ELEMENTS_PER_WAVE * length / N_DEFAULT_CELLS
+    return profile.MIN_ELEMENTS_PER_WAVE * length / N_DEFAULT_CELLS

@@ -11,10 +11,10 @@ from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.areal import level
 from ..surface.files.read import read_profile
-from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
+from ..surface.nodes import MEANS_OVER_WAVES_NOTE, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, resample_evenly
 from ..surface.roughness.filter import mean_line
-from ..surface.spectrum import ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
+from ..surface.spectrum import MIN_ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -72,7 +72,7 @@ def compute_profile_gap(
     cell : float
         Cell length [m] of an even mesh; it limits how much of the trace may be missing.
     is_rough : bool
-        Whether asperities represent the waves shorter than ``ELEMENTS_PER_WAVE`` average lengths.
+        Whether asperities represent the waves shorter than ``MIN_ELEMENTS_PER_WAVE`` average lengths.
         The curve is then the waviness for this cut-off.
     is_material : bool
         Whether the heights are those of a surface: a peak of either piece closes the gap.
@@ -105,7 +105,7 @@ def compute_profile_gap(
 
     # The asperities represent the waves below the cut-off, so that the waviness above it is the gap.
     if is_rough:
-        cutoff = ELEMENTS_PER_WAVE * average
+        cutoff = MIN_ELEMENTS_PER_WAVE * average
         shape = _filter_waviness(trace, cutoff)
         if not is_straight:
             notes = (*notes, *_describe_short_waves(trace, cutoff))
@@ -166,7 +166,7 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple[str, ...]:
         f"{trace.source}: waves longer than {format_length(cutoff)} give the shape of the gap; the shorter "
         f"waves ({100 * fraction:.2g} % of the rms height) are represented by [contact.asperities], whose "
         "key `cutoff` sets this limit",
-        f"{trace.source}: pressure_peak and contact_fraction are {MEANS_OVER_WAVES} shorter than "
+        f"{trace.source}: pressure_peak and contact_fraction are {MEANS_OVER_WAVES_NOTE} shorter than "
         f"{format_length(cutoff)}; the real contacts are smaller, and their pressure is higher",
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..formatting import format_length
-from ..surface.quantity import LEVEL, SIDE, Quantity
+from ..surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
 
 # Number of bins along the patch, in which the noise of single heights averages out
 N_PATCH_BINS = 100
@@ -398,11 +398,11 @@ def _make_result(
     if best.ratio <= 1:
         other = _refine(bins, replace(history, is_linear=True), best)
     half = np.sqrt(
-        (SIDE * spread[0]) ** 2
+        (HALF_WIDTH_95 * spread[0]) ** 2
         + (history.error * best.ratio) ** 2
         + (other.ratio - best.ratio) ** 2
     )
-    half_centre = np.hypot(SIDE * spread[1], other.centre - best.centre)
+    half_centre = np.hypot(HALF_WIDTH_95 * spread[1], other.centre - best.centre)
 
     # places whose sum of squares is larger by less than some variances of an independent block
     limit = best.squares * (1 + MAX_ACCEPTED_DEVIANCE / n_blocks)
@@ -475,7 +475,7 @@ def _measure_spread(
 
     gain = np.linalg.pinv(jacobian)
     scatter = residual @ residual / residual.size * n_blocks / freedom * length
-    student = float(stdtrit(freedom, (1 + LEVEL) / 2)) / SIDE
+    student = float(stdtrit(freedom, (1 + CONFIDENCE_LEVEL) / 2)) / HALF_WIDTH_95
     from_scatter = student * np.sqrt(scatter * (gain**2).sum(axis=1))
     variance = gain**2 @ bins.noise**2 + (bins.datum_error * gain.sum(axis=1)) ** 2
     return np.sqrt(from_scatter**2 + variance).tolist(), n_blocks

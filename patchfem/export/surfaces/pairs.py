@@ -7,7 +7,7 @@ from ... import __version__
 from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
-from ...surface.compare.compare import DEFAULTS, Options
+from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ..answer import Answer, JsonObject, Variables, make_columns
 from . import compare, worn
 from .variables import TEXTS
@@ -19,7 +19,7 @@ CHARTED_QUANTITIES = {
 
 
 def answer_pairs(
-    table: Path, options: Options = DEFAULTS, report_progress: Callable | None = None
+    table: Path, options: Options = COMPARE_DEFAULTS, report_progress: Callable | None = None
 ) -> Answer:
     """Compare the two files or results folders of each line of a table.
 

@@ -27,33 +27,35 @@ from .statistics import (
 )
 from .tops import find_worn_tops
 
-BORDER_SAMPLES = 3  # distance from the border of a surface from which on its spline is accurate
+# Distance from the border of a surface from which on its spline is accurate
+INACCURATE_BORDER_SAMPLES = 3
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
-N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
+N_DATUM_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
 # Side of a surface relative to the standard deviation of a Gaussian. The waves longer than it are not used to refine the
 # place.
-PLACE_WAVES = {1: 100, 2: 20}
+SIDE_OVER_PLACE_GAUSSIAN = {1: 100, 2: 20}
 # Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
 # place
-MIN_WAVE_SAMPLES = 10.0
+MIN_PLACE_GAUSSIAN_SAMPLES = 10.0
 # Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
-REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
+REFINING_GAUSSIAN_SAMPLES = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-N_DATUMS = 150  # number of datums that are improved by concentration steps
-MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
+N_IMPROVED_DATUMS = 150  # number of datums that are improved by concentration steps
+MAX_COMPARED_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
 # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
-MIN_DETERMINANT = 1e-3
+MIN_DATUM_DETERMINANT = 1e-3
 # Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one. Datums of larger
 # scale are not compared.
-MAX_DATUM_SCALE = 4.0
-MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
+MAX_DATUM_SCALE_RATIO = 4.0
+# Fraction of the heights at an end that agree, if the end is unworn
+MIN_AGREEING_END_FRACTION = 0.7
 # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
-MAX_AGREEING_DISTANCE = 5.0
+MAX_AGREEING_DISTANCE_IN_SCALES = 5.0
 # Distance of a height above a datum, relative to the smallest scale, from which on it has grown
-MIN_GROWN_DISTANCE = 10.0
+MIN_GROWN_DISTANCE_IN_SCALES = 10.0
 
 
 class Model:
@@ -116,8 +118,10 @@ class Model:
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
         self.common = np.isfinite(self.own.z) & (weights > MIN_KNOWN_WEIGHT)
-        last = self._shape(self.other.z.shape) - 1 - BORDER_SAMPLES
-        self.known = self.common & ((pixels >= BORDER_SAMPLES) & (pixels <= last)).all(axis=0)
+        last = self._shape(self.other.z.shape) - 1 - INACCURATE_BORDER_SAMPLES
+        self.known = self.common & ((pixels >= INACCURATE_BORDER_SAMPLES) & (pixels <= last)).all(
+            axis=0
+        )
 
     def _map_pixels(self, state) -> np.ndarray:
         """Return the place (d, ...) of the own points on the other surface at a state, in samples of it."""
@@ -206,7 +210,7 @@ class Model:
         """
         state = self.start.copy()
         place = slice(0, self.n_axes + 1)
-        for width in REFINE_WIDTHS:
+        for width in REFINING_GAUSSIAN_SAMPLES:
             if 2 * width > self.smoothing.max():
                 continue
             depth = self._filter(self.compute_depth(state), width)
@@ -219,8 +223,8 @@ class Model:
     @cached_property
     def smoothing(self) -> np.ndarray:
         """Deviations (d,), in samples, of the Gaussian that removes the long waves of a refined place."""
-        sizes = np.array(self.own.z.shape) / PLACE_WAVES[self.n_axes]
-        return np.maximum(sizes, MIN_WAVE_SAMPLES) if self.n_axes == 1 else sizes
+        sizes = np.array(self.own.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
+        return np.maximum(sizes, MIN_PLACE_GAUSSIAN_SAMPLES) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:
         """Return values (n,) smoothed by a Gaussian and without their long waves.
@@ -236,7 +240,7 @@ class Model:
         `state` is that of `compute_depth`.
         """
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
-        parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
+        parts = [numbers[part] for part in split_tiles(numbers.shape, N_DATUM_TILES[self.n_axes])]
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
         state = state.copy()
@@ -265,12 +269,12 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     random = np.random.default_rng(0)
 
     # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
-    # MAX_DATUMS
+    # MAX_COMPARED_DATUMS
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
-    subsets = subsets[random.permutation(len(subsets))[:MAX_DATUMS]]
-    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DETERMINANT]
+    subsets = subsets[random.permutation(len(subsets))[:MAX_COMPARED_DATUMS]]
+    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DATUM_DETERMINANT]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
     # Their scale is the distance within which a fifth of some heights lie
@@ -279,7 +283,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     few = depth[thin]
     # A quarter of the heights shows which datums are worth improving.
     scales = _scale_datums(datums, few_base[::4], few[::4])
-    datums = datums[np.argsort(scales)[:N_DATUMS]]
+    datums = datums[np.argsort(scales)[:N_IMPROVED_DATUMS]]
     # Concentration step: a least-squares fit to the fifth of the heights that are nearest to the datum
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
@@ -291,14 +295,14 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
     # Of the datums with a small scale the best one is taken: with an unworn end, few heights above it, and many on it
     scales = _scale_datums(datums, few_base, few)
-    near = np.flatnonzero(scales <= MAX_DATUM_SCALE * scales.min())
+    near = np.flatnonzero(scales <= MAX_DATUM_SCALE_RATIO * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
-    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
+    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE_IN_SCALES
     has_end = np.zeros(near.size, bool)
     for end in ends:
         at_end = agrees[:, np.isin(thin, end)]
-        has_end |= at_end.sum(axis=1) > MIN_AGREEING_FRACTION * at_end.shape[1]
-    grown = np.round((relative < -MIN_GROWN_DISTANCE).mean(axis=1), 1)
+        has_end |= at_end.sum(axis=1) > MIN_AGREEING_END_FRACTION * at_end.shape[1]
+    grown = np.round((relative < -MIN_GROWN_DISTANCE_IN_SCALES).mean(axis=1), 1)
     return datums[near[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
 
 

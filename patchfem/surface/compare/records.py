@@ -11,13 +11,13 @@ import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import SIDE, Quantity, read_definitions
+from ..quantity import HALF_WIDTH_95, Quantity, read_definitions
 
 if TYPE_CHECKING:
     from .depth_map import DepthMap
 
 # Unit and definition of each quantity of a comparison, by name
-DEFINITIONS = read_definitions("comparison")
+COMPARISON_DEFINITIONS = read_definitions("comparison")
 
 
 class Finding(NamedTuple):
@@ -112,7 +112,7 @@ def name_quantity(name: str, value: float, low: float | None, high: float | None
     known.
     """
     bounds = [None if number is None else float(number) for number in (value, low, high)]
-    return Quantity(*bounds, *DEFINITIONS[name], name=name)
+    return Quantity(*bounds, *COMPARISON_DEFINITIONS[name], name=name)
 
 
 def name_estimate(name: str, value: float, error: float, least: float = -np.inf) -> Quantity:
@@ -127,9 +127,10 @@ def name_estimate(name: str, value: float, error: float, least: float = -np.inf)
     least : float, optional
         0 for a quantity that cannot be negative.
     """
-    return name_quantity(name, value, max(value - SIDE * error, least), value + SIDE * error)
+    half_width = HALF_WIDTH_95 * error
+    return name_quantity(name, value, max(value - half_width, least), value + half_width)
 
 
 def name_unknown(name: str, reason: str) -> Quantity:
     """Return the quantity of this name without a value; reason: its code."""
-    return Quantity(None, None, None, *DEFINITIONS[name], reason, name)
+    return Quantity(None, None, None, *COMPARISON_DEFINITIONS[name], reason, name)

@@ -10,25 +10,26 @@ from ...inputs.damage import shorten
 from ..areal import Areal
 from ..profile import Profile
 from .units import (
-    GIVE_UNITS,
     HEADER_EXAMPLE,
-    UNIT_LIST,
+    LENGTH_UNIT_LIST,
+    MISSING_UNITS_REMEDY,
     parse_length_unit,
 )
 
 MAX_HEIGHTS = 50_000_000  # largest number of heights
-MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
+MAX_COORDINATE = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_TRACE_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
 # Fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
-FAULT_FRACTION = 0.01
-MIN_ROUNDED = 10  # smallest number of positions that show whether they are even but for rounding
+MAX_FAULTY_HEIGHT_FRACTION = 0.01
+# Smallest number of positions that show whether they are even but for rounding
+MIN_ROUNDED_POSITIONS = 10
 # Largest distance from even positions in printed digits, half of which is rounding.
-MAX_ROUNDING = 0.75
+MAX_ROUNDING_IN_DIGITS = 0.75
 MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
 # Largest distance of a step from a multiple of the printed digit, relative to the digit
-DIGIT_TOL = 1e-4
+STEP_DIGIT_TOL = 1e-4
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
-EVEN_TOL = 1e-6
+EVEN_POSITIONS_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.
 POSITION_ROUND_OFF = 1e-9
 MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
@@ -142,12 +143,13 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
     unit = given or stated
     if unit is None:
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or {GIVE_UNITS}"
+            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or "
+            f"{MISSING_UNITS_REMEDY}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
         raise PatchfemError(
-            f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
+            f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {LENGTH_UNIT_LIST}"
         )
     if stated is not None and parse_length_unit(stated) != factor:
         table = table.add_note(
@@ -162,7 +164,7 @@ def _check_numbers(table: Table, role: str) -> None:
     `role` is the name of the column of the `table`.
     """
     values = table.columns[role].ravel()
-    is_bad = ~(np.abs(values) <= MAX_LENGTH)
+    is_bad = ~(np.abs(values) <= MAX_COORDINATE)
     if role == "z":
         is_bad &= ~np.isnan(values)
     if not is_bad.any():
@@ -249,17 +251,17 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
 
     `role` is "x" or "y". The table gets a note if positions are changed.
     """
-    if x.size < MIN_ROUNDED:
+    if x.size < MIN_ROUNDED_POSITIONS:
         return table, x
 
     # The printed digit is the smallest difference of two steps.
     gaps = np.diff(np.sort(np.diff(x)))
-    gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
+    gaps = gaps[gaps > EVEN_POSITIONS_TOL * np.ptp(x) / x.size]
     digit = MIN_PRINTED_DIGIT
     if gaps.size and gaps[0] > digit:
         digit = float(gaps[0])
         n_digits = np.diff(x) / digit
-        if np.abs(n_digits - np.rint(n_digits)).max() > DIGIT_TOL:
+        if np.abs(n_digits - np.rint(n_digits)).max() > STEP_DIGIT_TOL:
             return table, x
 
     # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
@@ -273,8 +275,8 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and distance <= MAX_ROUNDING * digit:
-            if distance <= EVEN_TOL * step:
+        if step > 0 and distance <= MAX_ROUNDING_IN_DIGITS * digit:
+            if distance <= EVEN_POSITIONS_TOL * step:
                 return table, x
             note = (
                 f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
@@ -298,7 +300,9 @@ def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, .
         )
 
     # A few heights that stand out, such as 999 um for no signal, are spikes and do not count.
-    low, first, last, high = np.nanquantile(z, [0.0, FAULT_FRACTION, 1 - FAULT_FRACTION, 1.0])
+    low, first, last, high = np.nanquantile(
+        z, [0.0, MAX_FAULTY_HEIGHT_FRACTION, 1 - MAX_FAULTY_HEIGHT_FRACTION, 1.0]
+    )
     if last - first <= length:
         return ()
     text = (

@@ -22,7 +22,7 @@ from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
 from .header import (
     COMMENT_SIGNS,
-    MISSING_PATTERN,
+    MISSING_HEIGHT_PATTERN,
     Column,
     Header,
     parse_fact,
@@ -30,14 +30,14 @@ from .header import (
     split_cells,
 )
 from .table import Table
-from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit
+from .units import HEADER_EXAMPLE, MISSING_SIZE_REMEDY, parse_length_unit
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
-MAX_STEP_UNEVENNESS = 1e-6
+COORDINATE_STEP_TOL = 1e-6
 # Pattern of a number in quotes with a decimal comma
-_QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+_QUOTED_NUMBER_PATTERN = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 # Pattern of a control character, which no text contains
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL_CHARACTER_PATTERN = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
@@ -77,12 +77,12 @@ def _decode(content: Content) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    if _CONTROL.search(text):
+    if _CONTROL_CHARACTER_PATTERN.search(text):
         raise PatchfemError(
             f"{content.path}: not a text file; export the profile as text with two columns and {HEADER_EXAMPLE}"
         )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return _QUOTED_NUMBER.sub(r"\1.\2", text).replace('"', "")
+    return _QUOTED_NUMBER_PATTERN.sub(r"\1.\2", text).replace('"', "")
 
 
 def _find_roles(
@@ -171,17 +171,17 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
         if size is None or not 0 < size < np.inf:
             raise PatchfemError(
                 f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
-                f"row), but the {name} of the scan is not given as a length above zero; {SIZE_LINES}"
+                f"row), but the {name} of the scan is not given as a length above zero; {MISSING_SIZE_REMEDY}"
             )
         columns[role] = np.arange(count) * size / count
     columns["z"] = z if z.shape[0] > 1 else z[0]
-    return Table(path, columns, units, str(path), remedy=SIZE_LINES)
+    return Table(path, columns, units, str(path), remedy=MISSING_SIZE_REMEDY)
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether values (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
+    """Return whether values (n,) increase by equal steps, within COORDINATE_STEP_TOL of the first step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < MAX_STEP_UNEVENNESS * steps[0])
+    return bool(steps[0] > 0 and np.ptp(steps) < COORDINATE_STEP_TOL * steps[0])
 
 
 def _read_rows(
@@ -254,7 +254,7 @@ def _parse_cell(place: str, role: str, cell: str) -> float:
     """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
-    if role == "index" or (role == "z" and MISSING_PATTERN.fullmatch(cell)):
+    if role == "index" or (role == "z" and MISSING_HEIGHT_PATTERN.fullmatch(cell)):
         return np.nan
     raise PatchfemError(
         f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"

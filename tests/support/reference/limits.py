@@ -43,7 +43,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "inputs.packed.MAX_UNPACKED_BYTES": "bytes of the content of a .npz, .mat or zip file after decompression",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
     "surface.files.content.MAX_SURFACE_FILE_BYTES": "bytes of the file of a scan, also after decompression",
-    "surface.files.table.MAX_LENGTH": "length of a trace [m]",
+    "surface.files.table.MAX_COORDINATE": "length of a trace [m]",
     "model.slide.MAX_BENCH_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
