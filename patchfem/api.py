@@ -652,7 +652,7 @@ def sweep(
     # the cases are those of the command line, whose words the answer names
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
-    request = parse_request.Request(ranges, None, draw, sobol, seed)
+    request = parse_request.CaseRequest(ranges, None, draw, sobol, seed)
     command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets, request.list_options())
     cases = replace(parse_request.read_cases(sweep_scene, request), command=command)
 

@@ -44,7 +44,7 @@ PUBLIC = {
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
     "sweeps.parse_request": (
-        "Request",
+        "CaseRequest",
         "read_cases",
         "read_sweep",
     ),

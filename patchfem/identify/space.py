@@ -140,7 +140,7 @@ class UnitCubeResidual:
         residual = self(u)
         return np.inf if residual is None else residual @ residual
 
-    def with_penalty(self, u) -> np.ndarray:
+    def evaluate_or_penalize(self, u) -> np.ndarray:
         """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
         residual = self(u)
         if residual is None:

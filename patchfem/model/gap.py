@@ -84,8 +84,8 @@ class Gap:
         return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
-    def jumps(self) -> tuple[float, ...]:
-        """Coordinates [m] of the edges of steps, at which the gap jumps."""
+    def step_edges(self) -> tuple[float, ...]:
+        """Coordinates x [m] of the edges of steps, at which the gap is discontinuous."""
         return tuple(x for _, (x, _) in self._values("edge"))
 
     @property

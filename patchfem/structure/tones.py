@@ -24,7 +24,7 @@ class TonesRecord(RecordedDrive):
     """Record of a sum of tones, whose cycle is that of the first tone.
 
     - beat: number of cycles after which all tones repeat.
-    - max_frequency: highest frequency [Hz].
+    - max_frequency: frequency [Hz] of the highest tone.
     - tones (q, 3): amplitude [m s-2], circular frequency [rad/s] and phase [rad] of each tone.
     """
 

@@ -43,7 +43,7 @@ MIN_GROSS_SLIP_AMPLITUDE_RATIO = 3.0
 FLUTTER_AMPLITUDE_TOL = 1e-8
 
 
-class Levels(NamedTuple):
+class AmplitudesOrForces(NamedTuple):
     """Amplitudes of a backbone, or the forces that hold the phase resonance; () for a range around the onset of slip.
 
     - amplitudes: amplitudes at the output [m].
@@ -54,8 +54,8 @@ class Levels(NamedTuple):
     forces: Sequence[float] = ()
 
 
-# Levels of a backbone for which the user gives neither amplitudes nor forces
-DEFAULT_LEVELS = Levels()
+# For a backbone of which the user gives neither amplitudes nor forces
+RANGE_AROUND_SLIP = AmplitudesOrForces()
 
 
 def choose_methods(method: str | None) -> tuple[str, ...]:
@@ -113,14 +113,14 @@ def compute_backbone(
     PatchfemError
         If the scene has no rig, or the rig does not have this mode.
     """
-    levels = Levels(() if amplitudes is None else amplitudes)
-    return compute_backbones([model], mode, levels, methods, progress, errors=errors)[0]
+    given = AmplitudesOrForces(() if amplitudes is None else amplitudes)
+    return compute_backbones([model], mode, given, methods, progress, errors=errors)[0]
 
 
 def compute_backbones(
     models: Sequence[Model],
     mode: str = "",
-    levels: Levels = DEFAULT_LEVELS,
+    given: AmplitudesOrForces = RANGE_AROUND_SLIP,
     methods=CURVE_METHODS,
     progress: Callable | None = None,
     *,
@@ -137,14 +137,14 @@ def compute_backbones(
         Models of rigs, such as those of one scene with several values of a key.
     mode : str
         Name of the mode; "" for the first.
+    given : AmplitudesOrForces
+        Amplitudes [m] of the points, or forces [N] at the output, each of which gives an amplitude for each model.
     methods : sequence of str
         From CURVE_METHODS.
     progress : callable, optional
         Takes the name of a method that begins.
     errors : bool
         Whether the force and the errors are computed.
-    levels : Levels
-        Amplitudes, or forces at the output, of the points.
 
     Returns
     -------
@@ -156,16 +156,17 @@ def compute_backbones(
     PatchfemError
         If a scene has no rig, a rig does not have this mode, or no amplitude has one of the forces.
     """
+    # All models have the same amplitudes: those that hold a given force in any of them, so that curves can be compared.
     joints = []
-    wanted = [np.asarray(levels.amplitudes, float)]
+    wanted = [np.asarray(given.amplitudes, float)]
     for model in models:
         with locate_errors(model.source):
             joint = build_joint(model, mode)._replace(has_errors=errors, has_force=errors)
             joints.append(joint)
-            if len(levels.forces):
+            if len(given.forces):
                 forced = joint._replace(has_force=True)
-                wanted.append(find_amplitudes_of_forces(forced, levels.forces))
-    if not len(levels.forces) and not len(levels.amplitudes):
+                wanted.append(find_amplitudes_of_forces(forced, given.forces))
+    if not len(given.forces) and not len(given.amplitudes):
         wanted.append(default_amplitudes(joints))
     amplitudes = _merge(np.concatenate(wanted))
 

@@ -14,7 +14,7 @@ from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
 from ...scene.backbone_scene import BackboneTables, parse_modes
 from ...scene.scene import SceneError
-from .curves import Levels, choose_methods, compute_backbones
+from .curves import AmplitudesOrForces, choose_methods, compute_backbones
 from .given_modes import prepare_model
 from .records import Backbone
 
@@ -90,7 +90,7 @@ def compute_cases(
     methods = choose_methods(request.method)
     if request.amplitudes and request.forces:
         raise PatchfemError("--amplitudes and --forces: give only one of them")
-    levels = Levels(
+    given = AmplitudesOrForces(
         read_positive_values(request.amplitudes, "--amplitudes") if request.amplitudes else (),
         read_positive_values(request.forces, "--forces", "force") if request.forces else (),
     )
@@ -122,7 +122,7 @@ def compute_cases(
 
     # All curves at common amplitudes
     models = [case.model for case in prepared]
-    backbones = compute_backbones(models, request.mode, levels, methods, progress)
+    backbones = compute_backbones(models, request.mode, given, methods, progress)
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
     base = models[0]

@@ -1,6 +1,6 @@
 """Parser and validation of the request for a sweep, which reports all errors at once.
 
-In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
+In: a file, --set strings and a `CaseRequest`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
 
 import re
@@ -26,8 +26,8 @@ MAX_SWEEP_CASES = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """Request for a sweep: swept keys, table of cases and random sampling.
+class CaseRequest:
+    """Cases that the user asks for in a sweep: swept keys, table of cases and random sampling.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Request:
         return words
 
 
-def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[SweepScene, Cases]:
+def read_sweep(path: Path, sets: Sequence[str], request: CaseRequest) -> tuple[SweepScene, Cases]:
     """Read the scene of a sweep and its cases.
 
     Parameters
@@ -69,7 +69,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
         File of the scene.
     sets : sequence of str
         ``table.key=value`` strings for all cases.
-    request : Request
+    request : CaseRequest
         Which cases are asked for.
 
     Returns
@@ -98,7 +98,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     return sweep_scene, cases
 
 
-def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
+def read_cases(sweep_scene: SweepScene, request: CaseRequest) -> Cases:
     """Return the cases of a request: all combinations of the requested values.
 
     If it names no values, those of the table [sweep] are used.
@@ -107,7 +107,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     ----------
     sweep_scene : SweepScene
         Scene of the sweep.
-    request : Request
+    request : CaseRequest
         Values, ranges and tables of cases that the user asks for.
 
     Returns

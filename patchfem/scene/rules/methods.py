@@ -182,7 +182,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     return True
 
 
-def check_method(draft: SceneDraft, kind: str) -> None:
+def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
     """Report an accuracy.method that cannot solve the scene of a draft.
 
     A method that is not used in this `kind` of scene gets a remark.

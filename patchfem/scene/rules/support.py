@@ -31,7 +31,7 @@ from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .facts import TableFacts
 from .methods import (
-    check_method,
+    check_accuracy_method,
     describe_load_change,
     find_climbed_grooves,
     find_heave_key,
@@ -342,7 +342,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
     The combinations are the rows of UNSUPPORTED_COMBINATIONS, which are tried on each interface.
     """
-    check_method(draft, kind)
+    check_accuracy_method(draft, kind)
     joints = [Joint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
     for index, interface in enumerate(draft.values.structure.interface if kind == "rig" else ()):
         table = interface.table

@@ -21,7 +21,7 @@ from .statistics import (
 
 # Largest number of points to which the place is fitted. More would hardly improve it.
 MAX_FIT_POINTS = 40_000
-# Smallest part of the own surface that both surfaces must show
+# Smallest part of the sampled surface that both surfaces must show
 MIN_COMMON_PART = 0.2
 # Largest relative difference in length of two traces at the same place
 MAX_RELATIVE_STRETCH = 0.015
@@ -128,10 +128,10 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
     `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every axis,
     by default as many as MAX_FIT_POINTS allows.
     """
-    own, other = order(first, second.mirror() if place.mirrored else second)
+    sampled, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
-        stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
-    model = Model(own, other, place, stride)
+        stride = int(np.ceil((sampled.z.size / MAX_FIT_POINTS) ** (1 / sampled.z.ndim)))
+    model = Model(sampled, other, place, stride)
     count = model.known.sum()
     return model if count >= max(MIN_TRACE_HEIGHTS, MIN_COMMON_PART * model.known.size) else None
 
@@ -150,7 +150,7 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
     """
     fit = aligned.fit
     model = aligned.model
-    if model.own.z.shape == order(first, second)[0].z.shape:
+    if model.sampled.z.shape == order(first, second)[0].z.shape:
         return aligned
     shift = fit.state[: model.n_axes]
     place = aligned.place._replace(shift=shift, turn=float(fit.state[model.n_axes]))
@@ -166,8 +166,8 @@ def _is_same_place(aligned: Aligned) -> bool:
     """
     model = aligned.model
     fit = aligned.fit
-    own = model.own.z[model.known]
-    heights = (own, own - model.sign * fit.depth)
+    sampled = model.sampled.z[model.known]
+    heights = (sampled, sampled - model.sign * fit.depth)
     waves = [remove_long_waves(fill_gaps(model.draw(z))) for z in heights]
     noise = float(np.median(fit.noise))
     is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_RELATIVE_STRETCH

@@ -102,7 +102,7 @@ class Options(NamedTuple):
     """What is known of two surfaces.
 
     - units: of x (and y) and of z, for files that state none.
-    - direction: "x" or "y", along which traces run, or scans are evaluated; "".
+    - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if it is not known.
     - shift: known x of the second trace minus x of the first [m].
     - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
     - keep_spikes: whether spikes, dropouts and dust count.

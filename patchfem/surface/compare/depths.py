@@ -64,9 +64,9 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     masks = {
         name: model.draw(getattr(fit, name), False)[box] for name in ("unworn", "worn", "grown")
     }
-    first = fill_gaps(model.own.z)[box]
+    first = fill_gaps(model.sampled.z)[box]
     if model.n_axes == 1:
-        # The own heights are those of the second trace, with its gain.
+        # The sampled heights are those of the second trace, with its gain.
         first = first / (1 + fit.state[-1]) + depth
     base = model.datum[(terms, *box)]
     before = subtract_plane(first, base[: 1 + model.n_axes])
@@ -81,7 +81,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     model_error = float(np.hypot(INTERPOLATION_RELATIVE_ERROR, gain_error))
     # Holes of missing heights belong to the common part.
     inside = ndimage.binary_fill_holes(model.common[box])
-    axes = [axis[part] for axis, part in zip(model.own.axes, box)]
+    axes = [axis[part] for axis, part in zip(model.sampled.axes, box)]
     return DepthMap(
         x=axes[-1],
         y=axes[0] if model.n_axes > 1 else None,
@@ -92,7 +92,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         **masks,
         inside=inside,
         missing=inside & ~model.known[box],
-        cell=float(np.prod(model.own.steps)),
+        cell=float(np.prod(model.sampled.steps)),
         errors=errors._replace(model=model_error),
     )
 

@@ -1,10 +1,10 @@
 """Depth of the second surface below the first one, as a function of place and datum.
 
-A point p of the own surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the other
-one, with the own middle c; M stretches a trace or rotates a scan. The depth there is z1 + datum - z2, with a straight or
-parabolic datum of traces and a plane of scans. With another gain 1 + e of the instrument, it is (z1 + e z1 + datum -
-z2)/(1 + e), with the waves of z1 about its plane in the term e z1. The state is [shift (d), turn, datum (k), e], axes in
-the order y, x.
+A point p of the sampled surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the
+other one, where c is the middle of the sampled one; M stretches a trace or rotates a scan. The depth there is z1 +
+datum - z2, with a straight or parabolic datum of traces and a plane of scans. With another gain 1 + e of the
+instrument, it is (z1 + e z1 + datum - z2)/(1 + e), with the waves of z1 about its plane in the term e z1. The state is
+[shift (d), turn, datum (k), e], axes in the order y, x.
 """
 
 from functools import cached_property
@@ -59,7 +59,7 @@ MIN_GROWN_DISTANCE_IN_SCALES = 10.0
 
 
 class Model:
-    """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place.
+    """Depths (n,) at the `known` points of the sampled surface, which both surfaces show at the first place.
 
     `max_gain_change` is the largest change of the gain that is left, until it is fitted.
 
@@ -67,18 +67,18 @@ class Model:
     stretch of traces), then the k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
     [1].
 
-    The "own" surface is the one on whose points depths are known: the first of two scans, the second of two traces.
+    The sampled surface is the one on whose points depths are known: the first of two scans, the second of two traces.
     """
 
-    def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
-        """Choose the common points at a place, of each `stride`-th own point.
+    def __init__(self, sampled: Raster, other: Raster, place: Place, stride: int = 1):
+        """Choose the common points at a place, of each `stride`-th sampled point.
 
-        `own` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
+        `sampled` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
         """
-        every = (..., *(slice(None, None, stride),) * own.z.ndim)
-        self.own = Raster(own.z[every], own.origin, own.steps * stride)
-        self.n_axes = own.z.ndim
-        # Heights are known along the own surface: the depth is own minus other for scans, the reverse for traces.
+        every = (..., *(slice(None, None, stride),) * sampled.z.ndim)
+        self.sampled = Raster(sampled.z[every], sampled.origin, sampled.steps * stride)
+        self.n_axes = sampled.z.ndim
+        # Heights are known along the sampled surface: the depth is sampled minus other for scans, the reverse for traces.
         self.sign = 1.0 if self.n_axes > 1 else -1.0
         self.other = other
         filled = fill_gaps(other.z)
@@ -88,16 +88,16 @@ class Model:
         ]
         self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), KINK_SAMPLES)
 
-        self.middle = self._shape(own.middle)
-        points = np.array(np.meshgrid(*own.axes, indexing="ij")) - self.middle
-        unit = points / self._shape(own.lengths / 2)
-        columns = np.array([np.ones(own.z.shape), *unit[::-1]])
+        self.middle = self._shape(sampled.middle)
+        points = np.array(np.meshgrid(*sampled.axes, indexing="ij")) - self.middle
+        unit = points / self._shape(sampled.lengths / 2)
+        columns = np.array([np.ones(sampled.z.shape), *unit[::-1]])
         bend = unit**2 if self.n_axes == 1 else unit[:0]
         self.points = points[every]
         self.datum = np.concatenate((columns, bend))[every]
         # The gain belongs to the first surface, as a track of the second one would be its own gain.
         if self.n_axes > 1:
-            self.waves = subtract_plane(fill_gaps(own.z), columns)[every[1:]]
+            self.waves = subtract_plane(fill_gaps(sampled.z), columns)[every[1:]]
         else:
             line = np.array([np.ones(filled.size), np.linspace(-1, 1, filled.size)])
             self.waves = ndimage.spline_filter(subtract_plane(filled, line))
@@ -117,14 +117,14 @@ class Model:
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
-        self.common = np.isfinite(self.own.z) & (weights > MIN_KNOWN_WEIGHT)
+        self.common = np.isfinite(self.sampled.z) & (weights > MIN_KNOWN_WEIGHT)
         last = self._shape(self.other.z.shape) - 1 - INACCURATE_BORDER_SAMPLES
         self.known = self.common & ((pixels >= INACCURATE_BORDER_SAMPLES) & (pixels <= last)).all(
             axis=0
         )
 
     def _map_pixels(self, state) -> np.ndarray:
-        """Return the place (d, ...) of the own points on the other surface at a state, in samples of it."""
+        """Return the place (d, ...) of the sampled points on the other surface at a state, in samples of it."""
         turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
         start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
         return (turned + start) / self._shape(self.other.steps)
@@ -138,7 +138,7 @@ class Model:
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
         datum = state[self.n_axes + 1 : -1] @ self.datum[:, self.known]
-        depth = self.sign * (self.own.z[self.known] - other) + datum
+        depth = self.sign * (self.sampled.z[self.known] - other) + datum
         return (depth + state[-1] * self._get_waves(pixels)) / (1 + state[-1])
 
     def _get_waves(self, pixels) -> np.ndarray:
@@ -184,7 +184,7 @@ class Model:
 
         Other points of it have the value `fill`.
         """
-        image = np.full(self.own.z.shape, fill, dtype=np.asarray(values).dtype)
+        image = np.full(self.sampled.z.shape, fill, dtype=np.asarray(values).dtype)
         image[self.known] = values
         return image
 
@@ -198,7 +198,7 @@ class Model:
         `depth` and `noise` (n,) [m] are the depths and the standard deviation of an unworn one.
         """
         worn = self.find_changed(depth, noise)
-        height = (self.own.z[self.known] - self.sign * depth / 2) / np.median(noise)
+        height = (self.sampled.z[self.known] - self.sign * depth / 2) / np.median(noise)
         relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
         tops = find_worn_tops(relative, fill_gaps(self.draw(height)), self.max_gain_change)
         return worn | tops[self.known]
@@ -223,7 +223,7 @@ class Model:
     @cached_property
     def smoothing(self) -> np.ndarray:
         """Deviations (d,), in samples, of the Gaussian that removes the long waves of a refined place."""
-        sizes = np.array(self.own.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
+        sizes = np.array(self.sampled.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
         return np.maximum(sizes, MIN_PLACE_GAUSSIAN_SAMPLES) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:

@@ -29,7 +29,7 @@ UNMIRRORED_PLACE_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
-    """Place of one surface on the other: the map from own to other points (`model`) in d dimensions.
+    """Place of one surface on the other: the map from sampled to other points (`model`) in d dimensions.
 
     - shift (d,): shift of the map [m].
     - turn: stretch of traces [1], or rotation of scans [rad].
@@ -44,7 +44,7 @@ class Place(NamedTuple):
 
 
 def make_matrix(turn: float, n_axes: int) -> np.ndarray:
-    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans.
+    """Return the matrix (d, d) of the map from sampled to other points: a stretch of traces, a rotation of scans.
 
     `turn` is the stretch [1] or the rotation [rad], and `n_axes` is 1 for traces and 2 for scans.
     """
@@ -56,9 +56,9 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
 
 
 def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
-    """Return the own and the other surface, of the surfaces before and after wear.
+    """Return the sampled and the other surface, of the surfaces before and after wear.
 
-    Depths are computed at the points of the own surface: the second of two traces, the first of two scans.
+    Depths are computed at the points of the sampled surface: the second of two traces, the first of two scans.
     """
     return (second, first) if first.z.ndim == 1 else (first, second)
 
@@ -86,10 +86,10 @@ def find_place(first: Raster, second: Raster) -> Place:
 
     best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
     for mirrored in (False, True):
-        own, other = order(first, second.mirror() if mirrored else second)
-        images = zip(*(_make_images(surface, pixel) for surface in (own, other)))
+        sampled, other = order(first, second.mirror() if mirrored else second)
+        images = zip(*(_make_images(surface, pixel) for surface in (sampled, other)))
         for (image, other_image), turn in product(images, TRIED_TURNS[n_axes]):
-            # The other image is turned about its middle, and correlated with the own one at all lags at once.
+            # The other image is turned about its middle, and correlated with the sampled one at all lags at once.
             matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
@@ -99,14 +99,14 @@ def find_place(first: Raster, second: Raster) -> Place:
             if significance[peak] <= best.significance:
                 continue
 
-            # Lags beyond the size of the own image are negative: they stand at the end of each axis.
+            # Lags beyond the size of the sampled image are negative: they stand at the end of each axis.
             lag = np.where(
                 np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
             )
-            # The middle of the own surface lies at this point of the turned image.
-            at = (own.middle - own.origin) / pixel - lag
+            # The middle of the sampled surface lies at this point of the turned image.
+            at = (sampled.middle - sampled.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
-            best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
+            best = Place(place - sampled.middle, float(turn), mirrored, float(significance[peak]))
         # Mirrored scans are tried only if this side does not fit clearly. Traces are always tried both ways.
         if best.significance > UNMIRRORED_PLACE_SIGNIFICANCE and n_axes > 1:
             break

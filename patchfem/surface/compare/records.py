@@ -32,7 +32,7 @@ class Placement:
     """Place of the second surface on the first.
 
     - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan; significance unless the place was given.
-    - mirrored: whether the second surface was mirrored, along "x" (traces) or "x", "y" (scans); "".
+    - mirrored: axis along which the second surface was mirrored, "x" (traces) or "x", "y" (scans); "" if it was not.
     - basis: "place" if heights are compared at the same place, "flanks" if the depth is measured
       below the unworn flanks of the second trace alone, "" if there is no reference.
     """
@@ -82,7 +82,7 @@ class Comparison:
     - tracks: worn tracks of traces, the longest one first.
     - findings: what else a reader must know.
     - evidence: placement, curves and roughness.
-    - direction: "x", "y" or "".
+    - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if the user does not state it.
     """
 
     before: Profile | Areal

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
-from .units import AXES_BY_COLUMN_NAME, HEADER_EXAMPLE, parse_length_unit
+from .units import COORDINATES_BY_COLUMN_NAME, HEADER_EXAMPLE, parse_length_unit
 
 # Largest number of characters of a line in which names of columns are sought
 MAX_COLUMN_LINE_CHARACTERS = 1000
@@ -41,9 +41,14 @@ _MATRIX_FACT_PATTERN = re.compile(
 
 
 class Column(NamedTuple):
-    """Role of a column ("x", "y", "z", "index", an unknown name, or "" of a unit alone), its unit and its text."""
+    """Column of the table, as the header names it.
 
-    role: str
+    - coordinate: "x", "y" or "z", "index" for row numbers, an unknown name in lower case, or "" for a unit without a name.
+    - unit: unit as written, or None if the header gives none.
+    - name: text of the header.
+    """
+
+    coordinate: str
     unit: str | None = None
     name: str = ""
 
@@ -103,7 +108,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
             continue
 
         parsed = [_parse_column(cell) for cell in cells]
-        if any(column.role for column in parsed):
+        if any(column.coordinate for column in parsed):
             is_other = any(re.search("[:=]", column.name) for column in parsed)
             if not 1 < len(parsed) <= MAX_TRACE_TABLE_COLUMNS or is_other:
                 continue
@@ -111,15 +116,17 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
             columns = parsed
         else:
             # A line of units belongs to the names above it, or to x, (y,) z.
-            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(parsed), "")]
+            columns = columns or [
+                Column(coordinate) for coordinate in {2: "xz", 3: "xyz"}.get(len(parsed), "")
+            ]
             columns = [
                 column._replace(unit=column.unit or unit.unit)
                 for column, unit in zip(columns, parsed)
             ]
         named[len(cells)] = (start, columns)
         # Names of a comment count if one of them is known.
-        is_known = not is_comment or any(column.role in ("x", "y", "z") for column in columns)
-        units = [column.unit for column in columns if column.role != "index"]
+        is_known = not is_comment or any(column.coordinate in ("x", "y", "z") for column in columns)
+        units = [column.unit for column in columns if column.coordinate != "index"]
         if is_known and len(units) > 1 and None not in units:
             return Header(columns, facts, len(cells), start), lines
     raise PatchfemError(
@@ -137,12 +144,12 @@ def _parse_column(cell: str) -> Column:
         return Column("", cell if parse_length_unit(cell) else None, cell)
     match = _COLUMN_PATTERN.match(cell[:MAX_COLUMN_NAME_CHARACTERS])
     name, unit, word = match.groups() if match else (cell, None, None)
-    role = name.strip(" _").lower()
-    if word is not None and role in AXES_BY_COLUMN_NAME and parse_length_unit(word):
+    coordinate = name.strip(" _").lower()
+    if word is not None and coordinate in COORDINATES_BY_COLUMN_NAME and parse_length_unit(word):
         unit = word
     elif word is not None:
-        role = cell.lower()
-    return Column(AXES_BY_COLUMN_NAME.get(role, role), unit, cell)
+        coordinate = cell.lower()
+    return Column(COORDINATES_BY_COLUMN_NAME.get(coordinate, coordinate), unit, cell)
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:

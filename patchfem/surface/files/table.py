@@ -96,9 +96,9 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         units = None
 
     # All that follows is in metres.
-    for role in table.columns:
-        table = _convert_column(table, role, units and units[role == "z"])
-        _check_numbers(table, role)
+    for coordinate in table.columns:
+        table = _convert_column(table, coordinate, units and units[coordinate == "z"])
+        _check_numbers(table, coordinate)
     if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
 
@@ -110,14 +110,14 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
 
     # Positions of a surface increase, whatever the direction of the measurement.
     axes = []
-    for axis, role in enumerate("yx"[2 - z.ndim :]):
-        places = table.columns[role]
+    for axis, coordinate in enumerate("yx"[2 - z.ndim :]):
+        places = table.columns[coordinate]
         if places[-1] < places[0]:
             places = places[::-1]
             z = np.flip(z, axis)
             table = table._replace(lines=None if table.lines is None else table.lines[::-1])
-        table, places = _undo_rounding(table, role, places)
-        _require_increase(table, role, places)
+        table, places = _undo_rounding(table, coordinate, places)
+        _require_increase(table, coordinate, places)
         axes.append(frozen_array(places))
     has_sure_units = table.are_units_fixed or units is not None
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
@@ -133,45 +133,45 @@ def refuse_many_heights(path, count: int) -> None:
         )
 
 
-def _convert_column(table: Table, role: str, given: str | None) -> Table:
+def _convert_column(table: Table, coordinate: str, given: str | None) -> Table:
     """Convert a column of a table to metres.
 
-    `role` is "x", "y" or "z", and `given` is the unit that the user states, or None. It overrules the file, with a
+    `coordinate` is "x", "y" or "z", and `given` is the unit that the user states, or None. It overrules the file, with a
     note.
     """
-    stated = table.units.get(role)
+    stated = table.units.get(coordinate)
     unit = given or stated
     if unit is None:
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or "
+            f"{table.place}: the unit of {coordinate} is not given, and units are never guessed; {table.remedy}, or "
             f"{MISSING_UNITS_REMEDY}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
         raise PatchfemError(
-            f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {LENGTH_UNIT_LIST}"
+            f"{table.place}: unknown unit '{shorten(unit)}' of {coordinate}; use one of {LENGTH_UNIT_LIST}"
         )
     if stated is not None and parse_length_unit(stated) != factor:
         table = table.add_note(
-            f"the header gives {role} in {shorten(stated)}, but {unit} is used, as given by --units"
+            f"the header gives {coordinate} in {shorten(stated)}, but {unit} is used, as given by --units"
         )
-    return table._replace(columns=table.columns | {role: table.columns[role] * factor})
+    return table._replace(columns=table.columns | {coordinate: table.columns[coordinate] * factor})
 
 
-def _check_numbers(table: Table, role: str) -> None:
+def _check_numbers(table: Table, coordinate: str) -> None:
     """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing.
 
-    `role` is the name of the column of the `table`.
+    `coordinate` is the name of the column of the `table`.
     """
-    values = table.columns[role].ravel()
+    values = table.columns[coordinate].ravel()
     is_bad = ~(np.abs(values) <= MAX_COORDINATE)
-    if role == "z":
+    if coordinate == "z":
         is_bad &= ~np.isnan(values)
     if not is_bad.any():
         return
     first = int(np.argmax(is_bad))
     raise PatchfemError(
-        f"{table.locate(first)}: {role} is {values[first]:.4g} m; is the unit right? write a missing height as nan"
+        f"{table.locate(first)}: {coordinate} is {values[first]:.4g} m; is the unit right? write a missing height as nan"
     )
 
 
@@ -180,7 +180,7 @@ def _fill_raster(table: Table) -> Table:
 
     Cells of the matrix without a point are missing heights.
     """
-    x, y, z = (table.columns[role] for role in "xyz")
+    x, y, z = (table.columns[coordinate] for coordinate in "xyz")
     columns, in_column = _find_positions(x)
     rows, in_row = _find_positions(y)
     if rows.size == 1:
@@ -218,15 +218,15 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
-def _require_increase(table: Table, role: str, places) -> None:
+def _require_increase(table: Table, coordinate: str, places) -> None:
     """Raise PatchfemError if the positions of a column are equal or do not increase.
 
-    `role` is "x" or "y", and `places` (n,) [m] are the positions. The `table` tells the line of a wrong one.
+    `coordinate` is "x" or "y", and `places` (n,) [m] are the positions. The `table` tells the line of a wrong one.
     """
     if not np.ptp(places) > 0:
         raise PatchfemError(
-            f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
-            f"different {role}"
+            f"{table.path}: every sample lies at {coordinate} = {format_length(places[0])}; a surface needs at least two "
+            f"different {coordinate}"
         )
     is_rising = np.diff(places) > 0
     if is_rising.all():
@@ -237,19 +237,19 @@ def _require_increase(table: Table, role: str, places) -> None:
         pair.reverse()
     before, after = map(format_length, places[pair])
     raise PatchfemError(
-        f"{table.locate(pair[1])}: {role} is {before} and then {after}, but it must only rise or only fall; keep one trace "
-        "or scan per file, and one height at each place"
+        f"{table.locate(pair[1])}: {coordinate} is {before} and then {after}, but it must only rise or only fall; keep one "
+        "trace or scan per file, and one height at each place"
     )
 
 
-def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
+def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]:
     """Return the table and positions x (n,) [m], made even if they differ only by rounding.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
     differ by it; uneven steps, such as 1.0 and 1.4 um in turn, are no multiples of their difference.
 
-    `role` is "x" or "y". The table gets a note if positions are changed.
+    `coordinate` is "x" or "y". The table gets a note if positions are changed.
     """
     if x.size < MIN_ROUNDED_POSITIONS:
         return table, x
@@ -279,7 +279,7 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
             if distance <= EVEN_POSITIONS_TOL * step:
                 return table, x
             note = (
-                f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
+                f"{coordinate} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"
             )
             return table.add_note(note), even

@@ -30,8 +30,8 @@ _COLUMN_NAMES = {
     "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil, raw",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
 }
-AXES_BY_COLUMN_NAME = {
-    name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")
+COORDINATES_BY_COLUMN_NAME = {
+    name: coordinate for coordinate, names in _COLUMN_NAMES.items() for name in names.split(", ")
 }
 
 MISSING_UNITS_REMEDY = (
