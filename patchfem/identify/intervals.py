@@ -157,11 +157,13 @@ def compute_intervals(
     n = u.size
     rows = estimate_effective_rows(model(u)) if is_series else model.rows
     dof = max(rows - n, 1)
+    # An exact fit has the cost of its round-off, so that variances are not zero.
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     quantile = stdtrit(dof, 0.975)
     minimum = _Minimum(model, u, cost, quantile**2 / dof)
 
-    # covariance of the free parameters, and the directions without effect
+    # Covariance (J^T J)^-1 cost/dof of the parameters that have an effect and lie on no bound. A parameter is unknown
+    # if a direction without effect on the residual contains it.
     jacobian = model.jacobian(u, range(n))
     norms = np.linalg.norm(jacobian, axis=0)
     has_effect = norms > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
@@ -172,6 +174,8 @@ def compute_intervals(
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
+    # Linear interval u_k +- t sqrt(cov_kk). To its end the other free parameters change by the multiple cov_ik/cov_kk of
+    # u_k; if the sum of squares does not grow as expected on this line, or if u_k is on a bound, its profile is followed.
     half_width = quantile * np.sqrt(np.diag(covariance))
     offsets = np.full((2, n), np.nan)
     open_ends = np.zeros((n, 2), bool)
@@ -202,6 +206,7 @@ def compute_intervals(
         offsets[:, k] = steps
     ends = [model.space.to_values(u - offsets[0]), model.space.to_values(u + offsets[1])]
 
+    # Correlations cov_ij/sqrt(cov_ii cov_jj), without the parameters that the data do not determine
     covariance[is_unknown] = np.nan
     covariance[:, is_unknown] = np.nan
     scale = np.sqrt(np.diag(covariance))

@@ -116,9 +116,7 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
             columns = parsed
         else:
             # A line of units belongs to the names above it, or to x, (y,) z.
-            columns = columns or [
-                Column(coordinate) for coordinate in {2: "xz", 3: "xyz"}.get(len(parsed), "")
-            ]
+            columns = columns or list(map(Column, {2: "xz", 3: "xyz"}.get(len(parsed), "")))
             columns = [
                 column._replace(unit=column.unit or unit.unit)
                 for column, unit in zip(columns, parsed)

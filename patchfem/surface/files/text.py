@@ -52,7 +52,7 @@ def read_text(content: Content, *, has_units: bool = False) -> Table:
     if not header.columns and (header.count > 3 or is_sized):
         return _make_matrix(path, facts, _read_rows(path, lines, ["z"] * header.count)[0])
     place = f"{path}:{header.number}"
-    columns, notes = _find_roles(place, header, has_units=has_units)
+    columns, notes = _find_coordinates(place, header, has_units=has_units)
     numbers, row_lines = _read_rows(path, lines, [column.coordinate for column in columns])
 
     values = {}
@@ -85,7 +85,7 @@ def _decode(content: Content) -> str:
     return _QUOTED_NUMBER_PATTERN.sub(r"\1.\2", text).replace('"', "")
 
 
-def _find_roles(
+def _find_coordinates(
     place: str, header: Header, *, has_units: bool
 ) -> tuple[list[Column], tuple[str, ...]]:
     """Find which columns of a text file are x, y and z.
@@ -107,7 +107,7 @@ def _find_roles(
         A note if the coordinates follow from the order.
     """
     default_coordinates = {2: "xz", 3: "xyz"}.get(header.count, "z")
-    columns = header.columns or [Column(coordinate) for coordinate in default_coordinates]
+    columns = header.columns or list(map(Column, default_coordinates))
     data = [column for column in columns if column.coordinate != "index"]
     if len(data) not in (2, 3):
         raise PatchfemError(
@@ -115,7 +115,7 @@ def _find_roles(
             f"columns and {HEADER_EXAMPLE}"
         )
 
-    # Roles by name, or in their order where the user knows the units.
+    # Coordinates by the names of the columns, or in the order of the columns where the user states the units.
     known = ["x", "z"] if len(data) == 2 else ["x", "y", "z"]
     coordinates = [column.coordinate for column in data]
     if sorted(coordinates) == ["x", "y"]:
