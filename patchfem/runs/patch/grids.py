@@ -281,7 +281,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     # A node is placed on each step of the gap; the quantities there converge at first order in the
     # cell length.
     step_cell = min_cell / STEP_CELL_FACTOR
-    bands += _make_point_bands(patch_model.gap.jumps, step_cell)
+    bands += _make_point_bands(patch_model.gap.step_edges, step_cell)
 
     rounded_edges, rounding_length = find_rounded_edges(patch_model)
     for place in rounded_edges:
@@ -454,10 +454,10 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     -------
     list of TensorGrid
     """
-    x = divide_into_columns(layout, patch_model.gap.jumps)
+    x = divide_into_columns(layout, patch_model.gap.step_edges)
     while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
-        x = divide_into_columns(layout, patch_model.gap.jumps)
+        x = divide_into_columns(layout, patch_model.gap.step_edges)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
     growth = CELL_GROWTH[patch_model.mesh.is_fine]

@@ -38,7 +38,7 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
     if not patch_model.mesh.is_automatic:
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
-    has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
+    has_edges = bool(patch_model.gap.step_edges or (contact is not None and contact.places))
     for _ in range(MIN_LEVELS - 1 + (has_edges and tolerance < TIGHT_TOL)):
         bodies = [body.refine() for body in bodies]
     return bodies

@@ -277,7 +277,7 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
         )
 
     # An edge next to a step of the gap lies on the step.
-    jumps = patch.model.gap.jumps
+    jumps = patch.model.gap.step_edges
     if not jumps:
         return ends
     gap = np.broadcast_to(patch.unloaded_gap, state.gap.shape)[strip]

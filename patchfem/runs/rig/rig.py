@@ -10,7 +10,7 @@ from math import ceil, floor, log, log2
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response import reasons, stationary
 from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
 from ...response.decay_curve import DecayCurve
@@ -384,7 +384,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
 
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
     # program.
-    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
+    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
         outcome = Outcome.GROWS
     # A growing motion has no final values, so the errors of its measures are unknown.
     if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
