@@ -66,7 +66,7 @@ PUBLIC = {
         "Plan",
     ),
     "results.patch_rows": (
-        "TABLE",
+        "PATCH_TABLE",
         "find_unknown_measures",
     ),
     "results.result": (

@@ -29,7 +29,7 @@ from .patch import mesh_levels, store
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
-MAX_LOG_FACTOR = 5.0
+MAX_LOG_COMPLIANCE_FACTOR = 5.0
 
 
 class FreeRig(NamedTuple):
@@ -256,9 +256,11 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
         """Return the relative excess of the stiffness for a scaled compliance."""
         return _sum_nodal_forces(patch, np.exp(log_factor), bond_length) / stiffness - 1
 
-    if not excess(-MAX_LOG_FACTOR) > 0 > excess(MAX_LOG_FACTOR):
+    if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
-    factor = np.exp(brentq(excess, -MAX_LOG_FACTOR, MAX_LOG_FACTOR, xtol=1e-14))
+    factor = np.exp(
+        brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
+    )
     return frozen_array(factor * patch.slip_compliance)
 
 

@@ -17,7 +17,7 @@ from ..rig.solve import solve_rig
 from ..rig.steady.curves import COLUMN_MEASURES, ObservedMotion
 from ..rig.steady.steady import FINDERS
 
-UNBOUNDED_OUTCOMES = (
+OUTCOMES_WITHOUT_CYCLE = (
     Outcome.GROWS,
     Outcome.NOT_CONVERGED,
     Outcome.EXCEEDS_TRAVEL,
@@ -90,7 +90,7 @@ class MotionObserver:
         # Histories before the evaluated window are not needed.
         numerics = replace(self.numerics, whole=False)
         solution = solve_rig(model, numerics, self.patch, 0, self.report)
-        if solution.outcome in UNBOUNDED_OUTCOMES:
+        if solution.outcome in OUTCOMES_WITHOUT_CYCLE:
             return None
         peak, amplitude = (
             solution.values[COLUMN_MEASURES[name]] for name in ("acceleration_peak", "amplitude")

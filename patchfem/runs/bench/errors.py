@@ -29,9 +29,9 @@ from .engine import uses_parallel_elements
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
-MESH_TOL = 1e-2
+COARSE_MESH_STEPS_TOL = 1e-2
 # Ratio of the merge width in the comparison run to that of the finest run.
-FINER_MERGE_FACTOR = 0.5
+FINER_MERGE_WIDTH_FACTOR = 0.5
 
 
 class CoarseRun(NamedTuple):
@@ -138,7 +138,9 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):
         length = model.friction.bond_length
-        steps_on_coarse_mesh = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
+        steps_on_coarse_mesh = model.slide.steps(
+            COARSE_MESH_STEPS_TOL, model.accuracy.steps_per_cycle, length
+        )
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
         out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
@@ -153,7 +155,9 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
 
     # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:
-        narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
+        narrow = quarter._replace(
+            choice=replace(choice, merge=FINER_MERGE_WIDTH_FACTOR * choice.merge)
+        )
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
     return out
 

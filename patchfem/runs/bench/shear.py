@@ -17,16 +17,16 @@ from ..patch import store
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
-OPEN_PRESSURE_FRACTION = 1e-3
+UNLOADED_NODE_PRESSURE_FRACTION = 1e-3
 # Bond length of the points that represent Coulomb's law over grooves, relative to the tolerance times the slide at gross
 # slip; on flat ground the force is then wrong by at most .17 of the tolerance, relative to the friction limit.
-COULOMB_LENGTH_RATIO = 0.1
+COULOMB_BOND_LENGTH_RATIO = 0.1
 # Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
-MIN_LENGTH_RATIO = 1e-3
+MIN_BOND_LENGTH_RATIO = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
-ADDED_PRESSURE_FRACTION = 1.0
+ADDED_WEIGHT_PRESSURE_FRACTION = 1.0
 # Error of the backbone curve by neglected shear modes, relative to the tolerance.
-MODES_TOLERANCE_RATIO = 0.1
+SHEAR_MODES_ERROR_RATIO = 0.1
 
 
 def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "contacts.Contact":
@@ -81,8 +81,8 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     """Return the points of a patch whose contact set changes with heave and pitch of the upper piece.
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
-    pieces. The shear modes are weighted with mu_s times the preload plus ADDED_PRESSURE_FRACTION of its mean pressure, so
-    that nodes that are open at first also count. With m modes they are exact for any weights.
+    pieces. The shear modes are weighted with mu_s times the preload plus ADDED_WEIGHT_PRESSURE_FRACTION of its mean
+    pressure, so that nodes that are open at first also count. With m modes they are exact for any weights.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
         if weakening != 1:
             _choose_modes(patch, law.static * force, length, 1, 1.0, weakening)
         mean = force.sum() * weight / weight.sum()
-        limit = law.static * (force + mean * ADDED_PRESSURE_FRACTION)
+        limit = law.static * (force + mean * ADDED_WEIGHT_PRESSURE_FRACTION)
         shear = _choose_modes(patch, limit, length, n_modes, model.accuracy.tolerance)
 
     modes = model.rig.modes
@@ -174,7 +174,7 @@ def _choose_modes(
         limit,
         length,
         shear_modes.N_SHEAR_MODES,
-        MODES_TOLERANCE_RATIO * tolerance,
+        SHEAR_MODES_ERROR_RATIO * tolerance,
         weakening,
     )
 
@@ -229,9 +229,11 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
         law = f.model_copy(
-            update={"bond_length": COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide}
+            update={"bond_length": COULOMB_BOND_LENGTH_RATIO * tolerance * gross_slip_slide}
         )
-        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
+        length = (
+            max(COULOMB_BOND_LENGTH_RATIO * tolerance, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
+        )
 
     reduced = _choose_modes(patch, limit, length, n_modes, tolerance, _find_weakening(law))
 
@@ -294,7 +296,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
     """Return the shear modes of the contact points of a nonlocal law.
 
     If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
-    node then has OPEN_PRESSURE_FRACTION times the mean pressure of the loaded nodes.
+    node then has UNLOADED_NODE_PRESSURE_FRACTION times the mean pressure of the loaded nodes.
 
     Parameters
     ----------
@@ -318,7 +320,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
             # A single mode is computed first, because this rejects a patch that could jump at constant
             # displacement.
             _choose_modes(patch, limit * sigma, law.length, 1, tolerance, weakening)
-            sigma = np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch))
+            sigma = np.maximum(sigma, UNLOADED_NODE_PRESSURE_FRACTION * mean_loaded_pressure(patch))
         return _choose_modes(patch, limit * sigma, law.length, n_modes, tolerance, weakening)
 
     key = ("shear modes", patch, law, model.side, n_modes, tolerance)

@@ -22,7 +22,7 @@ from .engine import CLOSED_FORM, BenchEngine, BondListGuard, has_changing_pressu
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
-CREATED_ROUND_OFF = 1e-13
+CREATED_ENERGY_ROUND_OFF = 1e-13
 
 
 class SlideHistories(NamedTuple):
@@ -292,7 +292,7 @@ def stack_energies(work, stored, losses) -> np.ndarray:
     """
     steps = np.stack([work, np.maximum(losses, 0.0), np.maximum(-losses, 0.0)])
     work, dissipated, created = np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
-    if created[-1] <= CREATED_ROUND_OFF * dissipated[-1]:
+    if created[-1] <= CREATED_ENERGY_ROUND_OFF * dissipated[-1]:
         created = np.zeros(created.size)
     return np.stack([work, stored, dissipated, created])
 

@@ -13,7 +13,12 @@ from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, store
 from .condensed import condense, condense_once
-from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
+from .grids import (
+    MAX_CONDENSING_SECONDS,
+    MIN_NESTED_MESHES,
+    make_base_grids,
+    predict_condensing_seconds,
+)
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
 
@@ -122,7 +127,7 @@ def solve_on_refined_meshes(
 ) -> Patches:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
-    At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
+    At least MIN_NESTED_MESHES meshes are solved, because the error follows from the changes between them. Each
     mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
     time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
     measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
@@ -158,7 +163,7 @@ def solve_on_refined_meshes(
         patch = None
         if len(patches) < len(solved):
             patch = solved[-1 - len(patches)]
-        elif estimate or len(patches) == MIN_LEVELS - 1:
+        elif estimate or len(patches) == MIN_NESTED_MESHES - 1:
             try:
                 coarse = patches[0] if patches else None
                 pair = condense(patch_model, *grids)
@@ -171,7 +176,7 @@ def solve_on_refined_meshes(
 
         patches = (patch, *patches)
         grids = [grid.refine() for grid in grids]
-        if len(patches) < MIN_LEVELS:
+        if len(patches) < MIN_NESTED_MESHES:
             continue
 
         # The solution on the points of the profile is used with all finer meshes.

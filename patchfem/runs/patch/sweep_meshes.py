@@ -20,14 +20,14 @@ from .measures import max_mesh_error_ratio
 from .store import Key
 
 # Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
-MAX_LAYOUT_CASES = 48
+MAX_SPREAD_LAYOUT_CASES = 48
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 500
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
 # are of second order in their length.
-SINGLE_CASE_TOL = 1e-3
-N_FINER_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
-MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
+SINGLE_CASE_CELLS_TOL = 1e-3
+N_FINER_MESHES_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
+MAX_CELL_LENGTH_FACTOR = 4.0  # Largest factor on the cell lengths.
 
 
 def geometry_key(patch_model) -> Key:
@@ -87,7 +87,9 @@ def choose_shared_meshes(
     cell_factor = 1.0
     is_known = are_all_patches and is_complete
     if is_known and not (patch_model.mesh.edge_motion or has_partial_slip):
-        cell_factor = np.clip((tolerance / SINGLE_CASE_TOL) ** 0.5, 1.0, MAX_CELL_FACTOR)
+        cell_factor = np.clip(
+            (tolerance / SINGLE_CASE_CELLS_TOL) ** 0.5, 1.0, MAX_CELL_LENGTH_FACTOR
+        )
     pairs = _refine_until_tolerance_is_met(
         cases,
         grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
@@ -109,10 +111,10 @@ def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= MAX_LAYOUT_CASES:
+    if len(keys) <= MAX_SPREAD_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
-    even = np.linspace(0, len(keys) - 1, MAX_LAYOUT_CASES).round().astype(int)
+    even = np.linspace(0, len(keys) - 1, MAX_SPREAD_LAYOUT_CASES).round().astype(int)
     selected = np.unique([*even, *numbers.argmin(axis=0), *numbers.argmax(axis=0)])
     return [rows[keys[k]] for k in selected], False
 
@@ -158,12 +160,12 @@ def _refine_until_tolerance_is_met(
         From fine to coarse.
     """
     # Partial slip needs shorter cells than the static measures, which decide on the other meshes.
-    n_finer = N_FINER_FOR_SLIP if any(case.mesh.slip is not None for case in cases) else 0
+    n_finer = N_FINER_MESHES_FOR_SLIP if any(case.mesh.slip is not None for case in cases) else 0
     pairs = []
     while True:
         pairs.insert(0, condense_once(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
-        if len(pairs) < grids.MIN_LEVELS:
+        if len(pairs) < grids.MIN_NESTED_MESHES:
             continue
         is_too_large = bodies[0].x.size > MAX_INTERFACE_NODES
         if is_too_large or mesh_levels.is_too_expensive(cases[0], bodies):

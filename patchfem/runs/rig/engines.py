@@ -31,11 +31,13 @@ from .costs import prefers_time_steps
 from .solution import first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
-MERGE_WIDTH_FACTOR = 0.5
+COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
+COMPARISON_TAIL_FACTOR = (
+    0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
+)
 
 
 class Engine(NamedTuple):
@@ -200,7 +202,9 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
         finer = replace(
-            choice, merge=MERGE_WIDTH_FACTOR * choice.merge, tail=TAIL_FACTOR * choice.tail
+            choice,
+            merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
+            tail=COMPARISON_TAIL_FACTOR * choice.tail,
         )
         narrow = replace(quarter, choice=finer)
         same = replace(quarter, choice=choice)

@@ -32,7 +32,7 @@ from ..patch import faces, jenkins_elements
 from . import bond_lists, strips
 from .numerics import Numerics
 
-STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
+MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
 class Joint(NamedTuple):
@@ -232,7 +232,7 @@ def _find_stick_tolerance(joints, laws) -> float:
             lengths.append(keys.bond_length)
         elif keys.stiffness:
             lengths.append(keys.static * joint.load.mean / keys.stiffness)
-    return STUCK_SLIP * min(lengths, default=0.0)
+    return MAX_STUCK_SLIP_RATIO * min(lengths, default=0.0)
 
 
 # ---- march and harmonic balance

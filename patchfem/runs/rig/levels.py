@@ -22,14 +22,14 @@ from ...response.levels import (
     make_no_onset_reason,
     make_onset_test,
 )
-from ...response.rows import TABLE
+from ...response.rows import MOTION_TABLE
 from ...structure.drive_sizes import find_drive_omega
 from .solution import Fields
 
 # Relative error of the measures of an event-driven run, which has round-off only.
 EXACT_RELATIVE_ERROR = 1e-9
 # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
-MAX_BISECTIONS = 40
+MAX_ONSET_BISECTIONS = 40
 
 
 def add_level_errors(
@@ -100,7 +100,7 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | No
     first = levels[first]
     low = levels[before].drive if before >= 0 else 0.0
     high = first.drive
-    for _ in range(MAX_BISECTIONS):
+    for _ in range(MAX_ONSET_BISECTIONS):
         if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
@@ -133,7 +133,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     onset = find(solution)
     if onset is None:
         reason = make_no_onset_reason(*rig.drive.levels.onset)
-        return Measure(None, unit, None, TABLE["onset_level"].floor, reason=reason)
+        return Measure(None, unit, None, MOTION_TABLE["onset_level"].floor, reason=reason)
     level, error = onset
     for run, beside in solution.coarser:
         coarse_onset = find(run)

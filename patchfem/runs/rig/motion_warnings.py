@@ -26,7 +26,7 @@ from .solution import first_interface_load
 
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
-HALF_LIMIT_SPEED = 0.5493
+HALF_LIMIT_SPEED_RATIO = 0.5493
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -195,7 +195,7 @@ def note_on_creep(friction) -> list[str]:
         return []
     return [
         f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
-        f"creeps at {1e3 * HALF_LIMIT_SPEED * friction.reference_speed:.3g} mm/s"
+        f"creeps at {1e3 * HALF_LIMIT_SPEED_RATIO * friction.reference_speed:.3g} mm/s"
     ]
 
 

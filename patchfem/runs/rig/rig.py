@@ -25,7 +25,7 @@ from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
 from . import bond_lists, decays, flutter, levels
-from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
+from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
@@ -36,14 +36,14 @@ from .solve import Runner
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
+MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 # Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
-MIN_RELATIVE_ERROR = 1e-9
+MIN_MOTION_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
 # takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
-MAX_OTHER_WORK = 1e6
+MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
-PRESSING_WORK = 40.0
+PRESSING_STEP_WORK_RATIO = 40.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -186,7 +186,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     that is coarse in time, so that they need not be repeated: their errors are estimated once.
 
     The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
-    `response.errors.convergence_error`, plus MIN_RELATIVE_ERROR of the value (`add_errors`).
+    `response.errors.convergence_error`, plus MIN_MOTION_RELATIVE_ERROR of the value (`add_errors`).
     Afterwards `complete_measures` adds the errors that the run itself shows.
 
     Parameters
@@ -231,7 +231,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
-            solution.values, errors, min_relative_error=MIN_RELATIVE_ERROR, size=size
+            solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
         if solution.levels or model.rig.drive.kind == "free":
             coarser_runs = [*time_runs, *space_runs]
@@ -278,7 +278,8 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     """Decide whether a run is repeated with smaller steps, after runs with given excesses.
 
     It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
-    depend on the steps. Measures that are not main ones count in a run that takes little time (MAX_OTHER_WORK).
+    depend on the steps. Measures that are not main ones count in a run that takes little time
+    (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
     """
     numerics = run.numerics
     max_passes = _count_finer_passes(run)
@@ -293,11 +294,11 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     )
     work = numerics.steps * numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
-        work *= PRESSING_WORK
+        work *= PRESSING_STEP_WORK_RATIO
 
     tolerance = run.model.accuracy.tolerance
     measures = set_final_floors(complete_measures(run).measures, tolerance)
-    if work > MAX_OTHER_WORK:
+    if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if numerics.local else "steps"
@@ -319,7 +320,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
     """Return how many times a run can be repeated with smaller steps than before."""
     numerics = run.numerics
     if numerics.local:
-        return max(0, floor(log(numerics.local / MIN_STEP_ERROR, 100) + 1e-9))
+        return max(0, floor(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) + 1e-9))
     if (
         not ENGINES[numerics.engine].has_steps
         or run.model.accuracy.steps_per_cycle is not None
@@ -327,7 +328,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
         or run.solution.outcome in EARLY_OUTCOMES
     ):
         return 0
-    max_steps = min(MAX_MARCH_STEPS, MAX_RUN_STEPS / numerics.cycles)
+    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_RUN_STEPS / numerics.cycles)
     return max(0, floor(log2(max_steps / numerics.steps)))
 
 

@@ -18,7 +18,7 @@ from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import WearHistory
 from .evolve import (
-    THIN_FRACTION,
+    WORN_THROUGH_COATING_FRACTION,
     compute_mean_worn_depth,
     compute_worn_volume_and_depth,
     find_worn_through_coating,
@@ -29,9 +29,9 @@ from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
 # Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
 # which the stiffness of the unworn piece is valid.
-MAX_WORN_FRACTION = 0.2
+MAX_WORN_THICKNESS_FRACTION = 0.2
 WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
-HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
+MEASURE_BY_HOLDER_MOTION = {"closing": "approach", "rotation": "rotation"}
 
 
 def add_wear_measures(result, evolved, estimate: bool = True):
@@ -98,7 +98,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     deepest = int(np.argmax(last.depth))
     depth = float(last.depth.flat[deepest])
     rate = (depth - float(before.depth.flat[deepest])) / (last.cycle - before.cycle)
-    cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
+    cycle_error = None if error is None else (error + WORN_THROUGH_COATING_FRACTION * depth) / rate
     name = "worn_through_cycle"
     return {name: make_measure(name, last.cycle, cycle_error)}
 
@@ -156,7 +156,7 @@ def _warn_of_worn_depth(model, evolved) -> list[str]:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
     warnings = []
     for piece, name, depth in list_worn_pieces(model, evolved.state.depth):
-        if depth > MAX_WORN_FRACTION * (piece.thickness or piece.height):
+        if depth > MAX_WORN_THICKNESS_FRACTION * (piece.thickness or piece.height):
             size = "its height" if piece.coating is None else "the thickness of its coating"
             warnings.append(
                 f"up to {format_length(depth, 3)} is worn off the {name} piece, more than 0.2 of {size}, but the "
@@ -379,7 +379,7 @@ def _add_wear_frames(result, evolved):
         "time": result.fields["time"] + evolved.state.cycle * period,
         "worn_depth": np.repeat(evolved.state.depth[None], n_motion, axis=0),
     }
-    for field, name in HOLDER_MEASURES.items():
+    for field, name in MEASURE_BY_HOLDER_MOTION.items():
         wear[f"holder_{field}"] = [state.values[name] for state in states]
         motion[f"holder_{field}"] = np.full(n_motion, getattr(evolved.patch.pressure, name))
 

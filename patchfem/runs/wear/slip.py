@@ -27,11 +27,11 @@ UNBOUNDED_OUTCOMES = (
     Outcome.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED,
 )
-MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
+MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
 # Ratio of the error due to reversals between samples to the mean change of the path if only every
 # third sample is used.
-REVERSAL_ERROR_FACTOR = 1.5
+SLIP_PATH_REVERSAL_ERROR_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
@@ -134,7 +134,7 @@ class _PointSlip(NamedTuple):
         for first in range(3):
             samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
             changes.append(abs(float((path - self.integrate_path(samples)) @ force)))
-        return REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
+        return SLIP_PATH_REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
 
 
 def choose_frame_count(tolerance: float) -> int:
@@ -142,7 +142,7 @@ def choose_frame_count(tolerance: float) -> int:
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_CYCLE_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_CYCLE_FRAMES, MAX_CYCLE_FRAMES))
 
 
 def slips_uniformly(model) -> bool:
