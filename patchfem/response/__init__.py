@@ -74,7 +74,7 @@ PUBLIC = {
         "work_difference",
     ),
     "outcome": (
-        "RELATIVE_AMPLITUDE_ROUND_OFF",
+        "AMPLITUDE_ROUND_OFF",
         "OPEN_LOOP_MESSAGE",
         "describe_ringing",
         "find_ringing",

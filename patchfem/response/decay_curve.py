@@ -22,13 +22,13 @@ from .measures import ArrayPair, find_reversal_steps
 # Candidate spans of a fit: number of half cycles on either side of a point.
 CANDIDATE_HALF_SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 # Largest difference between the slopes fitted over two spans, in standard deviations.
-MAX_SLOPE_DIFFERENCE_IN_DEVIATIONS = 2.0
+MAX_SLOPE_DEVIATIONS = 2.0
 # Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is
 # chosen by means of the same data.
 INTERVAL_HALF_WIDTH_IN_DEVIATIONS = 2.5
 # Number of half cycles on either side from whose third differences the noise is estimated.
 NOISE_HALF_WIDTH_IN_HALF_CYCLES = 8
-RELATIVE_VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
+VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 # Largest speed at which a sample counts as a reversal, relative to the largest speed.
 REST_SPEED_TOL = 1e-12
 # Smallest half cycle that is not attributed to round-off, relative to the largest one.
@@ -121,7 +121,7 @@ def locate_reversals(time, position, speed) -> ArrayPair:
     reversal_positions = np.concatenate([position[resting_samples], inside.position])
     order = np.lexsort((reversal_positions, times))
     # a reversal with a jump of the force has two samples at the same time
-    min_interval = RELATIVE_VALUE_ROUND_OFF * float(np.ptp(time))
+    min_interval = VALUE_ROUND_OFF * float(np.ptp(time))
     order = order[np.diff(times[order], prepend=-np.inf) > min_interval]
     return times[order], reversal_positions[order]
 
@@ -303,9 +303,7 @@ def fit_slopes(values, noise) -> Slopes:
     is_accepted = ~np.isnan(slopes)
     for k in range(1, spans.size):
         excess = np.sqrt(np.maximum(noises[:k] ** 2 - noises[k] ** 2, 0.0))
-        limits = MAX_SLOPE_DIFFERENCE_IN_DEVIATIONS * excess + RELATIVE_VALUE_ROUND_OFF * np.abs(
-            slopes[:k]
-        )
+        limits = MAX_SLOPE_DEVIATIONS * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
         differs = (np.abs(slopes[k] - slopes[:k]) > limits).any(axis=0)
         is_accepted[k] &= is_accepted[k - 1] & ~differs
     longest = is_accepted.sum(axis=0) - 1
@@ -314,7 +312,8 @@ def fit_slopes(values, noise) -> Slopes:
     spread = noises[longest, points]
     span = spans[longest]
 
-    # A span that is too long shows the bias b m^2 of the longest accepted one.
+    # Curvature biases the slope over 2 m + 1 values by b m^2 with a constant b. Between the longest accepted span m and
+    # the next one n the slope therefore changes by b (n^2 - m^2), from which b m^2 follows.
     bias = np.abs(slopes[longest + 1, points] - slope)
     next_span = np.append(spans, 0)[longest + 1]
     bias /= np.where(spread > 0, (next_span / span) ** 2 - 1, 1.0)
@@ -324,9 +323,7 @@ def fit_slopes(values, noise) -> Slopes:
     # noise is estimated from the second difference.
     curvature = np.where(spread > 0, 0.0, np.abs(np.diff(values, 2)) / 2)
     bias = np.where(np.isnan(bias), curvature, bias)
-    error = (
-        INTERVAL_HALF_WIDTH_IN_DEVIATIONS * spread + bias + RELATIVE_VALUE_ROUND_OFF * np.abs(slope)
-    )
+    error = INTERVAL_HALF_WIDTH_IN_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
     return Slopes(slope, error, span)
 
 
@@ -337,11 +334,9 @@ def _add_damping_error(curve: DecayCurve) -> DecayCurve:
     logarithmic decrement per half cycle. The error is the change of the curve over this difference of
     amplitude.
     """
-    delta = (
-        np.pi * curve.damping / np.sqrt(np.maximum(1 - curve.damping**2, RELATIVE_VALUE_ROUND_OFF))
-    )
+    delta = np.pi * curve.damping / np.sqrt(np.maximum(1 - curve.damping**2, VALUE_ROUND_OFF))
     decrement = np.abs(np.gradient(np.log(curve.amplitude)))
-    min_decrement = np.maximum(np.abs(delta), RELATIVE_VALUE_ROUND_OFF)
+    min_decrement = np.maximum(np.abs(delta), VALUE_ROUND_OFF)
     fraction = delta**2 / 8 / np.maximum(decrement, min_decrement)
     errors = {}
     for name in ("frequency", "damping"):

@@ -2,7 +2,7 @@
 
 In a run that is coarser by a factor `ratio` (in steps, elements, cells of a density, harmonics, modes
 or the tolerance of a step), a measure changes by ratio**p - 1 times its error, where p is the order of
-convergence. The error estimate is therefore CONVERGENCE_SAFETY_FACTOR times the change divided by ratio**p - 1
+convergence. The error estimate is therefore ERROR_SAFETY_FACTOR times the change divided by ratio**p - 1
 (Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three
 runs with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed
 order depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md
@@ -20,7 +20,7 @@ from .measures import Measures, Values
 from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
-CONVERGENCE_SAFETY_FACTOR = 3.0
+ERROR_SAFETY_FACTOR = 3.0
 MIN_CONVERGENCE_ORDER = 1.0  # Lowest order of convergence in an estimate.
 # Highest order of convergence in an estimate, which is the order of the numerical methods.
 MAX_CONVERGENCE_ORDER = 2.0
@@ -57,7 +57,7 @@ def convergence_error(
 ):
     """Estimate the error of a value from its changes between successive runs.
 
-    The estimate is CONVERGENCE_SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
+    The estimate is ERROR_SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
     errors of a run and of the next coarser one.
 
     - Two runs (one change): growth = ratio**order.
@@ -94,7 +94,7 @@ def convergence_error(
         shows_order = (observed > growth) & (observed <= MAX_PLAUSIBLE_CHANGE_RATIO)
         growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_CONVERGENCE_ORDER), growth)
         largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_CONVERGENCE_ORDER)
-    error = (CONVERGENCE_SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
+    error = (ERROR_SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
     if len(coarser_changes) > 1:
         coarser_error = convergence_error(*coarser_changes, ratio=ratio, order=order)
         if abs(change) <= coarser_error:  # the value lies in the error interval of the coarser run

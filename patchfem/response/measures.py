@@ -17,15 +17,14 @@ ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
 MAX_STICKING_SLIP_FRACTION = 0.5
-RELATIVE_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
+COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
 MIN_ENERGY_DIFFERENCE = 1e-18  # Smallest significant difference of energies [J].
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
 RELATIVE_WORK_ROUND_OFF = 1e-10
 STEP_FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
-MAX_RESTING_SLIDE_RANGE = (
-    1e-15  # Largest range of the relative displacement [m] of an interface at rest.
-)
+# Largest range of the relative displacement [m] of an interface at rest.
+MAX_RESTING_SLIDE_RANGE = 1e-15
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_CURVATURE_RATIO = 4.0
 
@@ -82,14 +81,16 @@ def ratio_or_zero(part, total):
 
 
 def compute_harmonic(time, weight, values, omega) -> complex:
-    """Return the Fourier coefficient of sampled values at the drive frequency.
+    """Return the complex amplitude c of sampled values f(t) at the drive frequency: f(t) ~ Re(c exp(i omega t)).
+
+    c = 2/T int f(t) exp(-i omega t) dt over the span T of the samples, by a quadrature.
 
     Parameters
     ----------
     time : (k,)
-        Times [s].
+        Times [s], whole periods.
     weight : (k,)
-        Weights of the quadrature.
+        Weights of the quadrature; their sum is arbitrary.
     values : (k,)
         Samples; the result has the same unit.
     omega : float
@@ -99,16 +100,17 @@ def compute_harmonic(time, weight, values, omega) -> complex:
 
 
 def compute_step_harmonic(time, means, omega) -> complex:
-    """Return the Fourier coefficient of a force from its mean value in each time step.
+    """Return the complex amplitude c [N] of a force F(t) from its means in the time steps: F(t) ~ Re(c exp(i omega t)).
 
-    The result is exact for a force that is constant in each step, even if it jumps at a sample.
+    c = 2/T int F(t) exp(-i omega t) dt over the span T of the steps. It is exact for a force that is constant in each
+    step, even if it jumps at a sample.
 
     Parameters
     ----------
     time : (k,)
-        Times [s].
+        Times [s], from the first sample to the last one, whole periods.
     means : (k - 1,)
-        Mean of the force in each step.
+        Mean of the force in each step [N].
     omega : float
         Angular frequency [rad/s].
     """
@@ -148,7 +150,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip_steps = np.abs(np.diff(slip[last_cycles]))
     slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
-    is_moving = slide_steps > RELATIVE_COORDINATE_ROUND_OFF * np.abs(window.slide).max()
+    is_moving = slide_steps > COORDINATE_ROUND_OFF * np.abs(window.slide).max()
     ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
     excess = ratio - MAX_STICKING_SLIP_FRACTION
 
@@ -174,7 +176,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
 def slip_round_off(window: Response) -> float:
     """Return the round-off error of the slip [m]."""
-    return RELATIVE_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
+    return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start_measure(phases) -> Values:
@@ -201,10 +203,10 @@ def compute_ledger_measures(ledger) -> Values:
 
 
 def work_difference(work, loops, jumps: bool = False) -> float:
-    """Return the relative difference [1] between the friction works of energies and samples.
+    """Return the relative difference [1] between the friction work of the engine and int F dx over the samples.
 
-    The difference between the trapezoidal rule and `work` is divided by the sum of |work| over all steps.
-    It decreases with the square of the step size.
+    |sum of int F dx over all directions by the trapezoidal rule - work| / (sum over all steps of |change of work|). It
+    decreases with the square of the step size, and shows whether the samples resolve the loop.
 
     Parameters
     ----------

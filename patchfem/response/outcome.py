@@ -29,7 +29,7 @@ OPEN_LOOP_MESSAGE = "the friction loop of the last cycle does not close"
 PROPOSED_CYCLES_SAFETY_FACTOR = 1.5
 MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
 # Round-off error of an amplitude, relative to the displacement a/omega^2 of the drive.
-RELATIVE_AMPLITUDE_ROUND_OFF = 1e-12
+AMPLITUDE_ROUND_OFF = 1e-12
 
 
 def judge_outcome(
@@ -98,7 +98,7 @@ def judge_outcome(
     window = _count_window_cycles(solution, drive)
     windows = measure_windows(extremes, window)
     scale = drive_sizes.find_max_acceleration(drive) / drive_sizes.find_drive_omega(drive) ** 2
-    floor = RELATIVE_AMPLITUDE_ROUND_OFF * scale
+    floor = AMPLITUDE_ROUND_OFF * scale
     amplitude = measures[AMPLITUDE]
 
     # The criteria are vectorized over motions, of which there is one.

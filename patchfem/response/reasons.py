@@ -18,7 +18,7 @@ ACCELERATION_MEASURES = ("absolute_acceleration_fundamental", "acceleration_dist
 # Largest contribution of other modes to the relative displacement, as a fraction, at which the
 # damping ratio is attributed to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
-PERIODIC_MOTION_MEASURES = (
+PERIODIC_MEASURES = (
     "equivalent_stiffness",
     "secant_stiffness",
     "equivalent_damping",
@@ -68,7 +68,7 @@ def find_missing(
         Fraction of the relative displacement due to modes other than the first [1].
     """
     reasons = {}
-    for name in PERIODIC_MOTION_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
+    for name in PERIODIC_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
         reasons[name] = _reason_for_missing_cycle_value(
             name, values, window, drive, other_modes_fraction
         )
@@ -131,12 +131,13 @@ def find_invalid(
 
 
 def _list_open_loops(measures: Measures, window, drive) -> list[str]:
-    """Return the names of the areas of friction loops that are not closed.
+    """Return the names of those measures loop_area, loop_area_2, ... whose friction loop is not closed.
 
     The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a release, the
     interface also stores or returns energy. If this exceeds the dissipation, the area has no meaning. For several
     interfaces, only the sum of the energies is known: a loop does not close if its interface returns more energy than it
-    takes although no energy is created. `window` has the histories of the last cycles with the sums of energy.
+    takes although no energy is created. `measures` are those of the run by name, `drive` has the period, and `window` has
+    the histories of the last cycles with the sums of energy.
     """
     ledger = window.extra.get("ledger")
     loop = measures.get("loop_area")

@@ -32,11 +32,7 @@ from .measures import (
     compute_slip_measures,
     energy_balance,
 )
-from .spectrum import (
-    MIN_MOVING_ACCELERATION_HARMONIC,
-    find_acceleration_harmonics,
-    make_acceleration_measures,
-)
+from .spectrum import MIN_MOVING_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +50,11 @@ class LastCycles:
     - integrated: measures that the engine integrated.
     - loop: first harmonics of relative displacement [m] and friction force [N], and work per cycle
       [J]; None if the window contains no complete cycle.
-    - ledger (4, k): friction work and energies [J], or None.
+    - ledger (4, k): friction work, and stored, dissipated and created energy [J] of the whole run, or None.
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - is_single_interface: whether the interfaces are parts of a single one.
+    - is_single_interface: whether the columns `slides` of the window are strips of a single interface.
     """
 
     window: Response
@@ -142,7 +138,10 @@ class LastCycles:
         )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure, or None if it has none, as one of a sine under another drive."""
+        """Return the value of a measure by its row in the table, in the unit of the row.
+
+        None if it has no value: measures with the flag "sine" have none under a drive that is no sine.
+        """
         if row.has("sine") and not self.is_sine:
             return None
         if isinstance(row.function, str):
@@ -292,7 +291,7 @@ MOTION_MEASURE_ROWS = (
     MeasureDefinition(
         "absolute_acceleration_fundamental",
         "m s-2",
-        MIN_MOVING_ACCELERATION_HARMONIC,
+        MIN_MOVING_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
         "acceleration_measures",
         flags="level curve sine",

@@ -9,9 +9,8 @@ import numpy as np
 
 from .measures import Values
 
-MIN_MOVING_ACCELERATION_HARMONIC = (
-    1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
-)
+# Smallest first harmonic [m s-2] of an output that counts as moving.
+MIN_MOVING_HARMONIC = 1e-4
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
@@ -124,7 +123,7 @@ def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> 
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
     """
-    is_moving = first_harmonic > MIN_MOVING_ACCELERATION_HARMONIC
+    is_moving = first_harmonic > MIN_MOVING_HARMONIC
     return {
         "absolute_acceleration_fundamental": float(first_harmonic),
         "acceleration_distortion": third_harmonic / first_harmonic if is_moving else None,

@@ -62,7 +62,7 @@ PUBLIC = {
         "compute_pieces",
     ),
     "plan": (
-        "GROUPS",
+        "DIMENSIONLESS_GROUPS",
         "Plan",
     ),
     "results.patch_rows": (

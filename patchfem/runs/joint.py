@@ -230,7 +230,11 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
 def _match_stiffness(
     patches: Sequence, stiffness: StickStiffness | None, n_errors: int
 ) -> list[Patch | None]:
-    """Return patches with a given stiffness in full stick, plus a number of its errors."""
+    """Return patches whose tangential stiffness in full stick is `stiffness.value + n_errors * stiffness.error`.
+
+    With `n_errors` = 1 a comparison run shows the effect of the error of the stiffness. Patches without load, and all
+    patches if `stiffness` is None, are unchanged; None stands for a missing mesh.
+    """
     if stiffness is None:
         return list(patches)
     out = []
@@ -246,6 +250,7 @@ def _match_stiffness(
 def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray:
     """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
 
+    `bond_length` [m] is that of the friction law, whose bonds are in series with the pieces; 0 for rigid contact.
     Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
     such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """

@@ -14,17 +14,15 @@ from .plan import Plan
 from .rig import engines, numerics
 
 PROGRAM_BYTES = 160e6  # packages and compiled code [bytes]
-# Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
-NODE_BYTES = {True: 4.6e3, False: 8.1e3}
+BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them [bytes]
+BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion [bytes]
 BYTES_PER_STRIP_NODE = 3e3  # per strip and interface node [bytes]
 BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide [bytes]
-BYTES_PER_MODE_PAIR = (
-    125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
-)
+# Per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
+BYTES_PER_MODE_PAIR = 125.0
 BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive [bytes]
-BYTES_PER_HARMONIC_PAIR = (
-    94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
-)
+# Per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
+BYTES_PER_HARMONIC_PAIR = 94.0
 HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
@@ -78,7 +76,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     if any(patch.mesh.file for patch in patches):
         remedy = "give contact.mesh fewer nodes on the interface"
 
-    size = NODE_BYTES[model.kind == "patch"] * nodes
+    size = nodes * (BYTES_PER_STATIC_NODE if model.kind == "patch" else BYTES_PER_MOVING_NODE)
     parts = [
         MemoryPart(PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),

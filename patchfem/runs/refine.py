@@ -29,9 +29,8 @@ STEP_COST_RATIO = 2.0
 PASS_ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
 MIN_PASS_ERROR_GAIN = 1.5
-MIN_AXIS_ERROR_FRACTION = (
-    0.5  # Smallest share of an axis in an error that its refinement reduces noticeably.
-)
+# Smallest share of an axis in an error that its refinement reduces noticeably.
+MIN_AXIS_ERROR_FRACTION = 0.5
 MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
 MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.

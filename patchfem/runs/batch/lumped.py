@@ -24,12 +24,8 @@ from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
 from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
-from ...response.outcome import RELATIVE_AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
-from ...response.reasons import (
-    CHANGE_NOT_RESOLVED_REASON,
-    STICKS_AT_REVERSAL_REASON,
-    find_missing,
-)
+from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
+from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
 from ...response.rows import (
     AMPLITUDE,
     INTERNAL_VALUES,
@@ -319,7 +315,10 @@ def estimate_errors(
 
 
 def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
-    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
+    """Return the absolute part (n,) of the allowed error of a measure, in its unit.
+
+    The allowed error is the tolerance times the value plus this floor. A small difference of large terms cannot have a
+    small relative error, so that the floor is at least the tolerance times these terms (`response.rows.larger_term`).
 
     Parameters
     ----------
@@ -339,7 +338,7 @@ def _select(record, rows):
     if isinstance(record, dict):
         return {name: value[rows] for name, value in record.items()}
     return type(record)(
-        *(_select(one, rows) if isinstance(one, dict) else one[rows] for one in record)
+        *(_select(field, rows) if isinstance(field, dict) else field[rows] for field in record)
     )
 
 
@@ -461,7 +460,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
             march.phasors,
             window,
             scales.tolerance,
-            RELATIVE_AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
+            AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
             scales.decay * window * 2 * np.pi / omega,
         )
 

@@ -18,10 +18,8 @@ from ..results.result import collect_used_settings
 from ..run import run
 from .case_results import CaseResults
 
-FAILED_CASE_ERRORS = (
-    PatchfemError,
-    MemoryError,
-)  # errors caused by a case, not by a fault of the program
+# Errors that a case causes, and not a fault of the program.
+FAILED_CASE_ERRORS = (PatchfemError, MemoryError)
 NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 

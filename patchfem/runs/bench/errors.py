@@ -17,11 +17,7 @@ from ...response.coarser import (
     list_step_runs,
     second_order_errors,
 )
-from ...response.errors import (
-    convergence_errors,
-    finer_errors,
-    friction_errors,
-)
+from ...response.errors import convergence_errors, finer_errors, friction_errors
 from ...slip import shear_modes
 from ..results.patch_rows import Values
 from . import bench, shear

@@ -22,10 +22,7 @@ from ..results.result import (
     SlipRule,
     make_interface_frames,
 )
-from ..results.travel import (
-    check_pieces_overlap,
-    warn_of_large_slide,
-)
+from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from . import bench, shear
 from .engine import nodal_element_limit, steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors

@@ -228,12 +228,9 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
-        law = f.model_copy(
-            update={"bond_length": COULOMB_BOND_LENGTH_RATIO * tolerance * gross_slip_slide}
-        )
-        length = (
-            max(COULOMB_BOND_LENGTH_RATIO * tolerance, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
-        )
+        ratio = COULOMB_BOND_LENGTH_RATIO * tolerance
+        law = f.model_copy(update={"bond_length": ratio * gross_slip_slide})
+        length = max(ratio, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
 
     reduced = _choose_modes(patch, limit, length, n_modes, tolerance, _find_weakening(law))
 
@@ -259,13 +256,13 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     """
     reduction = contact.reduction
     index = np.arange(patch.x.size) if reduction is None else reduction.points
-    slide = np.array([one.slide for one in snapshots])[:, None]
+    slide = np.array([snapshot.slide for snapshot in snapshots])[:, None]
     shape = (len(snapshots), index.size)
-    forces = np.reshape([one.forces for one in snapshots], shape)
-    elastic = np.reshape([one.stretch + one.bend for one in snapshots], shape)
+    forces = np.reshape([snapshot.forces for snapshot in snapshots], shape)
+    elastic = np.reshape([snapshot.stretch + snapshot.bend for snapshot in snapshots], shape)
     if contact.grooves is not None:
         slope = contact.grooves.slope(slide)
-        vertical = np.array([one.vertical for one in snapshots])[:, None]
+        vertical = np.array([snapshot.vertical for snapshot in snapshots])[:, None]
         loads = contact.point_sets[0].law.load
         length = np.hypot(1.0, slope)
         forces = vertical * loads / loads.sum() * slope + forces * length

@@ -176,9 +176,10 @@ def _slide_on_faces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _find_limits(task: SlideTask, load, direction: float) -> np.ndarray:
-    """Return the largest forces (k,) [N] against a motion to +x (`direction` 1) or to -x (-1) at all samples.
+    """Return the friction limits (k,) [N] of a motion to +x (`direction` 1) or to -x (-1) at all samples.
 
-    Only an averaged pressure depends on more than the load (k,) [N].
+    The limit is mu N with the load N (k,) [N]. If the law acts on a pressure that is averaged along x, it is the sum of
+    the nodal limits, which depends on the position of the averaging windows, i.e. on the slide of `task`.
     """
     coefficient = _find_coefficient(task)
     if not _averages_pressure(task):
@@ -321,7 +322,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     slip = motion.slip
     frames = task.frames
     if jenkins_set is not None:
-        states = [(one.slide, one.stretch) for one in motion.snapshots]
+        states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
         length = make_law(model.friction, 1.0).element(1.0).length
         tau, local = fields.element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
@@ -345,7 +346,15 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
 
 
 def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
-    """Return the elastic stretch [m] of springs of one bond length under forces and normal loads, or stresses."""
+    """Return the elastic stretch [m] of bonds: the bond length times the force relative to the friction limit.
+
+    Parameters
+    ----------
+    task : SlideTask
+        Task whose friction law has the coefficient and the bond length.
+    force, load : (k,) or (k, m) array
+        Friction force and normal load [N] of the interface, or shear and normal stress [Pa] of its nodes.
+    """
     limit = task.model.friction.static * load
     share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
     return (task.model.friction.bond_length or 0.0) * share

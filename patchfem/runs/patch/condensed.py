@@ -11,10 +11,7 @@ import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
 from ...elasticity import mortar
-from ...elasticity.elasticity import (
-    Piece,
-    interface_compliance,
-)
+from ...elasticity.elasticity import Piece, interface_compliance
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 from . import store

@@ -28,14 +28,6 @@ N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
 MAX_GRID_COLUMNS = 120
-# Each of the following dicts has a value for a fine mesh (True) and for that of a patch in a rig or with wear (False), which
-# gets fewer nodes, because every node slows down each time step or jump (`PatchMesh.is_fine`).
-CELL_GROWTH = {
-    True: 0.5,
-    False: 0.9,
-}  # Growth of the cell length with distance on the coarsest grid [1].
-# Ratio of the contact length to the cell length at the contact edges, on the coarsest grid.
-EDGE_CELLS = {True: 20, False: 10}
 # Smallest ratio of cell length to interface length on the coarsest grid. For an interface of 10 mm this is a cell of 40 pm,
 # whose length, a difference of coordinates, still has about 7 digits.
 MIN_CELL_LENGTH_RATIO = 4e-9
@@ -54,9 +46,8 @@ N_SEARCH_CELLS_IN_SMALL_CONTACT = 64
 N_CELLS_PER_WAVELENGTH = 16
 # Smallest local pressure maximum, relative to the peak pressure, around which the mesh is refined.
 MIN_REFINED_PRESSURE_RATIO = 0.3
-N_CELLS_PER_PRESSURE_HALF_WIDTH = (
-    4  # Number of cells of the coarsest grid per half-width of a pressure maximum.
-)
+# Number of cells of the coarsest grid per half-width of a pressure maximum.
+N_CELLS_PER_PRESSURE_HALF_WIDTH = 4
 # Number of cells in a slip zone on the coarsest grid; the third grid has 16, which give the work to
 # about 1 %.
 N_CELLS_PER_SLIP_ZONE = 4
@@ -68,19 +59,37 @@ MAX_WAVE_CELL_RATIO = 2.0
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
 MAX_CONTACT_SEARCHES = 8
-MIN_NESTED_MESHES = (
-    3  # Smallest number of nested meshes at which the order of convergence is known.
-)
-# Largest predicted CPU time [s] of condensing a mesh, by whether the mesh is a fine one; more
-# expensive meshes are not tried.
-MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
-CONDENSING_SECONDS_PER_NODE = (
-    4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^CONDENSING_NODE_EXPONENT
-)
+# Smallest number of nested meshes at which the order of convergence is known.
+MIN_NESTED_MESHES = 3
+# CPU time [s] of condensing a mesh over (number of nodes)^CONDENSING_NODE_EXPONENT
+CONDENSING_SECONDS_PER_NODE = 4.2e-6
 CONDENSING_NODE_EXPONENT = 1.1
 
 Pairs = tuple[tuple[float, float], ...]  # (start, end) or (position, half-width) [m]
 Bands = list[tuple[float, float, float]]  # (from, to, cell length) [m], as in `Layout.bands`
+
+
+class GridDensity(NamedTuple):
+    """How short the cells of a coarsest grid are, and how many nodes its finer grids may have.
+
+    - cell_growth: growth of the cell length with the distance from the contact [1].
+    - n_edge_cells: ratio of the contact length to the cell length at the contact edges.
+    - max_condensing_seconds: largest predicted CPU time [s] of condensing a mesh; more expensive ones are not tried.
+    """
+
+    cell_growth: float
+    n_edge_cells: int
+    max_condensing_seconds: float
+
+
+FINE_GRID_DENSITY = GridDensity(0.5, 20, 3.6)
+# For a patch in a rig or with wear: every node slows down each time step or jump.
+COARSE_GRID_DENSITY = GridDensity(0.9, 10, 0.8)
+
+
+def choose_density(patch_model) -> GridDensity:
+    """Return the density of the grids of a patch, which depends on whether the mesh takes most of the time of its run."""
+    return FINE_GRID_DENSITY if patch_model.mesh.is_fine else COARSE_GRID_DENSITY
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -191,10 +200,10 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
         if not solved:
             break
         contact = solved[0][1][0]
-        layout = _merge_layouts([make_column_layout(*one) for one in solved])
+        layout = _merge_layouts([make_column_layout(case, extents) for case, extents in solved])
 
         # The search ends when this grid has resolved all contacts.
-        max_ratio = 1 / (EDGE_CELLS[first.mesh.is_fine] - 1)
+        max_ratio = 1 / (choose_density(first).n_edge_cells - 1)
         is_resolved = True
         for case, extents in solved:
             edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
@@ -260,7 +269,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     length = patch_model.pieces.length
     half = length / 2
     mesh = patch_model.mesh
-    n_edge_cells = EDGE_CELLS[mesh.is_fine]
+    density = choose_density(patch_model)
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
 
@@ -277,7 +286,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     # A contact of one or two nodes is searched for again with shorter cells.
     n_contact_cells = N_SEARCH_CELLS_IN_SMALL_CONTACT
     if np.isfinite(max(extent.cell for extent in extents)):
-        n_contact_cells = n_edge_cells
+        n_contact_cells = density.n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
     # contact set.
     coating_cell = coating / 4 if mesh.edge_motion != "load" else np.inf
@@ -294,7 +303,8 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         if span[0] - min_cell <= place <= span[1] + min_cell:
             bands.append((place, place, min(min_cell, rounding_length / 4)))
 
-    # Peaks of the pressure and zones of slip each have a number of cells.
+    # The half-width of a pressure maximum on a wavy surface, and a slip zone, are divided into at least
+    # N_CELLS_PER_PRESSURE_HALF_WIDTH and N_CELLS_PER_SLIP_ZONE cells.
     corner_factor = EDGE_TO_GAP_STEP_CELL_RATIO if patch_model.has_singular_ends else 1
     has_waves = _max_wave_cell(patch_model) < np.inf
     for extent in extents if has_waves else ():
@@ -311,7 +321,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     corner_cell = max(
         min(
             coating / 16,
-            width / n_edge_cells / corner_factor,
+            width / density.n_edge_cells / corner_factor,
         ),
         MIN_CELL_LENGTH_RATIO * length,
     )
@@ -326,7 +336,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[mesh.is_fine],
+        density.cell_growth,
     )
 
 
@@ -468,7 +478,7 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
         x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
-    growth = CELL_GROWTH[patch_model.mesh.is_fine]
+    growth = choose_density(patch_model).cell_growth
     pieces = patch_model.pieces.both
     grids = []
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:

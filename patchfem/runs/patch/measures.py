@@ -43,16 +43,13 @@ from .values import (
 MIN_PLANE_STRAIN_WIDTH_RATIO = 8.0
 # Smallest number of contact nodes at which the measures no longer depend on it.
 MIN_RESOLVED_CONTACT_NODES = 12
-MAX_UNRESOLVED_CONTACT_NODES = (
-    3  # Largest number of nodes of a contact that counts as not resolved.
-)
+# Largest number of nodes of a contact that counts as not resolved.
+MAX_UNRESOLVED_CONTACT_NODES = 3
 CONTACT_SOLUTION_ROUND_OFF = 5e-12  # Relative round-off error of the solved contact equations.
-MIN_REPORTED_RELATIVE_ERROR = (
-    1e-9  # Smallest relative error that is reported; no application needs a smaller one.
-)
-MIN_CONTACT_EDGE_ERROR_IN_CELLS = (
-    0.012  # Smallest position error of a contact edge, in cell lengths.
-)
+# Smallest relative error that is reported; no application needs a smaller one.
+MIN_REPORTED_RELATIVE_ERROR = 1e-9
+# Smallest position error of a contact edge, in cell lengths.
+MIN_CONTACT_EDGE_ERROR_IN_CELLS = 0.012
 # Ratio of the remaining increase of a corner pressure to its change by the last refinement.
 CORNER_PRESSURE_RISE_FACTOR = 4.0
 # Fraction of the corner pressure of a coating that cells longer than the coating thickness miss.
@@ -355,7 +352,7 @@ class Resolution(NamedTuple):
     - n_nodes: nodes in contact.
     - longest_cell, edge_cells: longest cell in which the contact ends, and the sum of all such
       cells [m].
-    - edge_offset: position error of a contact edge, in cells.
+    - edge_offset: position error of a contact edge, in cells; None under a smooth asperity layer, where it has no edge.
     - can_rotate: whether the rotation is free.
     - closing: range of the gap plus the largest elastic displacement [m].
     - corner_pressure: pressure [Pa] at loaded corners of a coating that the mesh misses.
@@ -453,7 +450,8 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
 
-    # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
+    # Errors add up over the edges of the contact: half of all their cells, but at least the longest one. The centre of a
+    # resolved contact is far more accurate than its edges, because their position errors are alike.
     cell = max(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES
     centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
@@ -463,7 +461,8 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
         peak_error = peak_error + peak / (4 * n_nodes**2)
     peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
 
-    # Displacements have round-off, and a wrong centre times the angle of rotation. A prescribed rotation has neither.
+    # A nodal displacement has the round-off of its terms, and an error of the centre times the angle of rotation. A
+    # prescribed rotation has neither error.
     displacement = CONTACT_SOLUTION_ROUND_OFF * (abs(finest["approach"]) + resolution.closing)
     displacement += abs(finest["rotation"]) * centre_error
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
@@ -567,8 +566,8 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
 def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
     """Format the changes of the measures from the assumed plane state to the opposite one.
 
-    The values are the static measures in the assumed and in the opposite state, by name. Changes of up to 0.1 % are left
-    out. If the approach is given, the load is a measure that changes.
+    `values` and `other_values` are the static measures in the assumed and in the opposite state, by name. Changes of up to
+    0.1 % are left out. If the scene of `patch_model` prescribes the approach, the load is a measure that changes.
     """
     changes = []
     names = MEASURES_BETWEEN_PLANE_STATES

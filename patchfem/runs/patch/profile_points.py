@@ -42,9 +42,8 @@ from .measures import (
 from .press import PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
-MIN_POINT_LEVELS = (
-    3  # Smallest number of refinement levels at which the order of convergence is known.
-)
+# Smallest number of refinement levels at which the order of convergence is known.
+MIN_POINT_LEVELS = 3
 # Largest number of points of a level; more would exceed the CPU time of a patch.
 MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
@@ -54,9 +53,8 @@ MIN_COARSEST_LEVEL_POINTS = 500  # Smallest number of points of the coarsest lev
 END_CELL_LENGTH_RATIO = 1e-4
 MIDDLE_CELL_LENGTH_RATIO = 1 / 30  # The same ratio in the middle of the interface.
 POINT_CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
-CONTACT_RESIDUAL_TOL = (
-    3e-8  # Largest relative residual at which the contact problem counts as solved.
-)
+# Largest relative residual at which the contact problem counts as solved.
+CONTACT_RESIDUAL_TOL = 3e-8
 MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
 CORNER_LENGTH_RATIO = 1e-3
@@ -191,10 +189,13 @@ def _combine_refinement_series(
 ) -> Measures:
     """Combine two series of refinements into one estimate of each measure.
 
-    The first series halves the cells at the ends. The second doubles the points, with the shortest
-    of these cells. The extrapolation of the first series and its error are added to the second.
+    The first series (`end_levels`) halves the cells by which the compliance of the free ends is computed. The second
+    (`point_levels`) doubles the points, with the shortest of these cells. With the limits p of the points and e of the
+    ends, and the value e_n of the last end level, a measure is p + (e - e_n); the errors of both limits add up. A peak
+    that may be at a free corner is left out, because the points do not resolve it.
     """
     finest = point_levels[-1]
+    # Errors that a refinement does not show, such as that of a contact of few points.
     hidden_errors = estimate_hidden_errors(finest.resolution, finest.values)
     by_points = extrapolate_static_measures(
         [level.values for level in point_levels], hidden_errors, 0.0

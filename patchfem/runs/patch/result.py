@@ -116,7 +116,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
         materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
     strains = {
         "the peak pressure is {:.3g} of the lowest Young's modulus": (
-            patch.pressure.sigma_n.max(initial=0.0) / min(one.young for one in materials)
+            patch.pressure.sigma_n.max(initial=0.0) / min(material.young for material in materials)
         ),
         "the approach is {:.3g} of the total height of the two pieces": (
             patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)

@@ -99,15 +99,22 @@ def choose_shared_meshes(
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
-    """Select patches that differ from each other by load or surface shape, and those with the extremes of every number.
+    """Select the patches that determine the meshes of a sweep: at most MAX_SPREAD_LAYOUT_CASES, and the extreme ones.
 
-    Of many patches, those at equal distances in their order by these numbers are selected. The result does not depend
-    on the order in which they are given. The second result is True if all patches are selected.
+    Each patch has a row of numbers: its load, the lengths of its surface shapes, and its asperities. Patches with equal
+    rows count once. Of many rows, sorted, equally spaced ones are selected, and those in which any of the numbers is the
+    smallest or the largest. The result does not depend on the order of the patches.
 
     Parameters
     ----------
     patches : sequence of PatchModel
         Patches of equal geometry.
+
+    Returns
+    -------
+    selected : list of PatchModel
+    are_all_patches : bool
+        Whether no row was left out.
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
@@ -120,12 +127,18 @@ def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
 
 
 def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
-    """Return the load and gap parameters that may differ between patches of one mesh geometry."""
+    """Return the numbers [SI units] that may differ between patches of one mesh geometry: loads, shapes, asperities."""
     interface = patch_model.interface
     shapes = tuple(tuple(part) for _, part in patch_model.gap.shapes)
     skin = tuple(interface.skin or ())
-    own = (astuple(patch_model.loading), patch_model.mesh.slip, interface.strips, shapes, skin)
-    return tuple(_list_numbers(own))
+    parameters = (
+        astuple(patch_model.loading),
+        patch_model.mesh.slip,
+        interface.strips,
+        shapes,
+        skin,
+    )
+    return tuple(_list_numbers(parameters))
 
 
 def _list_numbers(value) -> list[float]:

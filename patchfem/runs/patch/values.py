@@ -253,7 +253,7 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
 
 
 def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
-    """Return the contact edges of one strip, with their fractions between two nodes.
+    """Return the contact edges of one strip of a solved patch, with their positions between two nodes.
 
     `strip` is the number of the strip, 0 without strips, and `pressed` the factor of its nodes in contact.
     """

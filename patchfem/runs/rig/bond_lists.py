@@ -37,9 +37,8 @@ MAX_LISTED_STRIPS_PER_STEP = 0.1
 # Largest number of strips, at about one per step, at which steps are halved again; each halving
 # makes the run four times as expensive.
 MAX_HALVED_STRIPS = 500
-MAX_BOND_VIBRATION_PHASE = (
-    2.0  # Largest phase [rad] per step of the vibration of the block on its bonds.
-)
+# Largest phase [rad] per step of the vibration of the block on its bonds.
+MAX_BOND_VIBRATION_PHASE = 2.0
 
 
 @lru_cache(maxsize=8)
@@ -72,9 +71,10 @@ def has_bond_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Choose the bond summation for the requested engine, which may be "auto".
+    """Choose the bond summation (`friction.bonds`) for the requested engine, which may be "auto".
 
-    `stretch` is the displacement of a block held by its bonds, in bond lengths. `numerics` has the steps per cycle.
+    The error of a summation depends on the stroke between two reversals: 4 times the displacement amplitude of the drive,
+    but at most that of a block held by its bonds (`stretch`), both in bond lengths. `numerics` has the steps per cycle.
     """
     law = model.bonds
     accuracy = model.accuracy

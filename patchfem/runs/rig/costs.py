@@ -22,17 +22,14 @@ from ...structure.drive_sizes import find_max_frequency_ratio
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_HYBRID_SECONDS_UNRESOLVED = 60.0  # The same if time steps cannot resolve the modes.
-HYBRID_COST_WITH_COMPARISON = (
-    1.7  # Steps of a run and its comparison run, relative to those of the run.
-)
-MIN_STEPS_PER_SHORTEST_PERIOD = (
-    12  # Smallest number of steps of `hybrid` per shortest period of the drive.
-)
+# Steps of a run and its comparison run, relative to those of the run.
+HYBRID_COST_FACTOR = 1.7
+# Smallest number of steps of `hybrid` per shortest period of the drive.
+MIN_STEPS_PER_SHORTEST_PERIOD = 12
 HYBRID_STEPS_PER_RADIAN = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
 HYBRID_STEPS_PER_EVENT = 3.0
-MAX_HYBRID_STEP_RELAXATION_TIMES = (
-    4.0  # Largest stable step of `hybrid` in relaxation times of a law.
-)
+# Largest stable step of `hybrid` in relaxation times of a law.
+MAX_HYBRID_STEP_RELAXATION_TIMES = 4.0
 MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 # Keys of [accuracy] that select constant time steps.
@@ -140,7 +137,8 @@ def estimate_hybrid_steps(model: Model) -> float:
 
     # The explicit method follows the fastest decay of a law.
     rate = max(
-        [_estimate_decay_rate(model, one, mobility) for one in rig.friction.interfaces] or [0.0]
+        [_estimate_decay_rate(model, interface, mobility) for interface in rig.friction.interfaces]
+        or [0.0]
     )
     rate += float(np.abs(modes.damping_matrix).sum(axis=1).max())
     return (
@@ -178,9 +176,7 @@ def estimate_hybrid_seconds(model: Model) -> float:
         + cost_model.HYBRID_MODES_SECONDS * n_modes**2
         + cost_model.HYBRID_INTERFACES_SECONDS * n_interfaces**2
     )
-    return (
-        HYBRID_COST_WITH_COMPARISON * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
-    )
+    return HYBRID_COST_FACTOR * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
 
 
 def estimate_march_seconds(model: Model) -> float:

@@ -40,9 +40,8 @@ UNKNOWN_LOOP_REASON = (
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
 MAX_DECAY_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
-MESH_AMPLITUDES_PER_DECADE = (
-    16  # Number of amplitudes per decade at which the mesh error is computed.
-)
+# Number of amplitudes per decade at which the mesh error is computed.
+MESH_AMPLITUDES_PER_DECADE = 16
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
@@ -335,10 +334,10 @@ def describe_unknown_mesh_error(reason: str, coarser_runs: ComparisonRuns) -> st
 
 
 def _find_nearest_mode(modes, laws, frequency: float) -> int:
-    """Return the index of the mode with stuck interfaces that is nearest in frequency.
+    """Return the index of that mode of a rig with stuck interfaces whose natural frequency is nearest to `frequency`.
 
-    Modes that do not move the output are skipped. `laws` are the friction laws of the interfaces with their stiffness in
-    stick, and `frequency` is in [Hz].
+    `modes` are those of the structure alone. Stuck modes that do not move the output are
+    skipped. `laws` are the friction laws of the interfaces with their stiffness in stick, and `frequency` is in [Hz].
     """
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):

@@ -35,9 +35,8 @@ COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-COMPARISON_TAIL_FACTOR = (
-    0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
-)
+# Ratio of the neglected tail in the comparison run to that in the run itself.
+COMPARISON_TAIL_FACTOR = 0.1
 
 
 class Engine(NamedTuple):
@@ -105,8 +104,9 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
 
 
 def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
-    """List numerical settings with a coarser mesh: of the patch of [contact], or of one interface patch each.
+    """List numerical settings in which one patch of a model has a coarser mesh: that of [contact], or of an interface.
 
+    Interfaces with equal patches are coarsened together.
     `numerics` are the settings of the run, and `has_coarse_patch` tells whether the patch of [contact] matters.
     """
     meshes = [replace(numerics, coarse_patch=True)] * has_coarse_patch

@@ -15,12 +15,7 @@ from ...response.measures import Values, relative_gap
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
 from .levels import run_levels
-from .solution import (
-    Fields,
-    Solution,
-    first_interface_load,
-    first_mode_stiffness,
-)
+from .solution import Fields, Solution, first_interface_load, first_mode_stiffness
 
 
 class RunEvaluator:

@@ -11,12 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
-from ...core import (
-    IntegratedMeasures,
-    NotConverged,
-    Outcome,
-    Response,
-)
+from ...core import IntegratedMeasures, NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -34,17 +29,10 @@ from ...response.events import (
 from ...response.measures import MAX_RESTING_SLIDE_RANGE, Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import find_definition, select_names
-from ...structure.drive_sizes import (
-    choose_samples_per_cycle,
-    is_sinusoidal,
-)
+from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import engines, strips
-from .evaluation import (
-    RunEvaluator,
-    compute_sampled_work,
-    compute_work_check,
-)
+from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
 from .solution import (
     Fields,

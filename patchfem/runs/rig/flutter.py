@@ -55,7 +55,11 @@ class Flutter(NamedTuple):
 
 
 def compute_flutter_amplitude(run) -> Flutter:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig."""
+    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig, above which a motion grows.
+
+    `run` is the `rig.CoupledRun` of the rig, whose model has a mode of negative damping. Without an unstable cycle the
+    measure has no value, but the reason.
+    """
     model = run.model
     unit = MOTION_TABLE[FLUTTER_MEASURE].unit
     floor = MOTION_TABLE[FLUTTER_MEASURE].floor
@@ -125,11 +129,12 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     the interface, or None for an interface without one.
     """
     rig = model.rig
-    f = model.friction
-    if len(rig.friction.interfaces) != 1 or f is None:
+    law = model.friction
+    if len(rig.friction.interfaces) != 1 or law is None:
         return LimitCycles([], "limit cycles can be computed for one interface only")
 
     modes = rig.modes
+    # Slide of the interface per unit of each mode.
     row = modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_MOVING_INTERFACE_NOTE)
@@ -152,7 +157,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         # All other laws have smooth loops, which harmonic balance finds.
         group = make_law_group(model, numerics, patch)
         cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
-            modes, group, row, f.static * first_interface_load(model, patch)
+            modes, group, row, law.static * first_interface_load(model, patch)
         )
         reason = NO_SMALLER_CYCLE_NOTE if smallest_amplitude else NO_CYCLE_NOTE
         return LimitCycles(cycles, reason, smallest_amplitude)

@@ -160,7 +160,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     if not model.partial_slip:
         if not slide_apart:
             return [(load, ())]
-        return [(Load(float(one)), ()) for one in strips.compute_strip_loads(patch)]
+        return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
     length = record.make_law(model.friction, load.mean).element(load.mean).length

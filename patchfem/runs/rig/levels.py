@@ -6,7 +6,6 @@ found by bisection, and the joined run.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,7 +32,7 @@ MAX_ONSET_BISECTIONS = 40
 
 
 def add_level_errors(
-    levels: Sequence[Level], coarser_runs: ComparisonRuns, solutions
+    drive_levels: Sequence[Level], coarser_runs: ComparisonRuns, solutions
 ) -> tuple[Level, ...]:
     """Add the differences from coarse runs to the errors of each drive level.
 
@@ -41,7 +40,7 @@ def add_level_errors(
 
     Parameters
     ----------
-    levels : sequence of Level
+    drive_levels : sequence of Level
         Levels of the run, in chronological order.
     coarser_runs : list of CoarserRuns
         Settings of the coarse runs by source of error.
@@ -49,11 +48,12 @@ def add_level_errors(
         Solution of each coarse run by its Numerics.
     """
     levels_with_errors = []
-    for number, level in enumerate(levels):
+    for number, level in enumerate(drive_levels):
         # A run that ended earlier has no measures at this level.
-        none = replace(level, values={})
+        missing = replace(level, values={})
         solved = {
-            key: (*run.levels, *[none] * len(levels))[number] for key, run in solutions.items()
+            key: (*run.levels, *[missing] * len(drive_levels))[number]
+            for key, run in solutions.items()
         }
         sources = estimate_errors(None, level.values, coarser_runs, solved)
         errors = dict(level.errors)
@@ -74,7 +74,7 @@ class Onset(NamedTuple):
     error: float
 
 
-def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
+def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
     """Find the drive level [m s-2] of the onset by bisection, with its uncertainty; None if no level reaches the onset.
 
     The bisection starts between the last level before the onset and the first level after it, and
@@ -83,7 +83,7 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | No
 
     Parameters
     ----------
-    levels : sequence of Level
+    drive_levels : sequence of Level
         Levels of the run, in chronological order.
     run_level : callable
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
@@ -93,12 +93,12 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | No
     is_past_onset : callable
         Function of a Level that returns whether the onset is reached.
     """
-    bracket = bracket_onset(levels, is_past_onset)
+    bracket = bracket_onset(drive_levels, is_past_onset)
     if bracket is None:
         return None
-    before, first = bracket
-    first = levels[first]
-    low = levels[before].drive if before >= 0 else 0.0
+    before, reached = bracket
+    first = drive_levels[reached]
+    low = drive_levels[before].drive if before >= 0 else 0.0
     high = first.drive
     for _ in range(MAX_ONSET_BISECTIONS):
         if high - low <= tolerance * (high if low else first.drive):
@@ -143,10 +143,10 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
-def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:
-    """Convert drive levels [m s-2] to the unit of the scene, [m s-2] or [N]."""
+def convert_to_scene_units(rig, drive_levels) -> tuple[Level, ...]:
+    """Return the Levels with their amplitudes [m s-2] in the unit of the scene, [m s-2] or [N] for a force."""
     unit, factor = _find_level_unit(rig)
-    return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in levels)
+    return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in drive_levels)
 
 
 def _find_level_unit(rig) -> tuple[str, float]:
@@ -202,11 +202,14 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         return solve(level, runs[number] if number >= 0 else None)[1]
 
+    def report_level(fraction: float) -> None:
+        """Report the completed fraction of all levels; the levels before this one are complete."""
+        progress((len(runs) + fraction) / len(amplitudes))
+
     # Each level goes on from the end of the one before; a run that ends early is the last one.
-    n_levels = len(amplitudes)
-    for k, amplitude in enumerate(amplitudes):
-        report = None if progress is None else partial(_report_fraction, progress, k, n_levels)
-        is_last = k + 1 == n_levels
+    report = None if progress is None else report_level
+    for amplitude in amplitudes:
+        is_last = len(runs) + 1 == len(amplitudes)
         run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)
         level_results.append(result)
@@ -215,14 +218,6 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 
     joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
-
-
-def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
-    """Report the completed fraction of all levels to the progress callback.
-
-    `level` counts the levels from 0, and `fraction` is the completed part of this level.
-    """
-    progress((level + fraction) / n_levels)
 
 
 def join_runs(runs, duration: float):

@@ -183,7 +183,8 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
     `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run
-    that is coarse in time, so that they need not be repeated: their errors are estimated once.
+    that is coarse in time, so that they need not be repeated: their errors are estimated once. A run with
+    automatic steps is repeated with twice the steps (`_judge`).
 
     The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
     `response.errors.convergence_error`, plus MIN_MOTION_RELATIVE_ERROR of the value (`add_errors`).
@@ -239,7 +240,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
     run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
-    inputs.seconds["error"] = sum(one.seconds for one in runner.solutions.values())
+    inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
     return refine.Refined(replace(run, measures=run.measures | peak), shortage)
 
@@ -263,8 +264,9 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
 def _count_slip_period_cycles(model, numerics, solution) -> int:
     """Return the number of cycles of a complete stick-slip period on a belt.
 
-    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is no period, or if the
-    run is shorter than two windows. `numerics` has the cycles of the run, and `solution` is its motion.
+    A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one. The cycles are
+    those of `drive.period`. The result is 0 if the motion has no period, or if the run is shorter than two such periods.
+    `model` has the drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):

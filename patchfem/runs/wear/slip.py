@@ -18,15 +18,10 @@ from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
 from ..patch.press import nodal_areas
 from ..results.patch_rows import Values
+from ..results.result import UNBOUNDED_OUTCOMES
 from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve
 
-UNBOUNDED_OUTCOMES = (
-    Outcome.GROWS,
-    Outcome.EXCEEDS_TRAVEL,
-    Outcome.LEAVES_GROOVES,
-    Outcome.NOT_CONVERGED,
-)
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
 # Ratio of the error due to reversals between samples to the mean change of the path if only every
@@ -211,9 +206,10 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
 
 
 def _follow_slide(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a bench.
+    """Compute the motion of a bench, with the slip and the tractions of its nodes in the last cycle.
 
-    `frames` is the number of frames in each cycle, 0 for histories only.
+    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in each cycle; with 0
+    the nodes are None.
     """
     cycles = max(1, round(model.slide.cycles or 1))
     run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
@@ -239,9 +235,10 @@ def _follow_slide(model, patch, frames: int) -> _Motion:
 
 
 def _follow_rig(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a rig.
+    """Compute the motion of a rig, with the slip and the tractions of its nodes in the last cycle.
 
-    `frames` is the number of frames in the last cycle, 0 for histories only.
+    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in the last cycle; with
+    0 the nodes are None. The outcome is None unless the motion has no bound.
     """
     settings = numerics.choose_numerics(model)
     solution = solve.solve_rig(model, settings, patch, frames)
