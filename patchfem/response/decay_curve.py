@@ -179,12 +179,7 @@ def make_half_cycles(times, positions) -> HalfCycles:
     )
     count = int(ends[0]) if ends.size else distances.size
     no_noise = np.zeros(count)
-    return HalfCycles(
-        (times[1:] + times[:-1])[:count] / 2,
-        distances[:count],
-        no_noise,
-        no_noise,
-    )
+    return HalfCycles((times[1:] + times[:-1])[:count] / 2, distances[:count], no_noise, no_noise)
 
 
 def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:

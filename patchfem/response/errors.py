@@ -231,11 +231,7 @@ def friction_errors(values: Values, fraction: float, law, load: float, works) ->
 
 
 def add_errors(
-    values: Values,
-    errors=(),
-    *,
-    min_relative_error: float = 0.0,
-    size: float = np.inf,
+    values: Values, errors=(), *, min_relative_error: float = 0.0, size: float = np.inf
 ) -> Measures:
     """Return the measures with given values, with total errors from their errors by source.
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
+from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
 
 SAME_EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -80,7 +80,7 @@ def find_reversals(
     for begin, end in cycle_spans(time, period):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         pair = []
-        # The smallest displacement is the largest one of the reversed motion
+        # The smallest displacement is the largest one of the motion -q(t).
         for sign in (-1, 1):
             sample, value, fraction = _find_largest(
                 time[cycle], sign * slide[cycle], sign * rate[cycle], time_tolerance
@@ -181,7 +181,7 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
     is_moving = step > MIN_MOVING_STEP_RATIO * step.max(initial=0.0)
     is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
-    ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
+    ) > MODAL_COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
     before = np.flatnonzero(is_moving[:sample])
     after = np.flatnonzero(is_moving[sample:])
     if not before.size or not after.size:

@@ -17,7 +17,7 @@ ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
 MAX_STICKING_SLIP_FRACTION = 0.5
-COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
+MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
 MIN_ENERGY_DIFFERENCE = 1e-18  # Smallest significant difference of energies [J].
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
@@ -150,7 +150,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip_steps = np.abs(np.diff(slip[last_cycles]))
     slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
-    is_moving = slide_steps > COORDINATE_ROUND_OFF * np.abs(window.slide).max()
+    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * np.abs(window.slide).max()
     ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
     excess = ratio - MAX_STICKING_SLIP_FRACTION
 
@@ -176,7 +176,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
 def slip_round_off(window: Response) -> float:
     """Return the round-off error of the slip [m]."""
-    return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
+    return MODAL_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start_measure(phases) -> Values:

@@ -217,12 +217,7 @@ def _random_rows(
     """
     scatter = f"{name}_scatter"
     value_row = MeasureDefinition(
-        name,
-        unit,
-        floor,
-        definition,
-        "random_response_measures",
-        group=group,
+        name, unit, floor, definition, "random_response_measures", group=group
     )
 
     # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.

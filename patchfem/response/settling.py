@@ -21,7 +21,7 @@ MAX_STUCK_SPEED_RATIO = 1e-3
 # Largest sine of the angle between two phasor differences that count as collinear.
 MAX_COLLINEAR_PHASOR_SINE = 0.02
 # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
-MIN_BEAT_DECAY = 0.1
+MIN_PERIODIC_BEAT_DECAY = 0.1
 # Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
 # reported.
 MIN_REPORTED_CHANGE_FRACTION = 0.02
@@ -351,7 +351,9 @@ def remaining_free_motion(windows: Windows, decay=0.0):
     excess = windows.excess
     decayed_fraction = 1 - np.exp(-np.asarray(decay) * n_third)
     least_excess = (1 - decayed_fraction / 2) * excess[..., previous].max(axis=-1)
-    persists = (decayed_fraction > MIN_BEAT_DECAY) & (excess[..., last].max(axis=-1) > least_excess)
+    persists = (decayed_fraction > MIN_PERIODIC_BEAT_DECAY) & (
+        excess[..., last].max(axis=-1) > least_excess
+    )
 
     # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])

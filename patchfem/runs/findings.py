@@ -30,10 +30,7 @@ MAX_FIXED_STEP_HALVINGS = 4
 # long.
 MAX_PROPOSED_STRIPS = 64
 # Measures from samples, whose error does not depend on the number of harmonics.
-SAMPLED_MEASURES = (
-    "stick_fraction",
-    "slip_start_phase",
-)
+SAMPLED_MEASURES = ("stick_fraction", "slip_start_phase")
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
 ELEMENT_SIZE_KEY = "contact.element_size"

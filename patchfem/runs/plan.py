@@ -213,15 +213,7 @@ def _make_plan(model: Model) -> Plan:
     sentences = [*motion_sentences, *patch_sentences, *law_sentences]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
-    return Plan(
-        model,
-        engine,
-        unknowns,
-        samples,
-        chain,
-        groups,
-        tuple(sentences),
-    )
+    return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
 
 
 def _subtract_joint(model: Model) -> tuple[Model, Values]:

@@ -23,16 +23,16 @@ from .results.patch_rows import PATCH_TABLE, Measures, Values
 from .results.result import TimeShortage
 
 DEFAULT_MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
-MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
+HALVED_MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
 # The same of runs with twice the steps, or with a hundredth of the step error.
-STEP_COST_RATIO = 2.0
+DOUBLED_STEPS_COST_RATIO = 2.0
 PASS_ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
 MIN_PASS_ERROR_GAIN = 1.5
 # Smallest share of an axis in an error that its refinement reduces noticeably.
 MIN_AXIS_ERROR_FRACTION = 0.5
 MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
-MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
+MAX_REFINED_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.
 FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
 Resolution = TypeVar("Resolution")
@@ -55,7 +55,7 @@ class Verdict(NamedTuple):
     finer: Hashable = None
     axis: str = ""
     seconds: float = 0.0
-    cost_ratio: float = MESH_COST_RATIO
+    cost_ratio: float = HALVED_MESH_COST_RATIO
     max_passes: float = inf
     reason: str = ""
 
@@ -243,12 +243,12 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     if finer is None:
         return Verdict(excess)
     resolution = "half the element size"
-    cost_ratio = MESH_COST_RATIO
+    cost_ratio = HALVED_MESH_COST_RATIO
     max_passes = inf
     if axis == "steps":
         resolution = "twice the steps"
-        cost_ratio = STEP_COST_RATIO
-        max_passes = int(log2(MAX_BENCH_STEPS / result.settings.steps_per_cycle))
+        cost_ratio = DOUBLED_STEPS_COST_RATIO
+        max_passes = int(log2(MAX_REFINED_BENCH_STEPS / result.settings.steps_per_cycle))
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
@@ -290,7 +290,7 @@ def is_main(name: str) -> bool:
 def _refine_steps(model: Model, result) -> Model | None:
     """Return the model of a bench with twice the steps per cycle of a result; None if there are too many."""
     steps = result.settings.steps_per_cycle
-    if 2 * steps > MAX_BENCH_STEPS:
+    if 2 * steps > MAX_REFINED_BENCH_STEPS:
         return None
     accuracy = model.accuracy.model_copy(update={"steps_per_cycle": 2 * steps})
     return replace(model, accuracy=accuracy)

@@ -262,7 +262,7 @@ class _Passes:
         return result, moved.faces
 
     def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
-        """Compute the wear of a patch, continuing from a saved state if there is one."""
+        """Compute the wear of a patch, continuing from a saved state if there is one; without a file no state is saved."""
         model = inputs.plan.model
         file = self.state_file
         key = file and hash_run(model, inputs.patch, file.version)
@@ -352,7 +352,10 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
 
 
 def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
-    """Return the Result of a pressed patch whose motion was not found."""
+    """Return the Result of a pressed patch at rest, marked as not converged, because its motion was not found.
+
+    `run_plan` is the plan before any wear, and `inputs` are those of the motion.
+    """
     warnings = [*inputs.warnings, NO_MOTION_FOUND_MESSAGE]
     result = patch_result.make_static_result(replace(inputs, plan=run_plan, warnings=warnings))
     result = replace(result, outcome=Outcome.NOT_CONVERGED)
@@ -362,7 +365,10 @@ def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
 
 
 def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunInputs:
-    """Return the inputs of a run with worn surfaces."""
+    """Return the inputs of a run with the worn patch, and with the law and the grooves at its worn depth.
+
+    If no wear could be computed, the law and the grooves are those of the unworn patch.
+    """
 
     def wear_model(model: Model) -> Model:
         """Return a model after wear; unchanged if the last state of the wear is not known."""

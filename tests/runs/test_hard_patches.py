@@ -8,7 +8,7 @@ from scene_texts import PIECE
 
 from patchfem import run
 from patchfem.core import Outcome
-from patchfem.runs.patch import grids
+from patchfem.runs.patch import mesh_levels
 from patchfem.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
@@ -77,9 +77,11 @@ def assert_errors_cover_hertz(result, load) -> tuple:
 
 @pytest.fixture
 def coarse_meshes(monkeypatch):
-    """Limit automatic meshes to a hundredth of the usual cost."""
-    density = grids.FINE_GRID_DENSITY._replace(max_condensing_seconds=0.1)
-    monkeypatch.setattr(grids, "FINE_GRID_DENSITY", density)
+    """Limit automatic meshes to 1/36 of the usual cost."""
+    predict = mesh_levels.predict_condensing_seconds
+    monkeypatch.setattr(
+        mesh_levels, "predict_condensing_seconds", lambda meshes: 36 * predict(meshes)
+    )
 
 
 @pytest.mark.share(0)

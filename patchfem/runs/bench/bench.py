@@ -207,12 +207,7 @@ def _compute_loop_measures(
     means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
 
     reversals = find_reversals(
-        time,
-        slide,
-        np.zeros(time.size),
-        force,
-        time[-1] - time[0],
-        reversal_force_rule(model),
+        time, slide, np.zeros(time.size), force, time[-1] - time[0], reversal_force_rule(model)
     )
 
     # Without a mode there is no stiffness that damping could refer to, hence the 0.

@@ -83,11 +83,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
             accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
             coarse_model = replace(model, accuracy=accuracy)
         return bench.run_bench(
-            coarse_model,
-            patches[variant.level],
-            variant.steps,
-            choice=variant.choice,
-            say=say,
+            coarse_model, patches[variant.level], variant.steps, choice=variant.choice, say=say
         )
 
     # The runs are stored by their settings, because several estimates share one run.

@@ -99,6 +99,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     n_modes : int or None
         Number of shear modes. It follows from the tolerance if this is None.
     """
+    # Without pressure, the gap at the approach of the preload is g - C f.
     weight = patch.pieces.interface.weight
     force = patch.pressure.sigma_n * weight
     compliance = patch.pieces.normal
@@ -149,7 +150,10 @@ def _find_weakening(law) -> float:
 def _choose_modes(
     patch, limit, length: float, n_modes: int | None, tolerance: float, weakening: float = 1.0
 ) -> "shear_modes.ShearModes":
-    """Return a number of shear modes of the pieces, by default as many as a part of the tolerance needs.
+    """Return the shear modes of the pieces by which the interface deforms; without a number, as many as are needed.
+
+    The neglected modes then change the backbone curve of the interface by at most SHEAR_MODES_ERROR_RATIO times the
+    tolerance.
 
     Parameters
     ----------
@@ -158,9 +162,9 @@ def _choose_modes(
     limit : (m,) array
         Friction limits of the nodes [N].
     length : float
-        Length over which the force grows [m].
+        Displacement over which the force of a node grows to its limit [m]; 0 for rigid friction.
     n_modes : int or None
-        Number of modes.
+        Number of modes; None: by the tolerance.
     tolerance : float
         Relative tolerance of the scene.
     weakening : float

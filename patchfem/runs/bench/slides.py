@@ -122,7 +122,7 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     rises = np.zeros(slide.size - 1)
     stored = np.zeros(slide.size)
     if grooves is None:
-        force, losses = _slide_on_faces(task, load)
+        force, losses = _slide_on_flat_surfaces(task, load)
     else:
         force, losses = _climb_grooves(task, load)
         rises = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
@@ -149,8 +149,8 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     return SlideHistories(force, load, slide, ledger, tau, local)
 
 
-def _slide_on_faces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
-    """Return the force (k,) [N] and the loss of each step (k - 1,) [J] of a law without memory on flat faces.
+def _slide_on_flat_surfaces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force (k,) [N] and the loss of each step (k - 1,) [J] of a law without memory on flat surfaces.
 
     The force is phi L, with the friction limit L under the pressure at the sample, and its fraction phi, from the
     direction or the speed of the step that ends there. The loss has the mean limit of both ends of the step.
@@ -236,6 +236,7 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
     moves = np.diff(slide)
     if law_has_trait(friction.law, "set-valued"):
         kinetic = _find_coefficient(task)
+        # Index of the last step in which the interface moved, up to each step; -1 before the first one.
         last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
         ratio = grooves.force_ratio(slide, direction, kinetic)

@@ -319,10 +319,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
 
     # At a loaded corner the pressure is singular or, under a coating, changes over its thickness.
     corner_cell = max(
-        min(
-            coating / 16,
-            width / density.n_edge_cells / corner_factor,
-        ),
+        min(coating / 16, width / density.n_edge_cells / corner_factor),
         MIN_CELL_LENGTH_RATIO * length,
     )
     ends = set(chain.from_iterable(extent.corners for extent in extents))

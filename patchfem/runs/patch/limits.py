@@ -22,8 +22,8 @@ MIN_RATIO_OF_CHANGES = 1.6  # Lower bound of the ratio of successive changes in 
 MIN_CONVERGING_RATIO_OF_CHANGES = 1.3
 # Ratio of error to remainder for a regular series. With this value the interval misses the limit in
 # less than 2 of 100 random scenes.
-REGULAR_ERROR_FACTOR = 1.8
-IRREGULAR_ERROR_FACTOR = 2.0  # Ratio of error to the largest change for an irregular series.
+REGULAR_SERIES_ERROR_FACTOR = 1.8
+IRREGULAR_SERIES_ERROR_FACTOR = 2.0  # Ratio of error to the largest change for an irregular series.
 
 
 class Limit(NamedTuple):
@@ -46,11 +46,11 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
 
     Three values give a ratio of successive changes. It is regular between MIN_CONVERGING_RATIO_OF_CHANGES and
     MAX_REGULAR_RATIO_OF_CHANGES. The value is then extrapolated by the remainder of the geometric series, and the error
-    of the value on the finest mesh is REGULAR_ERROR_FACTOR times this remainder. The error of the
+    of the value on the finest mesh is REGULAR_SERIES_ERROR_FACTOR times this remainder. The error of the
     extrapolated value is a quarter of the remainder, half of it if the ratio is below MIN_EXPECTED_RATIO_OF_CHANGES; it
     is at least the change of the extrapolated value by the last refinement, and doubled if this is unknown.
 
-    If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_ERROR_FACTOR times the last
+    If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_SERIES_ERROR_FACTOR times the last
     change, or a fraction of the change before if that is larger. With two values the error is twice their
     change. For meshes that are not nested the order is limited to log2(2.5), and no value is
     extrapolated.
@@ -86,7 +86,7 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
             largest_change = max(
                 last_size / (MAX_RATIO_OF_CHANGES - 1), previous_size / MAX_RATIO_OF_CHANGES**2 * 2
             )
-        error = IRREGULAR_ERROR_FACTOR * largest_change
+        error = IRREGULAR_SERIES_ERROR_FACTOR * largest_change
         return Limit(finest, error, finest, error)
 
     # The error of the extrapolated value is its change due to the last refinement, but at least a
@@ -99,4 +99,6 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     else:
         change = abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
         extrapolated_error = max(extrapolated_error, change)
-    return Limit(finest, REGULAR_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error)
+    return Limit(
+        finest, REGULAR_SERIES_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error
+    )

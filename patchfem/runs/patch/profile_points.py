@@ -57,7 +57,7 @@ POINT_CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end
 CONTACT_RESIDUAL_TOL = 3e-8
 MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
-CORNER_LENGTH_RATIO = 1e-3
+CORNER_REGION_LENGTH_RATIO = 1e-3
 # Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
 MIN_CORNER_PRESSURE_RATIO = 0.2
 # Largest ratio of overlap to elastic displacement of a solved contact.
@@ -156,6 +156,8 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
                 for level in range(MIN_POINT_LEVELS)
             ]
             end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
+
+            # The points are doubled until the tolerance is met.
             point_levels = end_levels[-1:]
             while solution is None or not (
                 meets_tolerance(solution) or _is_next_level_expensive(point_levels[-1])
@@ -367,7 +369,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         can_rotate=patch_model.loading.moment is not None,
         closing=float(np.ptp(gap) + largest_deflection),
     )
-    n_corner = max(1, round(CORNER_LENGTH_RATIO * count))
+    n_corner = max(1, round(CORNER_REGION_LENGTH_RATIO * count))
     corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
 
     return PointLevel(

@@ -91,9 +91,7 @@ def choose_shared_meshes(
             (tolerance / SINGLE_CASE_CELLS_TOL) ** 0.5, 1.0, MAX_CELL_LENGTH_FACTOR
         )
     pairs = _refine_until_tolerance_is_met(
-        cases,
-        grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
-        tolerance,
+        cases, grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))), tolerance
     )
     return tuple(pair.meshes for pair in pairs)
 

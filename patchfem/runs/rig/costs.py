@@ -31,14 +31,9 @@ HYBRID_STEPS_PER_EVENT = 3.0
 # Largest stable step of `hybrid` in relaxation times of a law.
 MAX_HYBRID_STEP_RELAXATION_TIMES = 4.0
 MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
-MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
+MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 # Keys of [accuracy] that select constant time steps.
-MARCH_ACCURACY_KEYS = (
-    "steps_per_cycle",
-    "tail",
-    "merge",
-    "shear_modes",
-)
+MARCH_ACCURACY_KEYS = ("steps_per_cycle", "tail", "merge", "shear_modes")
 
 
 def required_steps_per_cycle(model: Model) -> int:

@@ -6,6 +6,7 @@ found by bisection, and the joined run.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -202,14 +203,11 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         return solve(level, runs[number] if number >= 0 else None)[1]
 
-    def report_level(fraction: float) -> None:
-        """Report the completed fraction of all levels; the levels before this one are complete."""
-        progress((len(runs) + fraction) / len(amplitudes))
-
     # Each level goes on from the end of the one before; a run that ends early is the last one.
-    report = None if progress is None else report_level
+    n_levels = len(amplitudes)
+    report = None if progress is None else partial(_report_fraction, progress, runs, n_levels)
     for amplitude in amplitudes:
-        is_last = len(runs) + 1 == len(amplitudes)
+        is_last = len(runs) + 1 == n_levels
         run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)
         level_results.append(result)
@@ -218,6 +216,11 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 
     joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
+
+
+def _report_fraction(progress, runs, n_levels: int, fraction: float) -> None:
+    """Report the completed fraction of all levels: `runs` are complete, and `fraction` of the next level."""
+    progress((len(runs) + fraction) / n_levels)
 
 
 def join_runs(runs, duration: float):

@@ -171,11 +171,11 @@ class MarchEvaluator(RunEvaluator):
         """
         window = run.window
         work = run.window_work
-        # The friction of strips that yaw does more work than follows from the mean displacement.
-        slides_apart = self.model.rig.friction.strips_slide_apart
-        is_rigid_block = self.contact.set_valued and not slides_apart
-        # `window_work` is that of all interfaces and of impacts at stops; that of the first interface is int F dx.
-        if len(self.model.rig.friction.names) > 1 or is_rigid_block:
+        # `window_work` is that of all interfaces and of impacts at stops; that of the first interface is int F dx. The
+        # friction of strips that yaw does more work than follows from their mean displacement.
+        friction = self.model.rig.friction
+        is_rigid_block = self.contact.set_valued and not friction.strips_slide_apart
+        if len(friction.names) > 1 or is_rigid_block:
             work = float(run.step_force @ np.diff(window.slide))
 
         span = window.time[-1] - window.time[0]

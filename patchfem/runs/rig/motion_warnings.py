@@ -1,7 +1,7 @@
 """Warnings and notes of a run of a rig on its friction law, load and engine.
 
-In: a `rig.CoupledRun`. Out: sentences. WARNINGS and NOTES are the tables of conditions; each entry yields the sentences of a
-run that meets its condition. Those on the friction law are in `results.notes`.
+In: a `rig.CoupledRun`. Out: sentences. MOTION_WARNINGS and MOTION_NOTES are the tables of conditions; each entry yields
+the sentences of a run that meets its condition. Those on the friction law are in `results.notes`.
 """
 
 from collections.abc import Iterator
@@ -49,8 +49,8 @@ def collect_remarks(run, settings: Settings) -> Remarks:
     """Return the warnings and notes of a run with its settings on its friction law, load, engine and end of motion."""
     facts = collect_law_facts(run, settings)
     structure = run.model.rig.structure
-    warnings = chain.from_iterable(find(run) for find in WARNINGS)
-    notes = chain.from_iterable(find(run) for find in NOTES)
+    warnings = chain.from_iterable(find(run) for find in MOTION_WARNINGS)
+    notes = chain.from_iterable(find(run) for find in MOTION_NOTES)
     return Remarks(
         [*structure.notes, *list_law_warnings(facts), *warnings],
         [*structure.reduction_notes, *list_law_notes(facts), *notes],
@@ -207,13 +207,13 @@ def _note_on_end(run) -> Iterator[str]:
         yield run.solution.message
 
 
-WARNINGS = (
+MOTION_WARNINGS = (
     _warn_of_single_points,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
     _warn_of_large_slides,
 )
-NOTES = (
+MOTION_NOTES = (
     _note_on_fields_of_strips,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,

@@ -25,7 +25,7 @@ from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
 from . import bond_lists, decays, flutter, levels
-from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_RUN_STEPS
+from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
@@ -313,7 +313,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         numerics.finer(),
         axis,
         seconds=run.solution.seconds,
-        cost_ratio=refine.STEP_COST_RATIO,
+        cost_ratio=refine.DOUBLED_STEPS_COST_RATIO,
         max_passes=max_passes,
     )
 
@@ -330,7 +330,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
         or run.solution.outcome in EARLY_OUTCOMES
     ):
         return 0
-    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_RUN_STEPS / numerics.cycles)
+    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
     return max(0, floor(log2(max_steps / numerics.steps)))
 
 
