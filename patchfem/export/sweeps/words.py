@@ -82,7 +82,7 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
         names = " and ".join(_name_in_words(limit.measure) for limit in small)
         return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
     # limits of a motion come before those of its patch, which change before the motion does
-    moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
+    moving = [limit for limit in open_ended if limit.measure in rows.MOTION_TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
     numbers = (first.low, first.high, first.value)
     low, high, value = (format_value(number, first.unit, 3) for number in numbers)

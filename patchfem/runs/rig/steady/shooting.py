@@ -47,9 +47,8 @@ SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental") 
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
-FULL_SLIP_TOL = (
-    1e-9  # relative distance from its friction limit at which an interface slips as a whole
-)
+# Relative distance from its friction limit at which an interface slips as a whole
+FULL_SLIP_TOL = 1e-9
 
 
 class PeriodMap:
