@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
-from ..core import NotConverged
 from .cases import Case, make_arrays
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State, Status
-from .runs import Motion, describe_end, run_case
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
+from .runs import Motion, run_case
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
@@ -43,7 +42,6 @@ MIN_SIZE_RATIO = (
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
-N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion from another method
 
 
 class PeriodicMotion(NamedTuple):
@@ -95,7 +93,7 @@ def find_periodic_motion(
         Whether a law has many elements, so that a change of MAX_KINKED_CHANGE counts as none. The derivatives of the
         map are then those between two kinks; stability and error follow from N_CHECKED periods of the motion itself.
     """
-    shooting = _Shooting(case)
+    shooting = Shooting(case)
     if start is not None:
         shooting.state = start
     shooting.relax(n_first - 1)
@@ -134,46 +132,13 @@ def find_periodic_motion(
     )
 
 
-def find_multipliers(case: Case, modal_state) -> np.ndarray:
-    """Return the Floquet multipliers (k,) of a motion that another method has found, in decreasing magnitude.
-
-    Its modes are those of the other method at the start of each of N_MEMORY_CYCLES periods, in which the laws take the
-    memory of the periodic motion.
-
-    Parameters
-    ----------
-    case : Case
-        Its schedule is not used.
-    modal_state : (2 n,) array
-        Modal coordinates [m] and velocities [m/s] at phase 0 of the drive.
-
-    Raises
-    ------
-    NotConverged
-        If a period cannot be computed.
-    """
-    shooting = _Shooting(case)
-    shooting.relax(1)
-    for _ in range(N_MEMORY_CYCLES):
-        before = shooting.state
-        before.y[: modal_state.size] = modal_state
-        shooting.relax(1)
-    status = Status(int(shooting.state.clock[Clock.STATUS]))
-    if status != Status.DONE:
-        raise NotConverged(
-            f"the stability of the steady motion is unknown: {describe_end(case, status)}"
-        )
-    multipliers, _ = shooting.find_multipliers(before)
-    return multipliers[np.argsort(-np.abs(multipliers))]
-
-
 def _grows_for_ever(case: Case, size: float) -> bool:
     """Return whether the motion from the start of a case increases by similar amounts in equal times.
 
     `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
     does not come near; inf if none was found.
     """
-    shooting = _Shooting(case)
+    shooting = Shooting(case)
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
@@ -185,7 +150,7 @@ def _grows_for_ever(case: Case, size: float) -> bool:
     return bool(is_moving and is_far and is_growing)
 
 
-class _Shooting:
+class Shooting:
     """State of a motion at the start of a period, and its map."""
 
     def __init__(self, case: Case):
@@ -203,11 +168,11 @@ class _Shooting:
 
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0."""
-        state = _copy(state)
+        state = copy_state(state)
         state.clock[:] = 0.0
         state.clock[Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
-        record = make_arrays(self.case)[1]
-        compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, record)
+        self.record = make_arrays(self.case)[1]
+        compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, self.record)
         self.n_periods += 1
         return state
 
@@ -280,7 +245,7 @@ class _Shooting:
         self.relax(1)
         return nearer, self.measure_change(nearer)
 
-    def _scales(self) -> np.ndarray:
+    def scales(self) -> np.ndarray:
         """Return the magnitudes (n,) of the modes and law states at the start of a period."""
         scale = np.maximum(np.abs(self.state.y[: self.n]), self.case.rig.scales[: self.n])
         n_modes = self.case.rig.modes.shape[1]
@@ -294,7 +259,7 @@ class _Shooting:
     def measure_change(self, before: State) -> float:
         """Return the change of the state since another one, relative to its scale."""
         change = np.abs(self.state.y[: self.n] - before.y[: self.n])
-        return float((change / self._scales()).max())
+        return float((change / self.scales()).max())
 
     def has_same_regime(self, before: State) -> bool:
         """Return whether the laws are in the regimes of another state."""
@@ -302,40 +267,48 @@ class _Shooting:
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
     def _columns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in (state, memory): what a period changes."""
-        changed = _pack(self.state, self.n) != _pack(before, self.n)
-        changed[: 2 * self.case.rig.modes.shape[1]] = True
+        """Return the indices of the unknowns in the packed state: what a period changes, and the reversal points."""
+        start = pack_state(before, self.n)
+        is_unknown = pack_state(self.state, self.n) != start
+        is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
 
-        # Of the memories only the reversal points count, if their number is the same.
-        counts = before.memory[:, Memory.COUNT, None]
-        stack_index = np.arange(before.memory.shape[1]) - Memory.STACK
-        is_used = (stack_index >= 0) & (stack_index < 2 * counts)
-        is_used &= counts == self.state.memory[:, Memory.COUNT, None]
-        changed[self.n :] &= is_used.ravel()
-        return np.flatnonzero(changed)
+        # A periodic motion leaves the reversal points as they were, but they move with it.
+        is_used = find_used(before) & find_used(self.state)
+        is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
+        return np.flatnonzero(is_unknown)
 
-    def _differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
+    def differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
         """Return the derivatives of the map of a period from a state, and the change over this period, in scaled unknowns.
 
         The derivatives of the last correction are used again as long as `map` has them.
         """
         columns = self._columns(before)
-        start = _pack(before, self.n)
-        end = _pack(self.state, self.n)
+        start = pack_state(before, self.n)
+        end = pack_state(self.state, self.n)
         if self.map is None or not np.array_equal(self.map.columns, columns):
-            scale = np.append(self._scales(), np.abs(start[self.n :]))[columns]
+            scale = np.append(self.scales(), np.abs(start[self.n :]))[columns]
             slopes = np.empty((columns.size, columns.size))
             for k, column in enumerate(columns):
                 packed = start.copy()
                 packed[column] += self.difference * scale[k]
-                after = _pack(self.advance(_unpack(before, packed)), self.n)
-                slopes[:, k] = (after - end)[columns] / (self.difference * scale)
+                slopes[:, k] = self.find_change(unpack_state(before, packed), end)[columns]
+                slopes[:, k] /= self.difference * scale
             self.map = _Map(columns, slopes, scale)
         return self.map, (end - start)[columns] / self.map.scale
 
+    def find_change(self, state: State, end) -> np.ndarray:
+        """Return the change of the packed state after a period from that of another motion, `end`.
+
+        A reversal point that only one of both motions remembers does not count, because it is not passed again.
+        """
+        after = self.advance(state)
+        change = pack_state(after, self.n) - end
+        change[self.n :][~find_used(after).ravel()] = 0.0
+        return change
+
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
-        found, change = self._differentiate(before)
+        found, change = self.differentiate(before)
         if not np.isfinite(found.slopes).all():
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
@@ -347,11 +320,11 @@ class _Shooting:
 
         Regimes are those at the end of the period, where the motion has brought them.
         """
-        period_map, change = self._differentiate(before)
-        packed = _pack(self.state, self.n)
+        period_map, change = self.differentiate(before)
+        packed = pack_state(self.state, self.n)
         step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
-        packed[period_map.columns] = _pack(before, self.n)[period_map.columns] + step
-        self.state = _unpack(self.state, packed)
+        packed[period_map.columns] = pack_state(before, self.n)[period_map.columns] + step
+        self.state = unpack_state(self.state, packed)
 
 
 class _Map(NamedTuple):
@@ -376,20 +349,42 @@ def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 
 
-def _copy(state: State) -> State:
+def copy_state(state: State) -> State:
     """Return an independent copy of a state."""
     return State(*(array.copy() for array in state))
 
 
-def _pack(state: State, n: int) -> np.ndarray:
-    """Return the first n states of the motion and the memories in one array (k,)."""
-    return np.append(state.y[:n], state.memory)
+def pack_state(state: State, n: int) -> np.ndarray:
+    """Return the first n states of the motion and the reversal points in one array (k,), the last of them at its end."""
+    return np.append(state.y[:n], _align(state.memory, 1)[:, Memory.STACK :])
 
 
-def _unpack(state: State, packed) -> State:
-    """Return a copy of a state with the values of `_pack`."""
-    state = _copy(state)
-    n = packed.size - state.memory.size
+def unpack_state(state: State, packed) -> State:
+    """Return a copy of a state with the values of `pack_state`."""
+    state = copy_state(state)
+    memory = _align(state.memory, 1)
+    stack = memory[:, Memory.STACK :]
+    n = packed.size - stack.size
     state.y[:n] = packed[:n]
-    state.memory[:] = packed[n:].reshape(state.memory.shape)
+    stack[:] = packed[n:].reshape(stack.shape)
+    state.memory[:] = _align(memory, -1)
     return state
+
+
+def _align(memory, direction: int) -> np.ndarray:
+    """Return memories (M, k) whose last reversal points are in the last columns (direction 1), or as they were (-1)."""
+    aligned = memory.copy()
+    stacks = aligned[:, Memory.STACK :]
+    for row, stack in zip(memory, stacks):
+        stack[:] = np.roll(stack, -2 * direction * int(row[Memory.COUNT]))
+    return aligned
+
+
+def find_used(state: State) -> np.ndarray:
+    """Return which entries (M, k) of the aligned stacks of `pack_state` the motion depends on.
+
+    It does not depend on the first of more than two reversal points, where it would meet the curve of first loading again.
+    """
+    count = state.memory[:, Memory.COUNT, None]
+    size = state.memory.shape[1] - Memory.STACK
+    return np.arange(size) >= size - 2 * count + 2 * (count > 2)

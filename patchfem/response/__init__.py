@@ -66,7 +66,6 @@ PUBLIC = {
     "measures": (
         "MIN_SLIDE_RANGE",
         "compute_ledger_measures",
-        "compute_peak",
         "compute_step_harmonic",
         "energy_balance",
         "measure_half_range",
@@ -122,7 +121,6 @@ PUBLIC = {
         "slip_period",
     ),
     "spectrum": (
-        "find_acceleration_harmonics",
         "read_instrument",
         "make_acceleration_measures",
     ),

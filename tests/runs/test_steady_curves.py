@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 from scene_runs import find_sentences
-from scene_texts import COULOMB, MODE, PLASTIC, POINT, SWEEP
+from scene_texts import COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
+from patchfem.response.rows import AMPLITUDE
+from patchfem.runs.rig.numerics import choose_numerics
 from patchfem.runs.rig.steady import shooting
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
@@ -76,8 +78,47 @@ def test_always_unstable_steady_state_is_not_converged():
 
 
 def test_exact_number_of_steady_motions_is_stated():
-    """With an interlock of 80 um three steady motions exist at 180 Hz; a warning says how many are stable."""
-    steady = pf.run(INTERLOCK + SINE.format(180, 10), **STEADY)
-    assert steady.outcome == "steady" and np.abs(steady.motion.steady.multipliers).max() < 1
-    (sentence,) = find_sentences([*steady.warnings, *steady.notes], "3 steady motions exist")
-    assert "1 of them stable" in sentence
+    """Near 160 Hz a stiffening rig has three steady motions. For the unstable one of them the smallest stable one
+    is shown, and a note says how many are stable."""
+    scene = MODE + '[structure.stiffening]\ncubic = "1.4e10 N/m^3"\n' + STRONG_SWEEP
+    model = pf.plan(pf.load(scene, **STEADY, **{"drive.to": "240 Hz"})).model
+    finder = shooting.ShootingFinder(model, choose_numerics(model), None)
+    points = finder.trace_curve(model.rig.drive.signal).points
+    unstable = [point for point in points if not point.stable]
+    middle = min(unstable, key=lambda point: abs(point.drive.omega - 2 * np.pi * 160))
+    found = finder.compute_steady_motion(middle.drive, middle.guess)
+    assert found.values[AMPLITUDE] < 0.5 * middle.values[AMPLITUDE]
+    assert np.abs(found.periodic.multipliers).max() < 1
+    (sentence,) = find_sentences(found.notes, "3 steady motions exist")
+    assert "2 of them stable; the stable motion of smallest amplitude is shown" in sentence
+
+
+def test_exact_regimes_of_laws_with_memory():
+    """Bonds stick at a small level and slide at a large one; a nonlinear spring alone has no friction."""
+    for level, regime in (("0.001 g", "stuck"), ("20 g", "slides")):
+        steady = pf.run(
+            POINT + NONLOCAL + MODE + SINE.format(100, 10),
+            **STEADY,
+            **{"drive.acceleration": level},
+        )
+        assert steady.motion.steady.regime == regime
+    spring = MODE + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n' + SINE.format(100, 10)
+    assert pf.run(spring, **STEADY).motion.steady.regime == "no friction"
+
+
+def test_exact_measures_of_bonds_agree_with_march():
+    """The measures under bonds agree within 2e-3 with those of a scene that is integrated in time for 300 cycles at 5 g."""
+    scene = POINT + NONLOCAL.replace("1 um", "20 um") + MODE + SINE.format(143, 300)
+    keys = {"accuracy.method": "march", "accuracy.steps_per_cycle": 1000}
+    march = pf.run(scene, **keys).measures
+    steady = pf.run(scene, **STEADY).measures
+    for name in (
+        AMPLITUDE,
+        "absolute_acceleration_peak",
+        "friction_force_peak",
+        "slip_amplitude",
+        "loop_area",
+        "equivalent_stiffness",
+        "equivalent_damping",
+    ):
+        assert steady[name].value == pytest.approx(march[name].value, rel=2e-3), name

@@ -11,11 +11,11 @@ from dataclasses import replace
 from functools import cached_property
 
 from ...core import NotConverged, Outcome
-from ..rig.engines import ENGINES, choose_steady_method
+from ..rig.engines import ENGINES
 from ..rig.numerics import choose_numerics
 from ..rig.solve import solve_rig
 from ..rig.steady.curves import COLUMN_MEASURES, ObservedMotion
-from ..rig.steady.steady import FINDERS
+from ..rig.steady.shooting import ShootingFinder
 
 UNBOUNDED_OUTCOMES = (
     Outcome.GROWS,
@@ -57,8 +57,7 @@ class MotionObserver:
     @cached_property
     def finder(self):
         """Finder of periodic motions; the motions of other engines are those of runs from rest."""
-        finder_class = FINDERS[choose_steady_method(self.model)]
-        return finder_class(self.model, self.numerics, self.patch, 0, self.report)
+        return ShootingFinder(self.model, self.numerics, self.patch, 0, self.report)
 
     def __call__(self, drive, initial_guess=None) -> ObservedMotion | None:
         """Compute the motion under a drive.

@@ -1,0 +1,309 @@
+"""Curves of periodic motions over frequency or level of the drive, through their folds.
+
+A point of a curve is a fixed point of the map of a period (`periodic`). The unknowns are the modes and the states of the
+laws at phase 0. The reversal points that the laws remember there follow from them over a period, so that they are
+eliminated.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .cases import Case
+from .continuation import (
+    Curve,
+    CurvePath,
+    PathEquations,
+    PathPoint,
+    PathSettings,
+    correct_at,
+    correct_point,
+    follow_curve,
+)
+from .laws import LAWS, masing
+from .periodic import (
+    MAX_CHANGE,
+    MAX_KINKED_CHANGE,
+    PeriodicMotion,
+    Shooting,
+    copy_state,
+    find_used,
+    pack_state,
+    unpack_state,
+)
+from .records import Face, Memory, Probe, Setting, State
+from .runs import run_case
+
+MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
+
+N_FIRST = 2  # periods in which the laws take the memory of the loop of a motion from another map
+
+
+class CurveStart(NamedTuple):
+    """Motion from which a curve is followed.
+
+    - state: state at the start of a period
+    - parameter: frequency [rad/s] or level [m s-2] of the drive
+    """
+
+    state: State
+    parameter: float
+
+
+class _LoopShooting(Shooting):
+    """Map of a period after which the laws remember the loop of this period alone.
+
+    Larger motions of the past would otherwise shift the loop for ever, and the map would have a kink at each periodic
+    motion, because its reversals neither exceed those of the period before nor fall short of them.
+    """
+
+    def advance(self, state: State) -> State:
+        """Return the state a period after another one, whose clock starts at 0."""
+        state = copy_state(state)
+        faces = self.case.rig.faces
+        n_modes = self.case.rig.modes.shape[1]
+        loops = [i for i in range(len(faces)) if int(faces[i, Face.LAW]) == MASING]
+        slides = self.case.rig.rows[0] @ state.y[:n_modes]
+        for i in loops:
+            masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
+        end = super().advance(state)
+
+        slides = self.case.rig.rows[0] @ end.y[:n_modes]
+        ranges = self.record.get_face_extremes(Probe.SLIDE)
+        for i in loops:
+            masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
+        return end
+
+
+class Reversals(NamedTuple):
+    """Reversal points of the laws at phase 0, which follow from the unknowns of a curve.
+
+    - columns: (m,) their places in the memory
+    - gain: (N, m) change of the residual per change of the reversal points over a period
+    - own: (m, m) negative correction of the reversal points per change over a period
+    - by_motion: (m, N + 1) derivatives by unknowns and parameter
+    - w: (N + 1,) unknowns and parameter of the last period
+    - change: (m,) change of the reversal points over it
+    """
+
+    columns: np.ndarray
+    gain: np.ndarray
+    own: np.ndarray
+    by_motion: np.ndarray
+    w: np.ndarray
+    change: np.ndarray
+
+    def predict(self, w) -> np.ndarray:
+        """Return the change (m,) of the reversal points to unknowns and parameter w (N + 1,)."""
+        return self.by_motion @ (w - self.w) - self.own @ self.change
+
+
+class PeriodEquations:
+    """Equations of the periodic motions of a rig over a parameter of its drive.
+
+    Parameters
+    ----------
+    make_case : callable
+        Function of the parameter that returns the `Case` of a period.
+    start : CurveStart
+        Motion near the first point. Its size is the unit of the unknowns.
+    has_kinks : bool
+        Whether a law has many elements, see `periodic.find_periodic_motion`.
+    """
+
+    def __init__(self, make_case: Callable[[float], Case], start: CurveStart, *, has_kinks: bool):
+        self.make_case = make_case
+        self.start = start
+        shooting = self._make_shooting(start.parameter)
+        shooting.state = start.state
+        shooting.relax(N_FIRST)
+        self.n = shooting.n
+        self.scale = shooting.scales()
+        self.before = shooting.state
+        self.reversals: Reversals | None = None
+        self.tolerance = MAX_CHANGE * float(shooting.case.rig.settings[Setting.RTOL])
+        if has_kinks:
+            self.tolerance = max(self.tolerance, MAX_KINKED_CHANGE)
+
+    @property
+    def curve(self) -> Curve:
+        """Equations for the continuation."""
+        return Curve(self.find_residual, self.differentiate)
+
+    def _make_shooting(self, parameter: float) -> Shooting:
+        """Return the map of a period at a value of the parameter."""
+        return _LoopShooting(self.make_case(float(parameter)))
+
+    def _advance(self, x, parameter: float) -> tuple[Shooting, State]:
+        """Return the map with the state after a period, and the state before it, with the memory that belongs to it.
+
+        `x` (N,) are the unknowns, divided by their scale, and `parameter` is that of the drive.
+        """
+        shooting = self._make_shooting(parameter)
+        w = np.append(x, parameter)
+        packed = pack_state(self.before, self.n)
+        packed[: self.n] = x * self.scale
+        if self.reversals is not None:
+            packed[self.reversals.columns] += self.reversals.predict(w)
+        before = unpack_state(self.before, packed)
+        shooting.state = shooting.advance(before)
+
+        # In another regime the reversal points are those that the period has left.
+        regime = [Memory.DIRECTION, Memory.CONTACT]
+        is_same = np.array_equal(shooting.state.memory[:, regime], before.memory[:, regime])
+        if self.reversals is not None and is_same:
+            change = pack_state(shooting.state, self.n) - packed
+            change[self.n :][~find_used(shooting.state).ravel()] = 0.0
+            change = change[self.reversals.columns]
+            self.reversals = self.reversals._replace(w=w, change=change)
+            self.before = before
+        else:
+            self.reversals = None
+            self.before = copy_state(shooting.state)
+        return shooting, before
+
+    def find_residual(self, x, parameter: float) -> np.ndarray:
+        """Return the change (N,) of the unknowns over a period, in units of their scale; arguments as `_advance`."""
+        shooting, before = self._advance(x, parameter)
+        residual = (shooting.state.y - before.y)[: self.n] / self.scale
+        if self.reversals is not None:
+            residual += self.reversals.gain @ self.reversals.change
+        return residual
+
+    def differentiate(self, x, parameter: float) -> PathEquations:
+        """Return the derivatives of the change over a period, and the `PeriodicMotion` as their details."""
+        shooting, before = self._advance(x, parameter)
+        linear, change = shooting.differentiate(before)
+        columns = linear.columns
+        is_motion = columns < self.n
+
+        # Derivatives by the parameter, all in units of the curve.
+        step = shooting.difference * parameter
+        end = pack_state(shooting.state, self.n)
+        other = self._make_shooting(parameter + step).find_change(before, end)
+        by_parameter = other[columns] / linear.scale / step
+        unit = linear.scale.copy()
+        unit[is_motion] /= self.scale[columns[is_motion]]
+        slopes = unit[:, None] * (linear.slopes - np.eye(columns.size)) / unit
+        matrix = np.column_stack([slopes, unit * by_parameter])
+
+        # The reversal points m follow from the unknowns: (M - 1) dm + ... = -change.
+        is_kept = np.append(is_motion, True)
+        own = np.linalg.pinv(matrix[~is_motion][:, ~is_kept])
+        gain = -matrix[is_motion][:, ~is_kept] @ own
+        reduced = matrix[is_motion][:, is_kept] + gain @ matrix[~is_motion][:, is_kept]
+
+        # A state that a period does not change keeps its value.
+        places = columns[is_motion]
+        jacobian = -np.eye(self.n)
+        jacobian[np.ix_(places, places)] = reduced[:, :-1]
+        slope = np.zeros(self.n)
+        slope[places] = reduced[:, -1]
+
+        by_motion = np.zeros((own.shape[0], self.n + 1))
+        by_motion[:, np.append(places, self.n)] = -own @ matrix[~is_motion][:, is_kept]
+        whole_gain = np.zeros((self.n, own.shape[0]))
+        whole_gain[places] = gain
+        left = (end - pack_state(before, self.n))[columns[~is_motion]]
+        self.before = before
+        self.reversals = Reversals(
+            columns[~is_motion], whole_gain, own, by_motion, np.append(x, parameter), left
+        )
+        return PathEquations(jacobian, slope, self._describe(shooting, before, change))
+
+    def _describe(self, shooting: Shooting, before: State, change) -> PeriodicMotion:
+        """Return the motion of a point, with its multipliers.
+
+        Parameters
+        ----------
+        shooting : Shooting
+            Map of a period with its derivatives and the state after a period.
+        before : State
+            State at the start of the period.
+        change : (k,) array
+            Change over the period in the unknowns of the map.
+        """
+        multipliers, error = shooting.find_multipliers(before)
+        return PeriodicMotion(
+            run_case(shooting.case, start=before),
+            float(np.abs(change).max(initial=0.0)),
+            error,
+            self.tolerance,
+            multipliers[np.argsort(-np.abs(multipliers))],
+            shooting.period,
+            shooting.n_periods,
+        )
+
+    def follow(
+        self, bounds: tuple[float, float], settings: PathSettings, *, forward: bool = True
+    ) -> CurvePath:
+        """Follow the curve from its start within bounds of the parameter, which increases at first if `forward`.
+
+        The details of a point are its `PeriodicMotion`. The tolerance of `settings` is replaced by that of the map.
+        """
+        settings = settings._replace(tolerance=self.tolerance)
+        x = self.before.y[: self.n] / self.scale
+        return follow_curve(self.curve, x, self.start.parameter, bounds, forward, settings)
+
+    def find_between(
+        self, first: PathPoint, second: PathPoint, fraction: float, width: float
+    ) -> PathPoint | None:
+        """Return the point of a curve at a fraction of the step between two points, or None if it is not found.
+
+        The linear interpolation is corrected perpendicularly to the step, so that folds are no obstacle.
+
+        Parameters
+        ----------
+        first, second : PathPoint
+            Points at the ends of the step.
+        fraction : float
+            Fraction of the step.
+        width : float
+            Change of the parameter that counts as 1.
+        """
+        unit = find_unit(first, second, width)
+        step = (second.w - first.w) / unit
+        tangent = step / np.linalg.norm(step)
+        guess = first.w + fraction * (second.w - first.w)
+        self.restart(first)
+        found = correct_point(self.curve, first, guess, tangent, unit, self.tolerance)
+        return None if found is None else self.make_point(found[0])
+
+    def restart(self, point: PathPoint) -> None:
+        """Begin the next correction at a point of the curve."""
+        self.before = copy_state(point.equations.details.run.final)
+        self.reversals = None
+        self.make_point(point.w)
+
+    def make_point(self, w) -> PathPoint:
+        """Return the point with given unknowns and parameter w (N + 1,)."""
+        return PathPoint(w, self.differentiate(w[:-1], w[-1]))
+
+    def list_crossings(self, path: CurvePath, parameter: float) -> list[PathPoint]:
+        """Return the points at which a path passes a value of the parameter, in their order."""
+        found = []
+        for first, second in zip(path.points[:-1], path.points[1:]):
+            before, after = first.w[-1], second.w[-1]
+            if (before > parameter) == (after > parameter):
+                continue
+            guess = first.w + (parameter - before) / (after - before) * (second.w - first.w)
+            guess[-1] = parameter
+            self.restart(first)
+            point = correct_at(self.curve, first, guess, self.tolerance)
+            found += [point] * (point is not None)
+        return found
+
+
+def find_unit(first: PathPoint, second: PathPoint, width: float) -> np.ndarray:
+    """Return the sizes (N + 1,) by which the difference of two points of a curve is divided.
+
+    `width` is the change of the parameter that counts as 1.
+    """
+    size = max(float(np.linalg.norm(point.w[:-1])) for point in (first, second)) or 1.0
+    return np.append(np.full(first.w.size - 1, size), width)
+
+
+def measure_distance(first: PathPoint, second: PathPoint, width: float) -> float:
+    """Return the distance between two points of a curve in scaled unknowns and parameter; `width` as in `find_unit`."""
+    return float(np.linalg.norm((second.w - first.w) / find_unit(first, second, width)))
