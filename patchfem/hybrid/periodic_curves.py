@@ -25,6 +25,7 @@ from .laws import LAWS, masing
 from .periodic import (
     MAX_CHANGE,
     MAX_KINKED_CHANGE,
+    MAX_STABLE_MULTIPLIER,
     PeriodicMotion,
     Shooting,
     copy_state,
@@ -60,20 +61,23 @@ class _LoopShooting(Shooting):
 
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0."""
-        state = copy_state(state)
         faces = self.case.rig.faces
         n_modes = self.case.rig.modes.shape[1]
-        loops = [i for i in range(len(faces)) if int(faces[i, Face.LAW]) == MASING]
-        slides = self.case.rig.rows[0] @ state.y[:n_modes]
-        for i in loops:
-            masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
-        end = super().advance(state)
-
+        end = super().advance(self.load_loops(state))
         slides = self.case.rig.rows[0] @ end.y[:n_modes]
         ranges = self.record.get_face_extremes(Probe.SLIDE)
-        for i in loops:
+        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
             masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
         return end
+
+    def load_loops(self, state: State) -> State:
+        """Return a copy of a state with the forces that belong to the reversal points of its loops."""
+        state = copy_state(state)
+        faces = self.case.rig.faces
+        slides = self.case.rig.rows[0] @ state.y[: self.case.rig.modes.shape[1]]
+        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+            masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
+        return state
 
 
 class Reversals(NamedTuple):
@@ -131,11 +135,11 @@ class PeriodEquations:
         """Equations for the continuation."""
         return Curve(self.find_residual, self.differentiate)
 
-    def _make_shooting(self, parameter: float) -> Shooting:
+    def _make_shooting(self, parameter: float) -> _LoopShooting:
         """Return the map of a period at a value of the parameter."""
         return _LoopShooting(self.make_case(float(parameter)))
 
-    def _advance(self, x, parameter: float) -> tuple[Shooting, State]:
+    def _advance(self, x, parameter: float) -> tuple[_LoopShooting, State]:
         """Return the map with the state after a period, and the state before it, with the memory that belongs to it.
 
         `x` (N,) are the unknowns, divided by their scale, and `parameter` is that of the drive.
@@ -212,7 +216,7 @@ class PeriodEquations:
         )
         return PathEquations(jacobian, slope, self._describe(shooting, before, change))
 
-    def _describe(self, shooting: Shooting, before: State, change) -> PeriodicMotion:
+    def _describe(self, shooting: _LoopShooting, before: State, change) -> PeriodicMotion:
         """Return the motion of a point, with its multipliers.
 
         Parameters
@@ -225,8 +229,14 @@ class PeriodEquations:
             Change over the period in the unknowns of the map.
         """
         multipliers, error = shooting.find_multipliers(before)
+        if np.abs(multipliers).max(initial=0.0) >= MAX_STABLE_MULTIPLIER:
+            # Differences in the other direction do not pass the same kink of a law.
+            shooting.difference *= -1
+            shooting.map = None
+            other = shooting.find_multipliers(before)[0]
+            multipliers = min(multipliers, other, key=lambda found: np.abs(found).max())
         return PeriodicMotion(
-            run_case(shooting.case, start=before),
+            run_case(shooting.case, start=shooting.load_loops(before)),
             float(np.abs(change).max(initial=0.0)),
             error,
             self.tolerance,
