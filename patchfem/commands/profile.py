@@ -81,9 +81,9 @@ def profile(
         if options[key] is not None and options[key] <= 0:
             raise UsageError(f"profile --{name} {text}: a length above zero is needed")
     if split is not None:
-        if more or form != "1" or s_filter or window or units or verbose:
+        if more or form != "1" or s_filter or window or units or plot or verbose:
             raise UsageError(
-                "profile --split: takes one FILE, without --form, --s-filter, --window, --units and --verbose"
+                "profile --split: takes one FILE, without --form, --s-filter, --window, --units, --plot and --verbose"
             )
         _print_split(file, split, options["cutoff"], out, json_=json_)
         return

@@ -93,7 +93,7 @@ Verbose = flag_option("print all numbers", "-v", "--verbose")
 class Output:
     """Options of all commands that write a results folder.
 
-    Without `out` no files are written.
+    Without `out` no files are written. A picture of another format is refused before anything is computed.
     """
 
     out: Out = None
@@ -102,6 +102,10 @@ class Output:
     json_: Json = False
     quiet: Quiet = False
     verbose: Verbose = False
+
+    def __post_init__(self):
+        if self.plot is not None:
+            axes.find_picture_format(self.plot)
 
     def into(self, name: str) -> "Output":
         """Return the output into the folder that -o gives, or into out/NAME."""
@@ -155,7 +159,7 @@ def describe_command() -> str:
 
 
 def present(answer: "Answer", output: Output) -> None:
-    """Print an answer, draw its picture, and print the names of its files.
+    """Print an answer and the names of its files, and draw its picture.
 
     The options in `output` tell what is printed, and where picture and files go.
     """
@@ -171,10 +175,11 @@ def present(answer: "Answer", output: Output) -> None:
             _print_remark(f"warning: {text}")
         for text in answer.remarks.notes:
             note(text)
-    if output.plot is not None:
-        axes.write_plot(answer, output.plot)
     if output.out is not None and not (output.json_ or output.quiet):
         print(*show.list_files(output.out, not output.no_page), sep="\n", flush=True)
+    # the results are in place and named if the picture cannot be written
+    if output.plot is not None:
+        axes.write_plot(answer, output.plot)
 
 
 def refuse_existing(out: Path | None) -> None:

@@ -116,10 +116,13 @@ def _memoize_call_types(method):
         """
         key = self, tuple(args)
         if not kws and key in signatures:
+            # As the method does, record by which key numba finds the implementation of this signature.
             signature = signatures[key]
             self._impl_keys[signature.args] = self.typing_key
             return signature
         signature = method(self, context, args, kws)
+
+        # The key of an overload written in Python is another one than that of the function: it is not stored.
         if (
             not kws
             and signature is not None

@@ -57,6 +57,8 @@ class ArgumentConverter:
             return _convert_array(value)
         if not isinstance(value, tuple):
             raise UnsupportedError
+
+        # A cached tuple stands as (tuple, type code, words) at its `id`.
         known = self.known_tuples.get(id(value))
         if known is None:
             codes, words = zip(*map(self.convert, value)) if value else ((), ())
@@ -380,6 +382,8 @@ def _emit_object_code(target, result, name: str, n_result_words: int) -> tuple[b
     linked = result.library._get_module_for_linking().clone()
     entry_text = _write_entry_function(target, result, name, n_result_words, linked)
     linked.link_in(binding.parse_assembly(entry_text))
+
+    # Only the entry function is visible from outside, so that LLVM may remove what it does not call.
     for symbol in (*linked.functions, *linked.global_variables):
         if not symbol.is_declaration and symbol.name != name:
             symbol.linkage = "internal"
@@ -388,6 +392,8 @@ def _emit_object_code(target, result, name: str, n_result_words: int) -> tuple[b
     passes.add_global_dead_code_eliminate_pass()  # removes the wrapper for Python
     options = binding.create_pipeline_tuning_options()
     passes.run(linked, binding.create_pass_builder(target_machine, options))
+
+    # What is declared but not defined here must be found in numba or the system when the code is loaded.
     calls = [
         symbol.name
         for symbol in (*linked.functions, *linked.global_variables)

@@ -83,6 +83,7 @@ def load_field(context, builder, kind, value, name):
     LLVM value
         Value of the field, or its address if it is a tuple itself.
     """
+    # Fields lie one after the other in memory.
     field_types = kind.tuple_type.types
     index = kind.tuple_type.fields.index(name)
     offset = WORD_BYTES * sum(map(count_words, field_types[:index]))
@@ -92,6 +93,9 @@ def load_field(context, builder, kind, value, name):
         return address
     pointer_type = context.get_value_type(field_type).as_pointer()
     loaded = builder.load(builder.bitcast(address, pointer_type), align=WORD_BYTES)
+
+    # Metadata for LLVM's analysis of aliases by type (TBAA): the last number, 1, marks constant memory, so that no store to
+    # an array makes LLVM load the field again.
     module = builder.module
     family = module.add_metadata(["patchfem"])
     leaf = module.add_metadata(["field", family, ir.Constant(ir.IntType(64), 0)])

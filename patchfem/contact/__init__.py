@@ -22,7 +22,7 @@ PUBLIC = {
         "HertzAsperities",
         "LinearAsperities",
     ),
-    "conjugate_gradients": ("solve_by_gradients",),
+    "conjugate_gradients": ("fit_motion", "solve_by_gradients"),
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_RELATIVE_PRESSURE",

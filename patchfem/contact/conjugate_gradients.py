@@ -273,7 +273,7 @@ def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.nd
     `in_contact` (n,), where the gradient of the solution of `program` vanishes.
     """
     slope = program.gap + displacement
-    motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
+    motion = fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion
 
 
@@ -300,7 +300,7 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
     return restored
 
 
-def _fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
+def fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Fit a rigid motion (r,) to nodal values (k,) by least squares.
 
     `rigid` (k, r) holds the displacements of the nodes per unit of each motion.

@@ -15,6 +15,8 @@ from .strip_compliance import StripCompliance
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
 MIN_RELATIVE_PRESSURE = 1e-13
+# Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
+MIN_PRESSURE_FRACTION = 1e-287
 # Largest ratio of first-row height to cell length for which `edge_offset` was measured
 MAX_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
@@ -231,10 +233,8 @@ def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
     return moved_edges
 
 
-def find_pressure_edges(
-    x, pressure, fraction: float, largest: float | None = None
-) -> list[ContactEdge]:
-    """Find the edges of the region in which the pressure exceeds a fraction of its maximum.
+def find_pressure_edges(x, pressure, threshold: float) -> list[ContactEdge]:
+    """Find the edges of the region in which the pressure exceeds a threshold.
 
     This serves the pressures of a smooth asperity law, which have no sharp edge. Between two nodes the logarithm of the
     pressure is taken as linear.
@@ -243,20 +243,16 @@ def find_pressure_edges(
     ----------
     x, pressure : (m,) ndarray
         Positions [m] and pressure [Pa] >= 0.
-    fraction : float
-        Pressure at an edge over the largest pressure.
-    largest : float, optional
-        Largest pressure [Pa], by default that of `pressure`.
+    threshold : float
+        Pressure [Pa] at an edge.
 
     Returns
     -------
     list of ContactEdge
         By increasing x.
     """
-    largest = pressure.max() if largest is None else largest
-    threshold = fraction * largest
     with np.errstate(divide="ignore"):
-        height = np.log(np.maximum(pressure, 1e-300 * largest)) - np.log(threshold)
+        height = np.log(np.maximum(pressure, MIN_PRESSURE_FRACTION * threshold)) - np.log(threshold)
     edges = []
     for node, side in _find_ends(pressure > threshold):
         cell_fraction = height[node] / (height[node] - height[node + side])
@@ -273,7 +269,8 @@ def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
     Parameters
     ----------
     x, force : (m,) ndarray
-        Positions [m] and forces [N]; the ends of the interface that carry load are ends of intervals.
+        Positions [m] and forces [N]. Only the first and the last count: an end of the interface that carries load is an
+        end of an interval.
     edges : list of ContactEdge
         Edges of the set by increasing x.
     """

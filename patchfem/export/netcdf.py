@@ -104,7 +104,8 @@ def read_netcdf(path: Path) -> tuple[Variables, Attributes]:
     Dimensions without a coordinate have no variable. OSError if the file cannot be read or is not a netCDF4 file.
     """
     data = {}
-    # h5py reads the many small variables of a sweep three times as fast as h5netcdf
+    # h5py reads the many small variables of a sweep three times as fast as h5netcdf, which also leaves a traceback on the
+    # screen where it cannot open a damaged file
     with h5py.File(path, "r", track_order=True) as file:
         for name, stored in file.items():
             if bytes(stored.attrs.get("NAME", b"")).startswith(b"This is a netCDF dimension"):

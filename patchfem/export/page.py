@@ -14,8 +14,6 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-import numpy as np
-
 from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
@@ -100,6 +98,9 @@ def make_page(folders: list[Path]) -> str:
             path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths
         }
         if (folders[0] / store.FIELDS).is_file():
+            # only a run with fields has the modules that read them
+            from .fields.film import make_stress_panels
+
             drawn += make_stress_panels(folders[0] / store.FIELDS)
     else:
         tables = list_scene_differences(answers)
@@ -229,16 +230,6 @@ def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
     for name, entry in pairs:
         flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
     return flat
-
-
-def make_stress_panels(path: Path) -> list[panels.Panel]:
-    """Return the panel of the stress in both pieces from a file of fields; [] if the pieces do not touch."""
-    from .fields.film import stress_frames
-
-    frames = stress_frames(path)
-    if not np.nanmax(frames["values"], initial=0.0) > 0:
-        return []
-    return [panels.make_film(frames, "von Mises stress in both pieces", "Pa")]
 
 
 def _encode(content: bytes) -> str:

@@ -4,6 +4,8 @@ The measures of runs are defined in `response.rows` and `runs.results.patch_rows
 verbs. KEY lists the quantities that come first: in the tiles of a page, on the screen and in the first columns of a table.
 """
 
+from collections import ChainMap
+
 from ..formatting import (
     UNIT_LADDERS,
     choose_unit,
@@ -154,16 +156,12 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
         return surface_definitions.find(name) or surface_definitions.find(
             rows.remove_interface_number(name)
         )
-    if name in QUANTITIES:
-        return QUANTITIES[name]
     # quantities of a sweep: limits of its key, and extremes of measures
-    name = name.removeprefix("largest_").removeprefix("smallest_")
-    base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)
-    for table in (QUANTITIES, patch_rows.TABLE, rows.TABLE):
-        for candidate in (name, base_name):
-            if candidate in table:
-                return Definition(table[candidate].unit, table[candidate].text)
-    return None
+    measure = name.removeprefix("largest_").removeprefix("smallest_")
+    base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(measure)
+    definitions = ChainMap(QUANTITIES, patch_rows.TABLE, rows.TABLE)
+    found = definitions.get(name) or definitions.get(measure) or definitions.get(base_name)
+    return found and Definition(found.unit, found.text)
 
 
 def describe(name: str, kind: str = "") -> str:

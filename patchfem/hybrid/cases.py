@@ -363,7 +363,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
         clock,
         np.zeros((N_STATE_ROWS, n)),
         np.full((5, n_faces, Margin.AFTER), np.inf),
-        np.zeros((6, n_observed + 2 + n_faces)),
+        np.zeros((6, n_observed + 3 + n_faces)),
         np.zeros((n_faces, n_faces)),
     )
 

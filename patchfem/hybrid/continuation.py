@@ -16,6 +16,8 @@ from ..core import NotConverged
 
 NEWTON_TOL = 1e-9  # change of the unknowns, relative to their size, at which a correction ends
 MAX_NEWTON_STEPS = 12  # largest number of steps of a correction
+MAX_CORRECTIONS = 3  # largest number of corrections, each with new derivatives
+RESIDUAL_FACTOR = 10.0  # largest residual at a point, relative to the tolerance of a correction
 MIN_ARC_STEP = 1e-7  # smallest step of the arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
 MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
@@ -43,11 +45,13 @@ class PathEquations(NamedTuple):
     - jacobian: (N, N) derivatives of r by the unknowns x
     - by_parameter: (N,) derivatives of r by the parameter p
     - details: further results at this point
+    - residual: largest part of the residual there, relative to the unknowns, and of that of unknowns that were eliminated
     """
 
     jacobian: np.ndarray
     by_parameter: np.ndarray
     details: Any = None
+    residual: float = 0.0
 
 
 class Curve(NamedTuple):
@@ -173,7 +177,8 @@ def follow_curve(
             continue
 
         # The last point lies on the bound that the step passes.
-        w, n_steps = taken
+        after, n_steps = taken
+        w = after.w
         if not low <= w[-1] <= high:
             bound = high if w[-1] > high else low
             guess = point.w + (bound - point.w[-1]) / (w[-1] - point.w[-1]) * (w - point.w)
@@ -182,7 +187,7 @@ def follow_curve(
             ended = "end" if (bound == high) == forward else "start"
             break
 
-        points.append(PathPoint(w, curve.differentiate(w[:-1], w[-1])))
+        points.append(after)
         folds += _find_folds(points[-2:], tangent, unit, step)
         step = min(step * _step_factor(n_steps), settings.max_step)
     return CurvePath(points, tuple(folds), ended)
@@ -197,8 +202,11 @@ def _step_factor(n_steps: int) -> float:
 
 def correct_point(
     curve: Curve, point: PathPoint, w, row, unit, tolerance: float, *, max_step: float = np.inf
-) -> tuple[np.ndarray, int] | None:
-    """Correct a guess by Broyden's method, which begins with the derivatives at another point.
+) -> tuple[PathPoint, int] | None:
+    """Correct a guess, and again with the derivatives at the point found until its own residual has vanished.
+
+    Beyond a kink of the curve the derivatives at another point may lead to a place where the equations do not hold. If
+    they lead nowhere, the correction begins with the derivatives at the guess.
 
     Parameters
     ----------
@@ -220,9 +228,25 @@ def correct_point(
     Returns
     -------
     tuple or None
-        Corrected point (N + 1,), and number of steps; None without convergence.
+        Corrected point, and number of steps; None without convergence.
     """
-    matrix = point.border(row, unit)
+    for _ in range(MAX_CORRECTIONS):
+        found = _correct_by_broyden(curve, point.border(row, unit), w, unit, tolerance, max_step)
+        if found is not None:
+            w = found[0]
+        point = PathPoint(w, curve.differentiate(w[:-1], w[-1]))
+        if found is not None and point.equations.residual <= RESIDUAL_FACTOR * tolerance:
+            return point, found[1]
+    return None
+
+
+def _correct_by_broyden(
+    curve: Curve, matrix, w, unit, tolerance: float, max_step: float
+) -> tuple[np.ndarray, int] | None:
+    """Return the corrected guess (N + 1,) and the number of steps of Broyden's method, or None without convergence.
+
+    `matrix` (N + 1, N + 1) are the scaled derivatives with which it begins; the others are as in `correct_point`.
+    """
     step = None
     for count in range(1, MAX_NEWTON_STEPS + 1):
         residual = np.append(curve.find_residual(w[:-1], w[-1]) / unit[0], 0.0)
@@ -232,7 +256,7 @@ def correct_point(
         # The derivatives along the last step are those that would have predicted this residual.
         longest = max_step
         if step is not None:
-            matrix += np.outer(residual, step) / (step @ step)
+            matrix = matrix + np.outer(residual, step) / (step @ step)
             longest = min(max_step, 2 * np.linalg.norm(step)) if max_step < np.inf else np.inf
         step = _solve(matrix, -residual)
         length = float(np.linalg.norm(step))
@@ -255,11 +279,13 @@ def correct_at(curve: Curve, point: PathPoint, w, tolerance: float) -> PathPoint
     corrected = correct_point(curve, point, w, along, unit, tolerance)
     if corrected is None:
         return None
-    x = corrected[0][:-1]
-    return PathPoint(np.append(x, w[-1]), curve.differentiate(x, w[-1]))
+    found = corrected[0]
+    return found._replace(w=np.append(found.w[:-1], w[-1]))
 
 
-def _take_step(curve: Curve, point: PathPoint, step, unit, tolerance: float):
+def _take_step(
+    curve: Curve, point: PathPoint, step, unit, tolerance: float
+) -> tuple[PathPoint, int] | None:
     """Return the point after a step along the curve as `correct_point` does, or None if it fails or jumps.
 
     Parameters
@@ -279,12 +305,8 @@ def _take_step(curve: Curve, point: PathPoint, step, unit, tolerance: float):
     guess = point.w + unit * step
     corrected = correct_point(curve, point, guess, tangent, unit, tolerance, max_step=1.0)
     if corrected is None:
-        # Beyond a kink of the curve the derivatives differ from those at the point.
-        there = PathPoint(guess, curve.differentiate(guess[:-1], guess[-1]))
-        corrected = correct_point(curve, there, guess, tangent, unit, tolerance, max_step=1.0)
-    if corrected is None:
         return None
-    taken = (corrected[0] - point.w) / unit
+    taken = (corrected[0].w - point.w) / unit
     is_along = float(taken @ tangent) > MIN_STEP_COSINE * float(np.linalg.norm(taken))
     return corrected if is_along else None
 

@@ -161,6 +161,8 @@ def write_probes(rig, state, t, y, probes):
         probes[first + Probe.SLIP] = y[integrals + N_FACE_INTEGRALS * i + 1]
         probes[first + Probe.SLIDE] = point.slide
         probes[first + Probe.LOAD] = max(point.load, 0.0)
+        if i == 0:
+            probes[Probe.VELOCITY] = point.velocity
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
         is_still = rests(memory) or point.velocity == 0
         probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
@@ -215,14 +217,17 @@ def find_margin_root(rig, state, i, k, left, right):
     f_left = find_value(rig, state, left, i, k)
     if f_left < -MARGIN_TOL:
         return left
-    # A margin that starts at 0, or at a round-off above it, may first increase.
-    inside = 0.0
-    while f_left <= MARGIN_TOL:
-        inside = FIRST_LOOK if inside == 0 else 4 * inside
-        if inside > 1:
+    start = left
+    if f_left <= MARGIN_TOL:
+        # A margin that starts at 0, or at a round-off above it, may first increase.
+        inside = FIRST_LOOK
+        while inside <= 1 and find_value(rig, state, left + inside * (right - left), i, k) <= 0:
+            inside *= 4
+        if inside <= 1:
+            start = left + inside * (right - left)
+        elif f_left <= 0:
             return left
-        f_left = find_value(rig, state, left + inside * (right - left), i, k)
-    return find_root(rig, state, i, k, left + inside * (right - left), right)
+    return find_root(rig, state, i, k, start, right)
 
 
 @njit(**NJIT_KERNEL)
@@ -526,7 +531,15 @@ def start_directions(rig, state):
     """Set the directions of motion at the start of a run; a law keeps a direction that it has.
 
     A new law has that of the velocity, or of the acceleration if there is no velocity. A rigid interface without a
-    velocity is at rest.
+    velocity is at rest. A bench prescribes the slide, so that its interface always moves.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion at its start. The memory of each interface is updated: `Memory.DIRECTION` is 1, -1 or, at rest, 0, and
+        `Memory.CONTACT` is -1 where the surfaces are apart.
     """
     n = rig.modes.shape[1]
     t = state.clock[Clock.TIME]

@@ -214,7 +214,8 @@ class PeriodEquations:
         self.reversals = Reversals(
             columns[~is_motion], whole_gain, own, by_motion, np.append(x, parameter), left
         )
-        return PathEquations(jacobian, slope, self._describe(shooting, before, change))
+        motion = self._describe(shooting, before, change)
+        return PathEquations(jacobian, slope, motion, motion.change)
 
     def _describe(self, shooting: _LoopShooting, before: State, change) -> PeriodicMotion:
         """Return the motion of a point, with its multipliers.
@@ -278,17 +279,13 @@ class PeriodEquations:
         guess = first.w + fraction * (second.w - first.w)
         self.restart(first)
         found = correct_point(self.curve, first, guess, tangent, unit, self.tolerance)
-        return None if found is None else self.make_point(found[0])
+        return None if found is None else found[0]
 
     def restart(self, point: PathPoint) -> None:
         """Begin the next correction at a point of the curve."""
         self.before = copy_state(point.equations.details.run.final)
         self.reversals = None
-        self.make_point(point.w)
-
-    def make_point(self, w) -> PathPoint:
-        """Return the point with given unknowns and parameter w (N + 1,)."""
-        return PathPoint(w, self.differentiate(w[:-1], w[-1]))
+        self.differentiate(point.w[:-1], point.w[-1])
 
     def list_crossings(self, path: CurvePath, parameter: float) -> list[PathPoint]:
         """Return the points at which a path passes a value of the parameter, in their order."""

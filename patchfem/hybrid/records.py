@@ -260,7 +260,7 @@ class State(NamedTuple):
     - clock (16,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
     - margins (5, M, 5): margins at the points of a step, and those at the last evaluation
-    - probes (6, 4 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
+    - probes (6, 5 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
     - grip (M, M): force that holds an interface per unit of relative acceleration [kg]
     """
 
@@ -293,6 +293,7 @@ class Probe(IntEnum):
 
     - SPEED: velocity of the output [m/s]
     - TRAVEL: largest displacement of the output, less its present magnitude [m]
+    - VELOCITY: relative velocity of the first interface [m/s]
     - SLIPPING: |slip rate| - |velocity|/2 [m/s] of the first interface, negative in stick. Others precede it
     """
 
@@ -308,7 +309,8 @@ class Probe(IntEnum):
     # from the end
     SPEED = -1
     TRAVEL = -2
-    SLIPPING = -3
+    VELOCITY = -3
+    SLIPPING = -4
 
 
 class Cycle(IntEnum):

@@ -41,7 +41,9 @@ MIN_FACTOR = 0.2  # smallest ratio of successive steps
 
 @njit(**NJIT_KERNEL)
 def find_stages(rig, state, h, first, last, y):
-    """Compute the stages from `first` to `last` - 1 of a step h; y is the state of the last one afterwards.
+    """Compute the stages from `first` to `last` - 1 of a step h: k_i = f(t + C_i h, y + h sum_j A_ij k_j).
+
+    A and C are the weights and times of the method of order 8, and k_i is row i of `State.rows`.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ def find_stages(rig, state, h, first, last, y):
     last : int
         Stage after the last one.
     y : (n,) array
-        State of the last stage, which is written.
+        State at the last stage, in the order of `State.y` (output).
     """
     for stage in range(first, last):
         copy_values(state.y, y)

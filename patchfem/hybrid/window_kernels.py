@@ -38,14 +38,18 @@ WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
 MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
+EXTREME_REACH = (
+    1e-3  # distance from a located extreme, as a fraction of a step, within which the velocity is 0
+)
 EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
 
 
 @njit(**NJIT_KERNEL)
 def raise_extreme(rig, state, fraction, column, sign, known):
-    """Return the largest (sign 1) or smallest (-1) of a known value and the values of a scalar in a step.
+    """Return the largest (sign 1) or smallest (-1) of a known value and the values of a scalar in a step, and its place.
 
-    The scalar is known at the nodes. If the result lies in this step, the last evaluation is there.
+    The scalar is known at the nodes. If the result lies in this step, its place is a fraction of the step, and the last
+    evaluation is there; otherwise the place is -1.
 
     Parameters
     ----------
@@ -68,7 +72,7 @@ def raise_extreme(rig, state, fraction, column, sign, known):
             best = node
     value = sign * state.probes[best, column]
     if value <= sign * known - NEAR_EXTREME * abs(known):
-        return known
+        return known, -1.0
 
     # Successive parabolas through the best point and its neighbours.
     x = NODES[best]
@@ -94,9 +98,9 @@ def raise_extreme(rig, state, fraction, column, sign, known):
         width *= 0.3
         middle = min(max(at, width), 1 - width)
     if value <= sign * known:
-        return known
+        return known, -1.0
     find_value(rig, state, fraction * x, -1, column)
-    return sign * value
+    return sign * value, fraction * x
 
 
 @njit(**NJIT_KERNEL)
@@ -191,8 +195,8 @@ def observe_window(rig, state, record, cycle, fraction):
 
     for k in range(record.extremes.shape[0]):
         row = record.extremes[k]
-        row[Extreme.MIN] = raise_extreme(rig, state, fraction, k, -1.0, row[Extreme.MIN])
-        row[Extreme.MAX] = raise_extreme(rig, state, fraction, k, 1.0, row[Extreme.MAX])
+        row[Extreme.MIN] = raise_extreme(rig, state, fraction, k, -1.0, row[Extreme.MIN])[0]
+        row[Extreme.MAX] = raise_extreme(rig, state, fraction, k, 1.0, row[Extreme.MAX])[0]
     for i in range(rig.faces.shape[0]):
         row = record.faces[i]
         add_stick(rig, state, fraction, i, row)
@@ -224,11 +228,19 @@ def observe_reversal(rig, state, fraction, cycle, sign, column):
     slide = Probe.FACES + Probe.SLIDE
     force = Probe.FACES + Probe.FORCE
     known = cycle[column]
-    value = raise_extreme(rig, state, fraction, slide, sign, known)
+    value, at = raise_extreme(rig, state, fraction, slide, sign, known)
     size = EVENT_SLIDE_TOL * abs(value)
     if abs(state.probes[0, slide] - known) <= size and abs(value - known) <= size:
         cycle[column + 1] = 0.5 * (cycle[column + 1] + state.probes[0, force])
     elif value != known:
+        # Values locate an extreme only to the root of round-off, which shows in a force that is steep in the velocity.
+        left = max(at - EXTREME_REACH, 0.0)
+        right = min(at + EXTREME_REACH, fraction)
+        speed = find_value(rig, state, left, -1, Probe.VELOCITY)
+        if speed * find_value(rig, state, right, -1, Probe.VELOCITY) < 0:
+            find_root(rig, state, -1, Probe.VELOCITY, left, right)
+        else:
+            find_value(rig, state, at, -1, slide)
         cycle[column] = value
         cycle[column + 1] = state.probes[LAST_PROBES, force]
 

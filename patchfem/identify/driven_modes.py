@@ -141,10 +141,13 @@ def fit_driven_modes(
         )
     w = fit.omega
     zeta = fit.damping
+
+    # The spectrum that shows the modes resolves no lower frequency; filters and aliasing distort the highest ones.
     min_frequency, max_frequency = band
     lowest = WINDOW_WIDTH_LINES * N_SEGMENTS / (force.size * step)
     min_w = 2 * np.pi * max(min_frequency, lowest)
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
+
     # a mode with a damping ratio at a bound represents noise or a trend, not a resonance
     is_resonance = (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
     is_kept = (w >= min_w) & (w <= max_w) & is_resonance

@@ -1,14 +1,29 @@
-"""Errors for damaged files."""
+"""Errors for damaged files, and short quotations of what files contain."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason; longer reasons are cut
+MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason
+MAX_LISTED = 12  # largest number of names that a message lists
 
 # Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
 MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
+
+
+def shorten(text, length: int = 40) -> str:
+    """Make a text from a file or a library printable and at most `length` characters long."""
+    text = " ".join(str(text).split())
+    if not text.isprintable():
+        text = text.encode("unicode_escape").decode()
+    return text if len(text) <= length else f"{text[: length - 3]}..."
+
+
+def list_some(texts: Sequence[str]) -> str:
+    """Join texts with commas; those beyond `MAX_LISTED` are only counted."""
+    n_more = len(texts) - MAX_LISTED
+    return ", ".join(texts[:MAX_LISTED]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 @contextmanager
@@ -22,7 +37,5 @@ def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     except (PatchfemError, *MISTAKES):
         raise
     except Exception as error:
-        reason = " ".join(str(error).split())[:MAX_REASON_LENGTH]
-        if not reason.isprintable():
-            reason = type(error).__name__
+        reason = shorten(error, MAX_REASON_LENGTH)
         raise PatchfemError(f"{message} ({reason}){remedy}") from None

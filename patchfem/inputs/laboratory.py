@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from . import matlab, universal
+from .damage import shorten
 from .loops import EXPORTED_NAMES, find_standard_name
 from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
@@ -20,7 +21,7 @@ from .records import (
     RequestedChannel,
     select_channels,
 )
-from .tables import NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
+from .tables import MAX_LINE_LENGTH, NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
 from .units import CHANNEL_UNITS
 
 EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
@@ -110,7 +111,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     if len(names) > MAX_TABLE_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-            f"needed, not '{table.separator.join(names)[:80]}'"
+            f"needed, not '{shorten(table.header, MAX_LINE_LENGTH)}'"
         )
     columns = [name.lower().replace(" ", "_") for name in names]
     channels = []
@@ -123,7 +124,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
             channels.append(Channel(name, "", quantity, unit or "", values))
         elif column in CHANNEL_UNITS or has_decimal_comma(cells[row]):
             # This cell is no number, and the error says why.
-            parse_number(f"{path}:{row + 2}: {name}", cells[row], 1.0)
+            parse_number(f"{path}:{row + 2}: {shorten(name)}", cells[row], 1.0)
     return channels
 
 

@@ -1,15 +1,16 @@
 """A measured friction loop: rows of displacement and force, and optionally time and labels."""
 
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError
 from .tables import TableFormat, read_columns, require_increasing_time
-from .units import FORCE_UNITS, SLIDE_UNITS
+from .units import CHANNEL_UNITS
 
+READING_NAMES = ("force", "friction_ratio")  # quantities of which a loop has exactly one
 LOOP_HEADER = "time [s],displacement [um],force [N]"
 # Columns of `patchfem export` for each quantity, the preferred one first.
 EXPORTED_NAMES = {
@@ -18,8 +19,7 @@ EXPORTED_NAMES = {
 }
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Loop:
+class Loop(NamedTuple):
     """A measured friction loop.
 
     - path: file.
@@ -36,49 +36,6 @@ class Loop:
     reading: np.ndarray
     quantity: str
     labels: dict[str, tuple[str, ...]]
-
-    def select_rows(self, condition: str) -> np.ndarray:
-        """Return a mask of the rows (k,) whose label fulfils a condition "column=value,value".
-
-        Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
-        one of the values.
-
-        Parameters
-        ----------
-        condition : str
-            Option such as "cycle=1,2". The column is one of `labels`.
-
-        Returns
-        -------
-        (k,) bool array
-        """
-        name, equals, text = map(str.strip, condition.partition("="))
-        texts = [value.strip() for value in text.split(",")]
-        if not equals or not all(texts):
-            raise PatchfemError(
-                f"--hold {condition}: column=value,value is needed, such as cycle=1,2"
-            )
-
-        # Only a column of labels can choose rows.
-        if name not in self.labels:
-            known = ", ".join(self.labels) or "none"
-            raise PatchfemError(
-                f"--hold {name}: {self.path} has no column of labels with this name (it has: {known}); "
-                "add a column of labels, such as `run`, because rows cannot be chosen by time, "
-                "displacement or force"
-            )
-        values = [_parse_label(cell) for cell in self.labels[name]]
-        absent = [text for text in texts if _parse_label(text) not in values]
-        if absent:
-            known = ", ".join(dict.fromkeys(self.labels[name]))
-            raise PatchfemError(
-                f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
-                f"{known[:200]})"
-            )
-
-        # Cells and texts are compared as numbers where both are numbers.
-        selected = set(map(_parse_label, texts))
-        return np.array([value in selected for value in values])
 
 
 def read_loop(path) -> Loop:
@@ -103,7 +60,7 @@ def read_loop(path) -> Loop:
         If the table is not a loop; the message names the line.
     """
     path = Path(path)
-    known = {**FORCE_UNITS, **SLIDE_UNITS}
+    known = {name: CHANNEL_UNITS[name] for name in (*READING_NAMES, "time", "displacement")}
     for quantity, names in EXPORTED_NAMES.items():
         known |= dict.fromkeys(names, known[quantity])
     required = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
@@ -116,7 +73,7 @@ def read_loop(path) -> Loop:
     }
 
     # The table has either a force or a ratio.
-    quantities = [name for name in FORCE_UNITS if name in values]
+    quantities = [name for name in READING_NAMES if name in values]
     if not quantities:
         raise PatchfemError(
             f"{path}:1: no column force; write a header like `{LOOP_HEADER}` (or friction_ratio for "
@@ -132,7 +89,7 @@ def read_loop(path) -> Loop:
     displacement = values["displacement"]
     time = values.get("time")
     if time is not None:
-        require_increasing_time(path, time)
+        require_increasing_time(f"{path}:", time)
     if not np.ptp(displacement):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
     if not values[quantity].any():
@@ -165,11 +122,3 @@ def find_standard_name(
         if quantity not in names and present[:1] == [name]:
             return quantity
     return name
-
-
-def _parse_label(text: str) -> float | str:
-    """Return the text of a label as a number if it is one, or else unchanged."""
-    try:
-        return float(text)
-    except ValueError:
-        return text

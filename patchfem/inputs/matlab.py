@@ -52,6 +52,9 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
         check_file(Path(path), REMEDY)
         data = Path(path).read_bytes()
     is_hdf5 = data.startswith((HDF5_SIGNATURE, b"MATLAB 7.3")) or data[512:520] == HDF5_SIGNATURE
+
+    # The size after unpacking is limited first. Damaged elements are refused before SciPy reads them, because some of them
+    # would end the process.
     arrays = {}
     with refuse_damage(f"{path}: no readable MATLAB file", "; save it anew"):
         if is_hdf5:

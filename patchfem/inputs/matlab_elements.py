@@ -99,15 +99,16 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
 def _list_variables(data: bytes) -> Iterator[Element]:
     """Iterate over the variables of a file with a content, or over nothing for another version."""
     order = VERSION_5_MARKS.get(data[124:128])
-    place = HEADER_BYTES if order else len(data)
-    while place + 8 <= len(data):
-        stop = place + 8 + int.from_bytes(data[place + 4 : place + 8], order)
-        yield Element(int.from_bytes(data[place : place + 4], order), place + 8, stop)
-        place = stop
+    return _list_elements(data, order, HEADER_BYTES if order else len(data), len(data), unit=1)
 
 
-def _list_elements(data: bytes, order: str, place: int, stop: int) -> Iterator[Element]:
-    """Iterate over the elements between two places of a content, in the order "little" or "big" of its bytes."""
+def _list_elements(
+    data: bytes, order: str, place: int, stop: int, unit: int = 8
+) -> Iterator[Element]:
+    """Iterate over the elements between two places of a content, in the order "little" or "big" of its bytes.
+
+    Inside a variable they begin at multiples of eight bytes, the `unit`.
+    """
     while place + 8 <= min(stop, len(data)):
         kind = int.from_bytes(data[place : place + 4], order)
         # Up to four bytes stand in the place of their number, which is in the upper half of the type.
@@ -118,4 +119,4 @@ def _list_elements(data: bytes, order: str, place: int, stop: int) -> Iterator[E
             continue
         count = int.from_bytes(data[place + 4 : place + 8], order)
         yield Element(kind, place + 8, place + 8 + count)
-        place += 8 + -(-count // 8) * 8  # elements begin at multiples of eight bytes
+        place += 8 + -(-count // unit) * unit

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..core import PatchfemError
 from . import matlab
-from .damage import refuse_damage
+from .damage import list_some, refuse_damage
 from .packed import count_zip_bytes, refuse_large_content
 from .symmetric import SKEW_REFUSAL, symmetrize
 
@@ -27,7 +27,6 @@ MATRIX_NAMES = {
 }
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
-MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
 
 
 class Matrix(NamedTuple):
@@ -81,12 +80,11 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
     # The rows of all files are those of the sorted degrees of freedom.
     if with_places:
         places, index = _rank_dofs(np.vstack([matrix.places for matrix in matrices]))
-        ends = np.cumsum([len(matrix.places) for matrix in matrices])
-        parts = np.split(index, ends[:-1])
-        return [
-            Matrix(_insert_empty_rows(matrix.values, rows, len(places)), places)
-            for matrix, rows in zip(matrices, parts)
-        ]
+        aligned = []
+        for matrix in matrices:
+            rows, index = np.split(index, [len(matrix.places)])
+            aligned.append(Matrix(_spread_rows(matrix.values, rows, len(places)), places))
+        return aligned
 
     # A file without size may end before the last row, which then has no entry.
     n = max(matrix.values.shape[0] for matrix in matrices)
@@ -95,21 +93,15 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
         raise PatchfemError(
             "the matrices differ in size: " + " and ".join(f"{size} x {size}" for size in sizes)
         )
-    return [matrix._replace(values=_append_empty_rows(matrix.values, n)) for matrix in matrices]
+    return [
+        matrix._replace(values=_spread_rows(matrix.values, np.arange(n), n)) for matrix in matrices
+    ]
 
 
-def _append_empty_rows(values, n: int) -> sparse.csr_array:
-    """Return a sparse matrix (n, n): the given values, followed by empty rows and columns."""
-    if values.shape[0] < n:
-        values = values.copy()
-        values.resize((n, n))
-    return values
-
-
-def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
+def _spread_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
     """Expand a sparse matrix (m, m) of values to (n, n) by empty rows and columns.
 
-    `rows` (m,) are the positions of its rows in the result.
+    The first m of `rows` are the positions of its rows and columns in the result.
     """
     matrix = values.tocoo()
     i, j = matrix.coords
@@ -128,7 +120,7 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
             return short_names[known]
     names = list(names)
     if len(names) != 1:
-        contents = ", ".join(names[:MAX_LISTED_ARRAYS]) or "none"
+        contents = list_some(names) or "none"
         raise PatchfemError(
             f"{path}: contains no {matrix_name} under a known name ({', '.join(MATRIX_NAMES[matrix_name])}); its arrays: "
             f"{contents}"
@@ -261,11 +253,7 @@ def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
 
 def _read_matlab(path: Path, matrix_name: str) -> Matrix:
     """Read the "stiffness", "mass" or "damping" (`matrix_name`) of the MATLAB file `path`."""
-    arrays = {
-        name: array
-        for name, array in matlab.read_variables(path).items()
-        if array.dtype.kind in matlab.NUMBER_KINDS
-    }
+    arrays = matlab.read_variables(path)
     return _make_matrix(path, arrays[_find_matrix_name(path, arrays, matrix_name)])
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..exceptions import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
+from .damage import shorten
 from .tables import TableFormat, find_factors, parse_number, read_text
 
 # Factors to SI by unit, for each column of numbers in a table of measured responses
@@ -80,7 +81,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
     unknown = [name for name in table.names if name not in (*COLUMN_UNITS, "flag")]
     if unknown:
         raise PatchfemError(
-            f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
+            f"{path}:1: column '{shorten(unknown[0])}' is unknown; possible columns are flag and "
             f"{', '.join(COLUMN_UNITS)}"
         )
     rows = []
@@ -111,14 +112,14 @@ def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) 
     flag = cells.get("flag", "")
     if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(
-            f"{location}flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
+            f"{location}flag '{shorten(flag)}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
         )
     values = dict.fromkeys(COLUMN_UNITS)
     for name, factor in factors.items():
         if cells[name]:
             values[name] = parse_number(location + name, cells[name], factor)
             if values[name] < 0:
-                raise PatchfemError(f"{location}{name}: '{cells[name][:40]}' is below 0")
+                raise PatchfemError(f"{location}{name}: '{shorten(cells[name])}' is below 0")
     if values["frequency"] is None or values["input"] is None:
         raise PatchfemError(f"{location}frequency and input are needed in every row")
     return MeasuredRow(**values, flag=flag)

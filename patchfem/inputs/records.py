@@ -2,17 +2,17 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
+from .damage import list_some, shorten
+from .tables import require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
 MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
-MAX_LISTED_CHANNELS = 12  # largest number of channels that an error message lists
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 
@@ -50,20 +50,17 @@ class RequestedChannel(NamedTuple):
     unit: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Records:
+class Records(NamedTuple):
     """Channels in SI with a common time axis.
 
-    - path: file that was read.
     - values: values (k,) of each quantity by name, with `time` [s] first if there is one.
     - notes: sentences on what was not read as it stands.
     - channel_list: all channels of the file in words.
     """
 
-    path: Path
     values: dict[str, np.ndarray]
-    notes: list[str] = field(default_factory=list)
-    channel_list: str = ""
+    notes: list[str]
+    channel_list: str
 
 
 def check_file(path: Path, remedy: str) -> None:
@@ -137,8 +134,12 @@ def select_channels(
         channels have different times.
     """
     channel_list = describe_channels(channels)
+    # A unit that the user states overrules that of the file.
     if requests:
-        selected = [_make_requested_channel(path, channels, request) for request in requests]
+        selected = []
+        for quantity, source, unit in requests:
+            channel = find_channel(path, channels, source)._replace(quantity=quantity)
+            selected.append(channel._replace(unit=unit, factor=None) if unit else channel)
     else:
         selected = [channel for channel in channels if channel.quantity]
 
@@ -165,15 +166,6 @@ def select_channels(
     if time is not None:
         values = {"time": time, **values}
     return make_records(path, values, notes, channel_list)
-
-
-def _make_requested_channel(path, channels: list[Channel], request: RequestedChannel) -> Channel:
-    """Return a channel with the quantity of a request, and the unit if the request has one.
-
-    `path` names the file of the `channels` in messages.
-    """
-    channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
-    return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
 
 def find_channel(path, channels: list[Channel], source: str) -> Channel:
@@ -209,24 +201,22 @@ def find_channel(path, channels: list[Channel], source: str) -> Channel:
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
     raise PatchfemError(
-        f"{path}: no channel '{source[:60]}'; the file has {describe_channels(channels)}"
+        f"{path}: no channel '{shorten(source, 60)}'; the file has {describe_channels(channels)}"
     )
 
 
 def describe_channels(channels: list[Channel]) -> str:
     """Return a list of the channels as text, with number, name, degree of freedom and unit."""
     texts = []
-    for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
+    for number, channel in enumerate(channels, 1):
         place = f" at {channel.place}" if channel.place else ""
-        unit = f" [{channel.unit[:20]}]" if channel.unit else ""
-        texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
-    n_unlisted = len(channels) - MAX_LISTED_CHANNELS
-    listed = ", ".join(texts) or "no channel of numbers"
-    return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
+        unit = f" [{shorten(channel.unit, 20)}]" if channel.unit else ""
+        texts.append(f"{number} '{shorten(channel.name)}'{place}{unit}")
+    return list_some(texts) or "no channel of numbers"
 
 
 def make_records(
-    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str = ""
+    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str
 ) -> Records:
     """Check arrays in SI and return them as `Records`.
 
@@ -268,16 +258,10 @@ def make_records(
                 f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number"
             )
 
-    time = values.get("time")
-    late = [] if time is None else np.flatnonzero(np.diff(time) <= 0)
-    if len(late):
-        k = late[0]
-        raise PatchfemError(
-            f"{path}: time {time[k + 1]:.9g} s of sample {k + 2} is not later than "
-            f"{time[k]:.9g} s of the sample before; times must strictly rise"
-        )
+    if "time" in values:
+        require_increasing_time(f"{path}: sample ", values["time"], second_row=2)
     frozen = {name: frozen_array(column) for name, column in values.items()}
-    return Records(Path(path), frozen, notes, channel_list)
+    return Records(frozen, notes, channel_list)
 
 
 def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -298,7 +282,7 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
     if factor is None:
         if not channel.unit and "" not in CHANNEL_UNITS[quantity]:
             raise PatchfemError(
-                f"{path}: '{channel.name[:40]}' has no unit; write --map "
+                f"{path}: '{shorten(channel.name)}' has no unit; write --map "
                 f'"{quantity}=CHANNEL [{SI_UNITS[quantity]}]"'
             )
         factor = find_unit_factor(quantity, channel.unit, f"{path}: ")
@@ -320,8 +304,8 @@ def _find_shared_time(
     for channel in selected:
         if channel.time is None or not np.array_equal(channel.time, times[0]):
             raise PatchfemError(
-                f"{path}: '{channel.name[:40]}' is sampled at other times than "
-                f"'{selected[0].name[:40]}'; use --map to choose channels that have the same "
+                f"{path}: '{shorten(channel.name)}' is sampled at other times than "
+                f"'{shorten(selected[0].name)}'; use --map to choose channels that have the same "
                 f"times; the channels are {channel_list}"
             )
     return times[0]

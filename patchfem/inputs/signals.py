@@ -9,7 +9,7 @@ from ..scene.keys.quantities import UNIT_FACTORS
 from .records import select_channels
 from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS
-from .universal import OrdinateType, make_channels, read_datasets
+from .universal import make_channels, read_datasets
 
 # End of the message if there is no file of a drive signal
 FILE_REMEDY = "; drive.file is relative to the scene"
@@ -65,7 +65,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
         values = read_columns(path, table).values
         time = values["time"]
         value = values[quantity]
-        require_increasing_time(path, time)
+        require_increasing_time(f"{path}:", time)
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)
@@ -104,17 +104,12 @@ def read_spectrum(path) -> tuple[np.ndarray, np.ndarray]:
 def _read_universal(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     """Read time [s] and values of the only time response of a quantity in the universal file `path`.
 
-    Datasets of this data type, or of no stated one, count.
+    Datasets for which the file states this quantity, or none, count.
     """
-    kind = OrdinateType[quantity.upper()]
-    datasets = read_datasets(path)
-    candidates = [
-        {**dataset, "ordinate_spec_data_type": kind}
-        for dataset in datasets
-        if dataset["type"] != 58 or int(dataset["ordinate_spec_data_type"]) in (kind, 0)
-    ]
     notes = []
-    channels = make_channels(path, candidates, notes)
+    datasets = read_datasets(path)
+    channels = make_channels(path, datasets, notes, quantity)
+    channels = [channel for channel in channels if channel.quantity == quantity]
     if len(channels) != 1:
         raise PatchfemError(
             f"{path}: exactly one time response (dataset 58, function type 1) of {quantity} is needed; "

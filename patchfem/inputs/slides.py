@@ -61,7 +61,7 @@ def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
                 "import --zero`"
             )
     time, displacement = columns.values()
-    require_increasing_time(path, time)
+    require_increasing_time(f"{path}:", time)
     if not np.any(displacement):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
     return time, displacement

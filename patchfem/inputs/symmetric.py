@@ -29,9 +29,9 @@ def to_real(values, subject: str):
     PatchfemError
         If an imaginary part is not 0.
     """
-    values = numbers = values if sparse.issparse(values) else np.asarray(values)
-    if sparse.issparse(values):
-        numbers = values.data
+    is_sparse = sparse.issparse(values)
+    values = values if is_sparse else np.asarray(values)
+    numbers = values.data if is_sparse else values
     if not np.iscomplexobj(numbers):
         return values
 
@@ -52,8 +52,8 @@ def to_real(values, subject: str):
     )
 
 
-def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
-    """Return an array as finite real numbers of a magnitude with which the program can compute.
+def read_row(values, subject: str, n: int, *, allows_rows: bool = False) -> np.ndarray:
+    """Return a row of finite real numbers of a magnitude with which the program can compute.
 
     Parameters
     ----------
@@ -61,19 +61,19 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
         Array to be checked.
     subject : str
         Name of the array, at the beginning of messages.
-    *shapes : tuple of int or None
-        Shapes that are allowed; None stands for any length. The last length of the first one is the number of
-        coordinates. Without a shape the array is flattened.
+    n : int
+        Number of coordinates, which is the length of the row.
+    allows_rows : bool
+        Whether several rows (k, n) are accepted, too.
 
     Returns
     -------
-    ndarray of float
-        An array with at least one number.
+    (n,) or (k, n) ndarray of float
 
     Raises
     ------
     PatchfemError
-        If the array is empty, has none of the shapes, or holds anything but such numbers.
+        If the array is empty, has another shape, or holds anything but such numbers.
     """
     values = np.asarray(to_real(values, subject))
     if values.dtype.kind not in "iufb":
@@ -91,25 +91,15 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
         )
     if not values.size:
         raise PatchfemError(f"{subject} is empty; at least one number is needed")
-    if not shapes:
-        return values.ravel()
-
-    # The first shape that fits is accepted.
-    for shape in shapes:
-        lengths = zip(shape, values.shape)
-        if len(shape) == values.ndim and all(length in (None, size) for length, size in lengths):
-            return values
-    needed = " or ".join(_format_shape(shape) for shape in shapes)
+    # A row may be given as a column.
+    if not allows_rows and values.ndim == 2 and 1 in values.shape:
+        values = values.ravel()
+    if values.shape == (n,) or (allows_rows and values.ndim == 2 and values.shape[1] == n):
+        return values
+    needed = f"({n},) or (k, {n})" if allows_rows else f"({n},)"
     raise PatchfemError(
-        f"{subject} has shape {_format_shape(values.shape)}, but there are {shapes[0][-1]} coordinates or modes; "
-        f"shape {needed} is needed"
+        f"{subject} has shape {values.shape}, but there are {n} coordinates or modes; shape {needed} is needed"
     )
-
-
-def _format_shape(shape: tuple[int | None, ...]) -> str:
-    """Return a shape as text, such as (k, 2), where k stands for any length."""
-    lengths = ["k" if length is None else str(length) for length in shape]
-    return f"({', '.join(lengths)}{',' if len(shape) == 1 else ''})"
 
 
 def symmetrize(values, subject: str):
@@ -137,7 +127,7 @@ def symmetrize(values, subject: str):
         raise PatchfemError(f"{subject} is not a matrix of real numbers") from None
     if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
         raise PatchfemError(
-            f"{subject} must be square with at least one row, not of shape {_format_shape(values.shape)}"
+            f"{subject} must be square with at least one row, not of shape {values.shape}"
         )
     if not np.isfinite(values.data if sparse.issparse(values) else values).all():
         raise PatchfemError(

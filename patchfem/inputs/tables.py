@@ -10,24 +10,23 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
 from ..exceptions import Missing, PatchfemError
+from .damage import shorten
 from .units import normalize_unit
 
 if TYPE_CHECKING:
     import numpy as np
 
 MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
+MAX_LINE_LENGTH = 80  # largest number of characters of a quoted line
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 # Pattern of a number in a table
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
-# Words for the numbers of cells in messages
-_NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
 class TableFormat(NamedTuple):
@@ -48,30 +47,29 @@ class TableFormat(NamedTuple):
     remedy: str = ""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Columns:
+class Columns(NamedTuple):
     """Columns of a table; row i is on line i + 2 of the file, because the header is on line 1.
 
     - values: values (k,) in SI of each column of numbers, by its name.
     - labels: k texts of each other column, by its name.
-    - rows: number k of rows.
     """
 
     values: dict[str, np.ndarray]
     labels: dict[str, tuple[str, ...]]
-    rows: int
 
 
 class TextTable(NamedTuple):
     """Text of a table.
 
     - path: file.
+    - header: first line of the file.
     - names, units: name and unit of each column. The unit is None if there is none.
     - separator: sign between the cells.
     - lines: lines below the header, without blank ones at the end.
     """
 
     path: Path
+    header: str
     names: list[str]
     units: list[str | None]
     separator: str
@@ -87,35 +85,12 @@ class TextTable(NamedTuple):
                 continue
             cells = split_cells(f"{self.path}:{number}", line, self.separator)
             if len(cells) != len(self.names):
-                count = len(self.names)
-                words = _NUMBER_WORDS[count] if count < len(_NUMBER_WORDS) else count
-                columns = " and ".join(filter(None, (", ".join(self.names[:-1]), self.names[-1])))
+                columns = shorten(", ".join(self.names), 3 * MAX_LINE_LENGTH)
                 raise PatchfemError(
-                    f"{self.path}:{number}: {words} cells are needed, {columns}, not '{line.strip()[:80]}'"
+                    f"{self.path}:{number}: the number of cells must be {len(self.names)} ({columns}), not "
+                    f"{len(cells)} as in '{shorten(line, MAX_LINE_LENGTH)}'"
                 )
             yield number, cells
-
-
-def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
-    """Read the lines of the text file `path`.
-
-    The last one is empty after a final line break. `contents` says in messages what the file is, and `remedy` what to do
-    if there is no such file.
-    """
-    try:
-        with open_for_reading(path) as file:
-            text = file.read(MAX_BYTES + 1)
-        if len(text) > MAX_BYTES:
-            raise PatchfemError(
-                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
-            )
-        lines = text.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-        return lines.split("\n")
-    except FileNotFoundError:
-        raise Missing(f"{path}: there is no such file{remedy}") from None
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
 
 
 def split_cells(location: str, line: str, separator: str) -> list[str]:
@@ -162,14 +137,29 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     PatchfemError
         If the file cannot be read or is too large.
     """
-    header, *lines = _read_lines(path, contents, remedy)
+    try:
+        with open_for_reading(path) as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise PatchfemError(
+                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
+            )
+        text = data.decode("utf-8-sig")
+    except FileNotFoundError:
+        raise Missing(f"{path}: there is no such file{remedy}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
+
+    # Lines end as on any system. Blank ones at the end do not count.
+    header, *lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     while lines and not lines[-1].strip():
         lines.pop()
     separator = max(",;\t", key=header.count)
     cells = split_cells(f"{path}:1", header, separator)
     heads = [_HEAD_PATTERN.fullmatch(cell).groups() for cell in cells]
     units = [unit if other is None else other for _, unit, other in heads]
-    return TextTable(path, [name for name, *_ in heads], units, separator, lines)
+    return TextTable(path, header, [name for name, *_ in heads], units, separator, lines)
 
 
 def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
@@ -178,11 +168,8 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     Raises PatchfemError if the header is not that of the format, `form`.
     """
     names = table.names
-    heads = []
-    for name, unit in zip(names, table.units):
-        heads.append(name if unit is None else f"{name} [{unit}]")
-    header = table.separator.join(heads)
-    expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{header[:80]}'"
+    quoted = shorten(table.header, MAX_LINE_LENGTH)
+    expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{quoted}'"
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")
 
@@ -198,9 +185,10 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
         if factors[name] is None:
             known = ", ".join(filter(None, units))
             raise PatchfemError(
-                f"{table.path}:1: {name} [{unit}]: unknown unit; use one of {known}"
+                f"{table.path}:1: {name} [{shorten(unit)}]: unknown unit; use one of {known}"
             )
 
+    # An entry such as "displacement slide" is met by either column.
     absent = [text.split()[0] for text in form.required if not set(text.split()) & set(names)]
     if absent:
         raise PatchfemError(f"{expected} (no column {', '.join(absent)})")
@@ -233,7 +221,7 @@ def parse_number(location: str, cell: str, factor: float) -> float:
         reason = "is not a finite number"
         if has_decimal_comma(cell):
             reason = "has a decimal comma; export the file with decimal points"
-        raise PatchfemError(f"{location}: '{cell[:80]}' {reason}")
+        raise PatchfemError(f"{location}: '{shorten(cell)}' {reason}")
     value = float(cell) * factor
     if abs(value) > MAX_VALUE:
         raise PatchfemError(
@@ -263,8 +251,6 @@ def read_columns(path, form: TableFormat) -> Columns:
     PatchfemError
         If the file is not such a table; the message names the line.
     """
-    import numpy as np
-
     from ..core import frozen_array
 
     path = Path(path)
@@ -277,51 +263,63 @@ def read_columns(path, form: TableFormat) -> Columns:
         )
 
     # Cells are read one by one only if there is text among them, or a cell at fault to name.
-    labels = {name: [] for name in table.names if name not in factors}
-    values = None if labels else _read_numbers(table, list(factors.values()))
-    if values is None:
+    values = {} if len(factors) < len(table.names) else _read_numbers(table, factors)
+    if values:
+        return Columns(values, {})
+    labels = {}
+    rows = [cells for _, cells in table.iterate_rows()]
+    for name, cells in zip(table.names, zip(*rows)):
+        if name not in factors:
+            labels[name] = cells
+            continue
         numbers = []
-        for number, cells in table.iterate_rows():
-            row = dict(zip(table.names, cells))
-            for name, texts in labels.items():
-                texts.append(row[name])
-            place = f"{path}:{number}: "
-            numbers.append(
-                [parse_number(place + name, row[name], factor) for name, factor in factors.items()]
-            )
-        values = np.array(numbers).reshape(len(numbers), len(factors))
-
-    return Columns(
-        {name: frozen_array(column) for name, column in zip(factors, values.T)},
-        {name: tuple(texts) for name, texts in labels.items()},
-        len(values),
-    )
+        for line, cell in enumerate(cells, 2):
+            numbers.append(parse_number(f"{path}:{line}: {name}", cell, factors[name]))
+        values[name] = frozen_array(numbers)
+    return Columns(values, labels)
 
 
-def _read_numbers(table: TextTable, factors: list[float]) -> np.ndarray | None:
-    """Return the rows (k, columns) of a table that contains only numbers, in SI.
+def _read_numbers(table: TextTable, factors: dict[str, float]) -> dict[str, np.ndarray]:
+    """Return the columns (k,) of a table that contains only numbers in range, in SI, and else nothing.
 
-    It is None if a cell is not a number, or out of range. `factors` are those to SI by column. NumPy's reader takes a
-    tenth of the time of `parse_number`, but does not say which cell is wrong.
+    `factors` are those to SI by column. NumPy's reader takes a tenth of the time of `parse_number`, but does not say
+    which cell is wrong.
     """
     import numpy as np
+
+    from ..core import frozen_array
 
     try:
         values = np.loadtxt(table.lines, delimiter=table.separator, comments=None, ndmin=2)
     except ValueError:
-        return None
-    if values.shape != (len(table.lines), len(factors)):  # NumPy leaves out blank lines
-        return None
-    values = values * factors
-    return values if (np.abs(values) <= MAX_VALUE).all() else None
+        return {}
+    # NumPy leaves out blank lines.
+    if values.shape != (len(table.lines), len(factors)):
+        return {}
+    values = values * list(factors.values())
+    if not (np.abs(values) <= MAX_VALUE).all():
+        return {}
+    return {name: frozen_array(column) for name, column in zip(factors, values.T)}
 
 
-def require_increasing_time(path, time: np.ndarray) -> None:
-    """Raise PatchfemError at the first row of the table `path` whose time (k,) [s] does not rise."""
-    is_late = time[1:] <= time[:-1]
-    if is_late.any():
-        k = int(is_late.argmax())
+def require_increasing_time(place: str, time: np.ndarray, second_row: int = 3) -> None:
+    """Raise PatchfemError at the first row whose time (k,) [s] does not rise.
+
+    Parameters
+    ----------
+    place : str
+        Beginning of the message, which the number of the row follows, such as ``a.csv:``.
+    time : (k,) array
+        Times [s].
+    second_row : int
+        Number of the second row, 3 in a table with a header.
+    """
+    import numpy as np
+
+    late = np.flatnonzero(np.diff(time) <= 0)
+    if late.size:
+        k = int(late[0])
         raise PatchfemError(
-            f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
-            f"{time[k]:g} s; times must strictly rise"
+            f"{place}{k + second_row}: time {time[k + 1]:.9g} s is not later than the time before it, "
+            f"{time[k]:.9g} s; times must strictly rise"
         )

@@ -9,24 +9,20 @@ import re
 from ..exceptions import PatchfemError
 from ..scene.keys import quantities
 from ..scene.keys.quantities import UNIT_FACTORS
+from .damage import shorten
 
 # Factors of the units of a ratio, such as a damping ratio
 RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
-# Factors to SI by unit, for each column of a prescribed slide
-SLIDE_UNITS = {"time": UNIT_FACTORS["time"], "displacement": UNIT_FACTORS["length"]}
-# Factors to SI by unit, for each column that a friction loop may be read from
-FORCE_UNITS = {"force": UNIT_FACTORS["force"], "friction_ratio": RATIO_UNITS}
-# Factors to SI by unit, for each quantity that a record may contain besides time. A reader ignores those that it does
-# not need.
-RECORD_UNITS = {
+# Factors to SI by unit, for each quantity of a channel. A reader ignores those that it does not need.
+CHANNEL_UNITS = {
+    "time": UNIT_FACTORS["time"],
     "displacement": UNIT_FACTORS["length"],
     "velocity": UNIT_FACTORS["velocity"],
     "acceleration": UNIT_FACTORS["acceleration"],
     "base_acceleration": UNIT_FACTORS["acceleration"],
-    **FORCE_UNITS,
+    "force": UNIT_FACTORS["force"],
+    "friction_ratio": RATIO_UNITS,
 }
-# Factors to SI by unit, for each quantity of a channel
-CHANNEL_UNITS = {"time": UNIT_FACTORS["time"], **RECORD_UNITS}
 # The SI unit is the first one of each table that is not "".
 SI_UNITS = {name: next(filter(None, units)) for name, units in CHANNEL_UNITS.items()}
 # Spelling of a unit in the tables, by other spellings in lower case
@@ -79,6 +75,6 @@ def find_unit_factor(quantity: str, unit: str, location: str = "") -> float:
     name = normalize_unit(unit)
     if name not in units:
         raise PatchfemError(
-            f"{location}{quantity} [{unit[:40]}]: unknown unit; use one of {', '.join(filter(None, units))}"
+            f"{location}{quantity} [{shorten(unit)}]: unknown unit; use one of {', '.join(filter(None, units))}"
         )
     return units[name]

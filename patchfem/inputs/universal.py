@@ -5,14 +5,13 @@ step states the step with six digits; its times are as accurate as that. Binary 
 precision.
 """
 
-from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from .damage import refuse_damage
+from .damage import refuse_damage, shorten
 from .records import Channel, check_file
 from .units import CHANNEL_UNITS, normalize_unit
 
@@ -21,16 +20,15 @@ DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a no
 TIME_ABSCISSA_TYPE = 17  # type code of the abscissa "time"
 GENERAL_TYPE = 0  # function type of a dataset 58 that may be anything
 TIME_RESPONSE_TYPE = 1  # function type of a time response in dataset 58
-
-
-class OrdinateType(IntEnum):
-    """Data types of dataset 58 for which a quantity is defined here."""
-
-    DISPLACEMENT = 8
-    EXCITATION_FORCE = 9
-    VELOCITY = 11
-    ACCELERATION = 12
-    FORCE = 13
+# Quantity of each data type of dataset 58 that is read; 9 is the force of an excitation.
+ORDINATE_QUANTITIES = {
+    8: "displacement",
+    9: "force",
+    11: "velocity",
+    12: "acceleration",
+    13: "force",
+}
+UNKNOWN_ORDINATE = 0  # data type of values that may be any quantity
 
 
 def read_datasets(path) -> list[Dataset]:
@@ -75,7 +73,9 @@ def read_datasets(path) -> list[Dataset]:
     return datasets
 
 
-def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Channel]:
+def make_channels(
+    path, datasets: list[Dataset], notes: list[str], default_quantity: str = ""
+) -> list[Channel]:
     """Return the time records among the datasets as channels.
 
     A record along a negative axis is reversed, so that it points along the positive one.
@@ -88,6 +88,8 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
         Datasets from `read_datasets`.
     notes : list of str
         Receives a sentence on each record that is not read as it stands.
+    default_quantity : str
+        Quantity of records for which the file states none.
 
     Returns
     -------
@@ -100,12 +102,14 @@ def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Chann
     """
     factors = find_unit_factors(path, datasets)
     functions = [dataset for dataset in datasets if dataset["type"] == 58]
+    quantities = {UNKNOWN_ORDINATE: default_quantity, **ORDINATE_QUANTITIES}
     channels = []
     for number, dataset in enumerate(functions, 1):
         kind = int(dataset["func_type"])
         is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA_TYPE
         if kind == TIME_RESPONSE_TYPE or (kind == GENERAL_TYPE and is_over_time):
-            channels.append(_make_channel(path, number, dataset, factors, notes))
+            quantity = quantities.get(int(dataset["ordinate_spec_data_type"]), "")
+            channels.append(_make_channel(path, number, dataset, quantity, factors, notes))
     return channels
 
 
@@ -124,7 +128,12 @@ def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
 
 
 def _make_channel(
-    path, number: int, dataset: Dataset, factors: Dataset | None, notes: list[str]
+    path,
+    number: int,
+    dataset: Dataset,
+    quantity: str,
+    factors: Dataset | None,
+    notes: list[str],
 ) -> Channel:
     """Make a channel of a record from a dataset of a universal file.
 
@@ -138,6 +147,8 @@ def _make_channel(
         Number of the record, for messages.
     dataset : dict
         Dataset 58.
+    quantity : str
+        What it contains, or "" if this is not known.
     factors : dict or None
         Unit factors of dataset 164, if the file has one.
     notes : list of str
@@ -160,11 +171,8 @@ def _make_channel(
             f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
 
-    # Quantity and unit of the values; a channel whose label states a unit needs no factor.
-    kind = int(dataset["ordinate_spec_data_type"])
-    quantity = ""
-    if kind in list(OrdinateType):
-        quantity = OrdinateType(kind).name.lower().removeprefix("excitation_")
+    # A channel whose label states a unit of its quantity needs no factor. Dataset 164 gives the length (force) in the unit
+    # of the file that equals one SI unit.
     unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
     factor = None
     if quantity and unit not in CHANNEL_UNITS[quantity]:
@@ -174,7 +182,7 @@ def _make_channel(
             factor = 1 / factors["force" if quantity == "force" else "length"]
             remedy = "the unit of dataset 164 is used"
         if unit or factors is None:
-            reason = f"its unit '{unit[:20]}' is not known" if unit else "it has no unit"
+            reason = f"its unit '{shorten(unit)}' is not known" if unit else "it has no unit"
             notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
 
     # Place of the record; along a negative axis it is reversed.

@@ -131,8 +131,21 @@ def read_end_state(path: Path) -> EarlierWear:
     PatchfemError
         If the file is not that of a run with [wear] over a patch without strips.
     """
+    import h5py
+
+    # Depth and gap are per node of the earlier mesh. The gap in the file is that of the worn pieces.
     try:
-        earlier = _read_state(path)
+        with h5py.File(path, "r") as file:
+            depth = np.array(file["worn_depth"][-1], float)
+            earlier = EarlierWear(
+                path=path,
+                x=np.array(file["x"], float),
+                depth=depth,
+                gap=np.array(file["unloaded_gap"], float) - depth,
+                cycles=float(np.array(file["wear_cycle"], float)[-1]),
+                scene=tomllib.loads(file.attrs["scene"]),
+                measures=json.loads(file.attrs["measures"]),
+            )
         has_strips = "strips" in earlier.scene["contact"]
         is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
     except FILE_ERRORS:
@@ -155,26 +168,6 @@ def read_end_state(path: Path) -> EarlierWear:
             START_KEY,
         )
     return earlier
-
-
-def _read_state(path: Path) -> EarlierWear:
-    """Read the last state in the result.nc file `path`.
-
-    The values are not checked. Depth and gap are per node of the earlier mesh. The gap is that of the unworn pieces.
-    """
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        depth = np.array(file["worn_depth"][-1], float)
-        return EarlierWear(
-            path=path,
-            x=np.array(file["x"], float),
-            depth=depth,
-            gap=np.array(file["unloaded_gap"], float) - depth,
-            cycles=float(np.array(file["wear_cycle"], float)[-1]),
-            scene=tomllib.loads(file.attrs["scene"]),
-            measures=json.loads(file.attrs["measures"]),
-        )
 
 
 def _has_depth_along_patch(earlier: EarlierWear) -> bool:

@@ -5,6 +5,7 @@ computed. The module that reads a kind of file is imported only if a scene names
 the imports are half of the time of a check.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -155,14 +156,6 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     return notes
 
 
-def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
-    """Check the file of a prescribed slide by reading it.
-
-    `path` is the file. The arguments `tables` and `is_valid` of all checks have no effect here.
-    """
-    slide.read_path_file(path)
-
-
 def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
     """Check the file `path` of a recorded drive signal, or of its spectrum, by reading it.
 
@@ -187,30 +180,25 @@ def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
     structure_files.read_modes(path, tables.structure, tables.drive, needs_interface=rubs)
 
 
-def _make_matrix_check(key: str):
-    """Return the function that checks the file of one matrix of [structure.reduced], that of a `key`."""
+def _check_by_reading(read: Callable[[Path], object]) -> Callable[..., None]:
+    """Return the function that checks a file by reading it, whatever the other tables of the scene contain.
 
-    def check_matrix(path: Path, tables, *, is_valid: bool) -> None:
-        """Check the file of the matrix by reading it.
+    `read` is a function of the path.
+    """
+
+    def check_file(path: Path, tables, *, is_valid: bool) -> None:
+        """Read the file.
 
         Parameters
         ----------
         path : Path
-            File of the matrix.
+            File to check.
         tables, is_valid
             Tables of the scene, and whether they are free of mistakes. Both have no effect.
         """
-        structure_reduced.read_matrix(path, key)
+        read(path)
 
-    return check_matrix
-
-
-def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a table of measured responses by reading the file `path`.
-
-    The arguments `tables` and `is_valid` of all checks have no effect here.
-    """
-    measured.read_table(path)
+    return check_file
 
 
 def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
@@ -241,10 +229,15 @@ FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,
     "contact.profile.file": _check_profile,
-    "slide.file": _check_slide,
+    "slide.file": _check_by_reading(lambda path: slide.read_path_file(path)),
     "drive.file": _check_drive,
     "structure.file": _check_structure,
-    **{f"structure.reduced.{key}": _make_matrix_check(key) for key in MATRIX_KEYS},
-    "measured.file": _check_measured,
+    **{
+        f"structure.reduced.{name}": _check_by_reading(
+            lambda path, name=name: structure_reduced.read_matrix(path, name)
+        )
+        for name in MATRIX_KEYS
+    },
+    "measured.file": _check_by_reading(measured.read_table),
     "wear.start": _check_wear_start,
 }

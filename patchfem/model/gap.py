@@ -131,7 +131,7 @@ class Gap:
 
     def half_step_heights(self, x) -> np.ndarray:
         """Return half the height [m] of the step at each node x (m,) [m], or 0 at nodes without a step edge."""
-        heights = np.zeros(x.size)
+        heights = np.zeros_like(x)
         for _, (edge, height) in self._values("edge"):
             heights += np.where(x == edge, abs(height) / 2, 0.0)
         return heights

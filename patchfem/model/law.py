@@ -199,7 +199,7 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
     if table.contact is None:
         return None
     try:
-        patch = patch_models.build_patch(table.contact, scene.kind, scene.resolve_path)
+        patch = patch_models.build_patch(table.contact, scene.resolve_path)
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
@@ -208,16 +208,14 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
 
 def find_normal_load(scene: Scene) -> float | None:
     """Return the (mean) normal load [N] of a scene, or None if the approach is prescribed."""
-    if scene.contact is not None:
-        return scene.contact.load
-    return scene.normal.load if scene.normal is not None else None
+    contact = scene.contact or scene.normal
+    return contact.load if contact is not None else None
 
 
 def find_pad_width(scene: Scene) -> float | None:
     """Return the width [m] of the contact across the path, or None if the scene gives none."""
-    if scene.contact is not None:
-        return scene.contact.width
-    return scene.normal.width if scene.normal is not None else None
+    contact = scene.contact or scene.normal
+    return contact.width if contact is not None else None
 
 
 def make_interface_names(structure) -> list[str]:

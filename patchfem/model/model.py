@@ -157,8 +157,8 @@ class Model:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s]: the peak of a prescribed slide, or that of the rig."""
-        return self.slide.peak_speed if self.rig is None else self.rig.speed_scale
+        """Expected sliding speed [m/s]: the peak of a prescribed slide, or that of the interfaces of a rig."""
+        return self.slide.peak_speed if self.rig is None else self.rig.slide_speed_scale
 
     @property
     def bonds(self) -> Bonds:
@@ -207,7 +207,7 @@ def _build(scene: Scene) -> Model:
     # Patch, point and slide.
     patch_model = None
     if scene.contact is not None:
-        patch_model = patch.build_patch(scene.contact, scene.kind, scene.resolve_path)
+        patch_model = patch.build_patch(scene.contact, scene.resolve_path)
     point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point = load.build_point_load(scene)
@@ -224,7 +224,8 @@ def _build(scene: Scene) -> Model:
     law = _build_law(scene, rig_model)
     if patch_model is not None:
         edge_motion = _find_edge_motion(scene, rig_model)
-        patch_model = patch_model.with_mesh(edge_motion=edge_motion)
+        is_fine = rig_model is None and scene.wear is None
+        patch_model = patch_model.with_mesh(edge_motion=edge_motion, is_fine=is_fine)
         if path is not None and grooves is None:
             patch_model = _request_slip_mesh(patch_model, path, law.friction)
 

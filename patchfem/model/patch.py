@@ -217,7 +217,7 @@ class PatchMesh:
 
     - element_size: size [m] of the elements of an even interface.
     - file: mesh file of the two pieces.
-    - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
+    - is_fine: whether the patch is static or in a bench without wear, so that most of the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
     - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse. The upper one is None if it is
       like the lower one.
@@ -227,7 +227,7 @@ class PatchMesh:
 
     element_size: float | None
     file: MeshFile | None
-    is_static: bool = False
+    is_fine: bool = False
     edge_motion: str = ""
     shared: "tuple[tuple[Mesh, Mesh | None], ...] | None" = None
     slip: PrescribedSlip | None = None
@@ -312,16 +312,13 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, **changes))
 
 
-def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]) -> PatchModel:
+def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchModel:
     """Build the patch that a table [contact] describes.
 
     Parameters
     ----------
     contact : Contact
         Table [contact], or that of an interface.
-    kind : str
-        Kind of the run. A patch of kind "patch" is static: its mesh is finer than that of the same patch
-        in a rig or a bench, and may take more CPU time (`PatchModel.mesh.is_static`).
     resolve_path : callable
         Function of a file name in the scene that returns its path.
 
@@ -343,7 +340,7 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]
         file=trace.file if trace is not None else "",
     )
 
-    # Peaks that a trace or root mean squares determine.
+    # Radius, density and heights of Hertzian asperities may follow from a trace or from its root mean squares.
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)
@@ -360,7 +357,6 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable[[str], Path]
         mesh=PatchMesh(
             element_size=contact.element_size,
             file=find_mesh_file(contact, resolve_path),
-            is_static=kind == "patch",
         ),
     )
 

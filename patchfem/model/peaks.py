@@ -39,6 +39,8 @@ def complete_asperities(
     """
     if table.radius is not None:
         return table
+
+    # The key that gives the root mean squares, for messages: a trace, or these values themselves.
     key = "rms_height"
     if table.from_ is not None:
         key = "from"
@@ -46,6 +48,8 @@ def complete_asperities(
         moments = read_spectral_moments(path, cutoff).fine
         squares = {f"rms_{name}": value for name, value in moments._asdict().items()}
         table = table.model_copy(update={"from_": str(path), "cutoff": cutoff, **squares})
+
+    # Peaks of an isotropic Gaussian surface with these root mean squares.
     with name_key(KEY_PREFIX + key):
         peaks = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     changes = {

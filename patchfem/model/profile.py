@@ -65,7 +65,9 @@ def compute_profile_gap(
     x : (m,) ndarray
         Coordinates of the nodes [m].
     lengths : gap.ProfileLengths
-        Lengths over which the profile is averaged.
+        Lengths (average, limit) [m]. `average` is that of the means, None for the samples themselves. `limit` is the
+        length of cells than which too much of the heights must not be finer, 0 for the longest cell between the nodes,
+        None for no limit.
     cell : float
         Cell length [m] of an even mesh; it limits how much of the trace may be missing.
     is_rough : bool
@@ -88,16 +90,19 @@ def compute_profile_gap(
         If the cut-off is longer than the interface.
     """
     average, limit = lengths
+    # The trace may lack no more than about the length over which it is averaged.
     resolution = average or cell
     if is_rough:
         resolution = min(average, cell)
     trace, notes, is_straight = level_profile(path, x, resolution, is_material=is_material)
 
-    # Waves that the mesh cannot resolve are refused.
+    # A trace with too much of its height in waves that the cells do not resolve is refused.
     if limit is not None and not is_straight:
         lost_waves = describe_lost_waves(trace, limit or float(np.diff(x).max()))
         if lost_waves is not None:
             raise UnresolvedTrace(lost_waves, "contact.profile.file")
+
+    # The asperities represent the waves below the cut-off, so that the waviness above it is the gap.
     if is_rough:
         cutoff = ELEMENTS_PER_WAVE * average
         shape = _filter_waviness(trace, cutoff)
@@ -105,10 +110,13 @@ def compute_profile_gap(
             notes = (*notes, *_describe_short_waves(trace, cutoff))
         return average_at_nodes(shape, x) - shape.z.min(), notes
 
-    # The spline through all samples, or through their means over the average length.
+    # Without a length for means, the curve is the spline through all samples.
     if average is None:
         heights = average_at_nodes(trace, x, _fit_spline(trace).antiderivative())
         return heights - heights.min(), notes
+
+    # Otherwise it is the spline through means over this length. If the nodes have this spacing, they take the means
+    # themselves.
     nodes = x
     curve = trace
     if not _is_evenly_spaced(x, average):
@@ -183,6 +191,7 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
     length = float(x[-1] - x[0])
     nodes = np.linspace(x[0], x[-1], max(1, round(length / cell)) + 1)
     raw = _read_without_spikes(path, nodes, 2 * cell)
+    # Here larger heights are a wider gap, so that the heights of a surface change their sign.
     if is_material:
         raw = replace(raw, z=frozen_array(-raw.z))
     trace = level(raw)
@@ -233,11 +242,8 @@ def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
 
     The trace is placed over the nodes x (m,) [m], and must cover them.
     """
-    trace = read_trace(path)
-    try:
-        return clean(place_over_patch(trace, x), max_gap)
-    except PatchfemError as error:
-        raise type(error)(str(error), error.key or "contact.profile.file") from None
+    with name_key("contact.profile.file"):
+        return clean(place_over_patch(read_trace(path), x), max_gap)
 
 
 _read_profile = cache_by_file(read_profile)

@@ -15,6 +15,7 @@ from ..structure.drive_sizes import (
     estimate_peak_speed,
     find_decay_rate,
     find_drive_omega,
+    find_max_acceleration,
 )
 from . import structure_reduced
 from .drive import build_signal
@@ -24,7 +25,6 @@ from .structure import (
     build_own_modes,
     build_start,
     compute_joint_stiffnesses,
-    compute_natural_frequencies,
     find_bolted_scene,
     has_pressed_joint,
     needs_strip_displacements,
@@ -260,8 +260,22 @@ class Rig:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s] from drive signal and initial state; it sets the default rest speed (2.10)."""
+        """Expected speed [m/s] from drive signal and initial state."""
         return estimate_peak_speed(self.drive.signal, self.start)
+
+    @property
+    def slide_speed_scale(self) -> float:
+        """Expected sliding speed [m/s] of the fastest interface; it sets the default rest speed of bonds (2.10).
+
+        It is that of modes without restoring forces, as far as the interfaces take part in them.
+        """
+        signal = self.drive.signal
+        omega = find_drive_omega(signal)
+        peaks = [np.abs(self.modes.base) * find_max_acceleration(signal) / omega]
+        if self.start is not None:
+            peaks += [np.abs(self.start.v), omega * np.abs(self.start.z)]
+        speeds = np.abs(self.modes.interfaces) @ np.transpose(peaks)
+        return float(speeds.max(initial=0.0))
 
     @property
     def displacement_scale(self) -> float:
@@ -411,11 +425,7 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
     slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
     elastic = np.flatnonzero(own_modes.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-
-    # A frequency that the scene states is free of the round-off of the modes.
     frequency = float(own_modes.omega[first]) / (2 * np.pi)
-    if structure.mode and structure.measured == "free":
-        frequency = structure.mode[first].frequency
 
     # The mass at the output is that of this mode, or of all coordinates if the mode does not move the output.
     mass = structure.moving_mass
@@ -455,7 +465,7 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
         else:
             bolted = bolted._replace(stiffness=tuple(compute_joint_stiffnesses(bolted_scene)))
     return RigStructure(
-        frequencies=compute_natural_frequencies(structure, modes),
+        frequencies=modes.omega / (2 * np.pi),
         lists_modes=bool(structure.mode),
         notes=tuple(read_file_notes(scene)),
         bolted=bolted,

@@ -22,7 +22,7 @@ from .rig import build_drive, build_rig
 from .source import locate_errors
 
 if TYPE_CHECKING:
-    from ..scene.keys.tables import Friction, Structure
+    from ..scene.keys.tables import Structure
     from ..scene.overrides import PlainNumbers
     from .rig import Rig
 
@@ -127,7 +127,8 @@ def replace_numbers(
             law = changes["friction"] = complete_bond_length(
                 scene.friction, find_normal_load(scene)
             )
-            rig = _replace_law(rig, law)
+            interfaces = tuple(replace(one, numbers=law) for one in rig.friction.interfaces)
+            rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
         if "drive" in tables:
             rig = replace(rig, drive=build_drive(scene, rig.modes))
         if "structure" in tables:
@@ -139,12 +140,6 @@ def replace_numbers(
     write = partial(write_resolved, scene, unwritten)
     source = replace(model.source, write=write, sets=scene.sets)
     return replace(unwritten, source=source)
-
-
-def _replace_law(rig: Rig, law: Friction) -> Rig:
-    """Return a copy of a rig whose interfaces have another friction law."""
-    interfaces = tuple(replace(interface, numbers=law) for interface in rig.friction.interfaces)
-    return replace(rig, friction=replace(rig.friction, interfaces=interfaces))
 
 
 def _replace_modes(rig: Rig, structure: Structure) -> Rig:
@@ -171,7 +166,8 @@ def _replace_modes(rig: Rig, structure: Structure) -> Rig:
     mass = structure.moving_mass
     modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
 
-    # First elastic mode.
+    # First elastic mode. Its frequency follows from omega as in `rig`, with the same round-off.
+    frequency = omega / (2 * np.pi)
     elastic_modes = [k for k, values in enumerate(frequency) if np.any(values > 0)]
     first = elastic_modes[0] if elastic_modes else 0
     first_frequency = frequency[first]

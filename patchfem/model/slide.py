@@ -130,16 +130,15 @@ class SlidePath:
         `index` (k,) counts the samples from 0. After a run-in of the length `run_in` [m] the wave starts in the
         opposite direction.
         """
-        quarter = (index % steps) / steps * 4
-        falling = np.where(quarter < 3, 2 - quarter, quarter - 4)
-        rel_disp = np.where(quarter < 1, quarter, falling) * self.amplitude
+        quarter = index % steps / steps * 4
+        rel_disp = self.amplitude * np.interp(quarter, (0, 1, 3, 4), (0, 1, -1, 0))
         period = 4 * self.amplitude / self.speed
         time = index * period / steps
         if self.run_in:
             n_run_in = max(2, ceil(steps * self.run_in / (4 * self.amplitude)))
-            run_in = np.linspace(0, self.run_in, n_run_in + 1)
-            time = np.concatenate([run_in / self.speed, time[1:] + self.run_in / self.speed])
-            rel_disp = np.concatenate([run_in, self.run_in - rel_disp[1:]])
+            run_in = self.run_in * np.arange(n_run_in) / n_run_in
+            time = np.concatenate([run_in, time * self.speed + self.run_in]) / self.speed
+            rel_disp = np.concatenate([run_in, self.run_in - rel_disp])
         return SlideSamples(time, rel_disp, max(0, time.size - 1 - steps), 2 * np.pi / period)
 
     def steps(self, tolerance: float, pinned_steps: int | None, length: float | None) -> int:

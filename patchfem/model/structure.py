@@ -5,7 +5,7 @@ give the same quantities for each description.
 """
 
 from dataclasses import replace
-from math import inf, pi
+from math import inf
 
 import numpy as np
 
@@ -47,7 +47,12 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     PatchfemError
         If a file lacks something, or if a bonded spring has no single interface to act on.
     """
-    modes = _split_into_strips(scene, build_own_modes(scene) if own_modes is None else own_modes)
+    modes = build_own_modes(scene) if own_modes is None else own_modes
+    # A mode that yaws the patch gives each strip its own displacement, which is that at its middle.
+    if needs_strip_displacements(scene):
+        count = scene.contact.strips.count
+        offsets = ((np.arange(count) + 0.5) / count - 0.5) * scene.contact.width
+        modes = replace(modes, faces=frozen_array(compute_strip_slides(modes, offsets)))
     if modes.faces is not None and not len(modes.faces):
         # Without an interface there is no friction, and the motion of
         # the output replaces the slide.
@@ -193,19 +198,6 @@ def _build_given_modes(scene) -> ModalBasis:
         )
 
 
-def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Return the modes of a scene with a relative displacement for each strip of its patch.
-
-    The modes are returned unchanged if none of them yaws the patch. The displacement of a strip is that at its middle.
-    """
-    if not needs_strip_displacements(scene):
-        return modes
-    n_strips = scene.contact.strips.count
-    width = scene.contact.width
-    offsets = (np.arange(n_strips) + 0.5) * (width / n_strips) - width / 2
-    return replace(modes, faces=frozen_array(compute_strip_slides(modes, offsets)))
-
-
 def read_file_notes(scene) -> list[str]:
     """Return sentences that tell the user what was neglected or changed in structure.file of a scene."""
     if scene.structure.file is None:
@@ -278,17 +270,6 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
     return modal if modes.shapes is None else modal @ modes.shapes.T
 
 
-def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring, or 0 for rigid-body modes.
-
-    `structure` is the table [structure], and `modes` are the modes with the spring.
-    """
-    if structure.mode and structure.bonded is None and structure.measured == "free":
-        # Frequencies that the scene states are returned without the round-off of the modes.
-        return np.array([mode.frequency for mode in structure.mode])
-    return modes.omega / (2 * pi)
-
-
 def needs_strip_displacements(scene) -> bool:
     """Return whether a mode of a scene yaws a patch with strips.
 
@@ -315,5 +296,5 @@ def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     -------
     (s, n) ndarray
     """
-    yaw = np.zeros(modes.slide.size) if modes.yaw is None else modes.yaw
+    yaw = np.zeros_like(modes.slide) if modes.yaw is None else modes.yaw
     return modes.slide - np.outer(offsets, yaw)

@@ -70,11 +70,9 @@ class WearModel:
         return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
 
 
-def build_wear_model(scene: Scene) -> WearModel | None:
-    """Build the wear model of a scene, or return None if the scene has no [wear]."""
+def build_wear_model(scene: Scene) -> WearModel:
+    """Build the wear model of a scene with [wear]."""
     wear = scene.wear
-    if wear is None:
-        return None
     friction = start = None
     if wear.friction is not None:
         table = wear.friction

@@ -31,6 +31,6 @@ PUBLIC = {
         "make_pressed_contact",
     ),
     "laws": ("make_point_law",),
-    "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
+    "time_march": ("March", "Motion", "Snapshot", "load_kernels", "march"),
     "slides": ("BLOCK", "follow"),
 }

@@ -27,8 +27,6 @@ from .return_maps_kernels import (
 
 LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
-# Number of terms of the exponential of a shortest step; the product of this step with any rate is below 0.1.
-TAYLOR_TERMS = 12
 MAX_TRIALS = 60  # Newton steps and bisections for the increment of a step
 CASE_RESIDUAL = 1e-7  # residual of a step relative to its increments
 GAUSS_POINT = (
@@ -46,58 +44,6 @@ N_READ = 2  # measured cycles of a motion that repeats
 
 
 @njit(**NJIT_KERNEL)
-def write_responses(damping, stiffness, step, table):
-    """Write the responses (LEVELS + 1, 2, 5) of slide and velocity in a step and its halves.
-
-    The columns belong to slide and velocity at the start, and to accelerations 1, t and t^2/2. The exponential of the
-    shortest step is a Taylor series; that of a step of twice the length is its square.
-
-    Parameters
-    ----------
-    damping : float
-        Rate of the mode [1/s].
-    stiffness : float
-        Squared natural frequency [1/s2].
-    step : float
-        Duration of a whole step [s].
-    table : (LEVELS + 1, 2, 5) array
-        Responses, output.
-    """
-    shortest = step / TICKS
-
-    # Taylor series of the shortest step: y'' = u - damping y' - stiffness y, column by column.
-    for column in range(5):
-        # Derivatives of the motion that starts with a unit of this column.
-        term = 1.0 if column == 0 else 0.0
-        rate = 1.0 if column == 1 else 0.0
-        table[LEVELS, 0, column] = term
-        table[LEVELS, 1, column] = rate
-        factor = 1.0
-        for k in range(1, TAYLOR_TERMS):
-            force = 1.0 if column == k + 1 else 0.0
-            term, rate = rate, force - damping * rate - stiffness * term
-            factor *= shortest / k
-            table[LEVELS, 0, column] += factor * term
-            table[LEVELS, 1, column] += factor * rate
-
-    # Semigroup: the response of a step is that of its second half applied to the end of its first half.
-    for level in range(LEVELS, 0, -1):
-        h = step / (1 << level)
-        half = table[level]
-        for row in range(2):
-            for column in range(5):
-                total = half[row, 0] * half[0, column] + half[row, 1] * half[1, column]
-                if column > 1:
-                    # Polynomials of the second half are shifted by h.
-                    total += half[row, column]
-                    if column > 2:
-                        total += h * half[row, column - 1]
-                    if column == 4:
-                        total += 0.5 * h * h * half[row, 2]
-                table[level - 1, row, column] = total
-
-
-@njit(**NJIT_KERNEL)
 def solve_step(free, response, h, case, now, numbers, memory, j):
     """Solve dq = free - response of F for the slide of a step by Newton's method in a bracket.
 
@@ -110,7 +56,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     free : float
         Increment of the slide without friction [m].
     response : (2, 5) array
-        Slide and velocity at the end of the step per unit of `write_responses`.
+        Slide and velocity at the end of the step per unit of `cases.make_responses`.
     h : float
         Duration of the step [s].
     case : (12,) array
@@ -274,7 +220,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     h : float
         Duration of the step [s].
     response : (2, 5) array
-        Slide and velocity at the end of the step per unit of `write_responses`.
+        Slide and velocity at the end of the step per unit of `cases.make_responses`.
     is_shortest : bool
         Whether the step cannot be halved.
     max_bend : float
@@ -829,6 +775,8 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
+
+    # The irreversible slide turns inside the step where its velocity changes the sign.
     slip = now[Now.SLIP]
     first = seen[Seen.SHARE] * start[1]
     last = share * now[Now.VELOCITY]
@@ -837,6 +785,9 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], force)
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
     seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
+
+    # The work check compares the exact work with the trapezoidal rule over the ends of the steps, relative to the work
+    # that passed through the point in either direction.
     seen[Seen.WORK] += work
     seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
     seen[Seen.PASSED] += abs(work)
@@ -892,7 +843,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     steps : int
         Steps per cycle.
     table : (LEVELS + 1, 2, 5) array
-        Responses of `write_responses`.
+        Responses of `cases.make_responses`.
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
@@ -965,13 +916,15 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_cases(steps, parameters, numbers, memory, nows, seens, histories, table):
+def march_cases(steps, tables, parameters, numbers, memory, nows, seens, histories):
     """March cases over their cycles.
 
     Parameters
     ----------
     steps : int
         Steps per cycle.
+    tables : (c, LEVELS + 1, 2, 5) array
+        Responses of `cases.make_responses`.
     parameters : (c, 12) array
         Numbers of the cases, in the order of `case_rows.Number`.
     numbers : (k, c) array
@@ -984,8 +937,6 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
         What was observed, in the order of `case_rows.Seen` (output).
     histories : (c, n, 4) array
         Extremes and phasor of every cycle (output).
-    table : (LEVELS + 1, 2, 5) array
-        Workspace.
     """
     for j in range(parameters.shape[0]):
         case = parameters[j]
@@ -994,9 +945,6 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
         omega = case[Number.OMEGA]
         n_cycles = int(case[Number.CYCLES])
         first = n_cycles - int(case[Number.WINDOW])
-        write_responses(
-            case[Number.DAMPING], case[Number.STIFFNESS], 2 * np.pi / omega / steps, table
-        )
 
         # Initial state; a rigid point that moves slips in the direction of its velocity.
         now[Now.SLIDE] = case[Number.SLIDE]
@@ -1020,7 +968,7 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, tabl
             sums = now[Now.WORK_IN], now[Now.POWER], now[Now.VISCOUS], now[Now.FRICTION]
             if observes:
                 seen[Seen.LAST_MEAN] = 0.0
-            march_cycle(steps, table, observes, case, now, numbers, memory, j, seen)
+            march_cycle(steps, tables[j], observes, case, now, numbers, memory, j, seen)
 
             end_cycle(now, seen, histories[j, cycle])
             cycle += 1

@@ -7,8 +7,9 @@ import numpy as np
 from .. import compiled
 from ..core import ModalBasis, SineDrive
 from ..friction import path_work
-from .case_kernels import LEVELS
+from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
+from .exponentials import exponential
 
 ALWAYS_STUCK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
@@ -79,8 +80,8 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     compiled.load("points.case_kernels").march_cases(
-        steps, cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
+        steps, make_responses(columns, steps), cases.parameters, cases.numbers,
+        cases.memory.copy(), now, seen, history,
     )  # fmt: skip
 
     output = columns[Number.OUTPUT][:, None]
@@ -91,6 +92,32 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
             np.sort(history[..., :2] * output[..., None], axis=-1),
             phasors * output,
         )
+
+
+def make_responses(columns, steps: int) -> np.ndarray:
+    """Return the responses (c, LEVELS + 1, 2, 5) of slide and velocity in a whole step and its halves.
+
+    The last axis has slide and velocity at the start, and the coefficients of accelerations 1, t and t^2/2.
+
+    Parameters
+    ----------
+    columns : (12, c) array
+        Numbers of the cases, in the order of `Number`.
+    steps : int
+        Whole steps per cycle.
+    """
+    n = columns.shape[1]
+    matrix = np.zeros((n, 5, 5))
+    matrix[:, range(4), range(1, 5)] = 1.0
+    matrix[:, 1, 0] = -columns[Number.STIFFNESS]
+    matrix[:, 1, 1] = -columns[Number.DAMPING]
+    shortest = 2 * np.pi / columns[Number.OMEGA] / steps / TICKS
+    whole = exponential(matrix, shortest, np.arange(5.0))
+    table = np.zeros((n, LEVELS + 1, 2, 5))
+    for level in range(LEVELS, -1, -1):
+        table[:, level] = whole[:, :2]
+        whole = whole @ whole
+    return table
 
 
 def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:

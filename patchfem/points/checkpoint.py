@@ -29,7 +29,7 @@ MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
 MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums", "work_sums")
-RECORD_STATE = ("early", "recent", "energies", "before")
+RECORD_STATE = ("early", "stride", "recent", "energies", "before")
 _FILES = ContextVar("checkpoint_files", default=None)
 
 

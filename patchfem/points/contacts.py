@@ -20,6 +20,7 @@ from .laws import (
     make_interlocking,
     make_jenkins,
     make_list,
+    make_sliders,
     make_tanh,
 )
 from .march_rows import LOWER
@@ -122,11 +123,13 @@ class Contact:
 def convert_element(element: Element) -> PointLaw:
     """Return the points of a law of one contact under a constant load.
 
-    Parallel elements become one point each, bonds at points of equal slide a single point.
+    Parallel elements become one point each, a density of sliders or bonds at points of equal slide a single point.
     """
     numbers = element.numbers
     if element.form == "rigid":
         return make_coulomb(numbers[1], numbers[2])
+    if element.density:
+        return make_sliders(element.limit, *element.density)
     if element.form == "parallel":
         stiffness, length = np.split(numbers[2:], 2)
         return make_jenkins(stiffness * length, length)

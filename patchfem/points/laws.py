@@ -100,6 +100,25 @@ def make_list(bonds: Bonds, load: float) -> PointLaw:
     return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
 
 
+def make_sliders(limit, length, order, beta, load: float = 1.0) -> PointLaw:
+    """Return parallel sliders of Segalman's density (`friction.laws.iwan`) under a constant load.
+
+    Parameters
+    ----------
+    limit : float or (c,) array
+        Force [N] at which all sliders slip.
+    length : float or (c,) array
+        Displacement phi_max [m] at which they do.
+    order, beta : float or (c,) array
+        Exponent chi + 1 of the density, and weight of the last slider.
+    load : float or (c,) array
+        Normal load [N].
+    """
+    memory = (*(0.0,) * Masing.VIRGIN, 1.0)
+    size = Masing.STACK + 2 * REVERSALS
+    return _pack(Law.MASING, (limit, length, order, beta), memory, load, size)
+
+
 def make_cubic(stiffness: float) -> PointLaw:
     """Return a spring of force stiffness q^3."""
     return _pack(Law.CUBIC, (stiffness,))
@@ -142,13 +161,8 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
 
     if name == "iwan":
-        chi = friction.chi
-        beta = friction.beta
-        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
-        memory = (*(0.0,) * Masing.VIRGIN, 1.0)
-
-        size = Masing.STACK + 2 * REVERSALS
-        return _pack(Law.MASING, (limit, length, chi + 1, beta), memory, load, size)
+        length = max_yield_displacement(limit, friction.stiffness, friction.chi, friction.beta)
+        return make_sliders(limit, length, friction.chi + 1, friction.beta, load)
     if name == "bouc-wen":
         length = limit / friction.stiffness
         numbers = (friction.static, length, friction.exponent, friction.shape)

@@ -73,7 +73,7 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 
 @njit(**NJIT_CALL)
 def solve_linear(matrix, vector, n):
-    """Solve a dense system in place by Gaussian elimination with partial pivoting; return whether it is regular.
+    """Solve a dense system in place by Gauss-Jordan elimination with partial pivoting; return whether it is regular.
 
     Parameters
     ----------
@@ -97,19 +97,15 @@ def solve_linear(matrix, vector, n):
                 matrix[k, c], matrix[best, c] = matrix[best, c], matrix[k, c]
             vector[k], vector[best] = vector[best], vector[k]
 
-        for i in range(k + 1, n):
+        for i in range(n):
             factor = matrix[i, k] / matrix[k, k]
-            if factor != 0.0:
+            if factor != 0.0 and i != k:
                 for c in range(k + 1, n):
                     matrix[i, c] -= factor * matrix[k, c]
                 vector[i] -= factor * vector[k]
 
-    # Back substitution.
-    for k in range(n - 1, -1, -1):
-        total = vector[k]
-        for c in range(k + 1, n):
-            total -= matrix[k, c] * vector[c]
-        vector[k] = total / matrix[k, k]
+    for k in range(n):
+        vector[k] /= matrix[k, k]
     return True
 
 
@@ -217,10 +213,7 @@ def prepare_points(system, h):
     count = points.port.size
 
     # Trials since the last accepted step may have changed the memory.
-    if options.has_loads or system.totals[Total.IS_DIRTY] > 0:
-        copy_memory(points.memory, points.trial)
-        system.totals[Total.IS_DIRTY] = 0.0
-
+    copy_memory(points.memory, points.trial)
     if options.has_loads:
         for j in range(count):
             start = values[Point.START_LOAD, j]
@@ -230,7 +223,6 @@ def prepare_points(system, h):
                 lists.press_list(system.lists, j, middle)
             elif start != middle and points.node[j] != LOWER:
                 press(points.numbers, points.trial, j, start, middle)
-        system.totals[Total.IS_DIRTY] = 1.0
 
     # The length of bonds grows before they carry the force of the step.
     for j in range(count):
@@ -889,6 +881,7 @@ def commit(system, h):
 
     # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
+    is_any_held = False
     for j in range(count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
@@ -896,6 +889,7 @@ def commit(system, h):
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
         elif points.numbers[0, j] == Law.COULOMB:
+            is_any_held = is_any_held or points.trial[0, j] == 0
             was_held = is_held(points, p) and points.trial[0, j] == 0
             ports.values[Port.FREE, p] = slide if was_held else 0.0
             values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
@@ -916,7 +910,6 @@ def commit(system, h):
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
 
     copy_memory(points.trial, points.memory)
-    system.totals[Total.IS_DIRTY] = 0.0
 
     # The rates of the last three steps extrapolate those of the next one.
     shear = points.shear
@@ -932,7 +925,7 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    if options.has_events and system.sets.counters[PRESENT_SLOT] >= 0:
+    if is_any_held and system.sets.counters[PRESENT_SLOT] >= 0:
         return_ports_to_rest(system)
         rest += energy - find_motion_energy(system)
         if ports.contact[0] >= 0:
@@ -1192,14 +1185,13 @@ def try_step(system, level, row, begin, end, drive):
     -------
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
-        halved. Then the motion has not advanced, and `Total.IS_DIRTY` is 1. True after a step, and also if no contact
-        set was found, in which case the counter `PRESENT_SLOT` is -1.
+        halved. Then the motion has not advanced. True after a step, and also if no contact set was found, in which case
+        the counter `PRESENT_SLOT` is -1.
     """
     points = system.points
     shear = points.shear
     values = points.values
     options = system.options
-    totals = system.totals
     levels = system.structure.responses.shape[0]
     h = options.step / (1 << level)
     move_freely(system, level, drive, row, begin)
@@ -1243,13 +1235,11 @@ def try_step(system, level, row, begin, end, drive):
     if options.has_events and find_event(
         system, drive[0] + h * (drive[1] + 0.5 * h * drive[2]), is_shortest
     ):
-        totals[Total.IS_DIRTY] = 1.0
         return False
     if not is_solved:
         if not is_shortest:
-            totals[Total.IS_DIRTY] = 1.0
             return False
-        totals[Total.UNSOLVED] += 1
+        system.totals[Total.UNSOLVED] += 1
 
     commit(system, h)
     add_energies(system, level)

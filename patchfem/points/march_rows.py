@@ -130,7 +130,6 @@ class Total(IntEnum):
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - IS_FULL: 1 if a list of bonds is full
-    - IS_DIRTY: 1 if the trial memory differs from the memory
     - REST: work of the drive in the last step on motions of ports at rest, which are taken back [J]
     """
 
@@ -142,8 +141,7 @@ class Total(IntEnum):
     ITERATIONS = 5
     UNSOLVED = 6
     IS_FULL = 7
-    IS_DIRTY = 8
-    REST = 9
+    REST = 8
 
 
 class Sample(IntEnum):

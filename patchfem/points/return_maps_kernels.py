@@ -256,16 +256,21 @@ def _mean_lugre(numbers, stretch, j, load, step):
     direction = 1.0 if dq > 0 else -1.0
     first = step.start_velocity
     last = step.end_velocity
+    # By Simpson's rule the velocities at both ends and in the middle have the mean dq / duration.
     middle = 1.5 * dq / duration - 0.25 * (first + last)
     begin = relaxation_length(numbers[:, j], first)[0]
     centre = relaxation_length(numbers[:, j], middle)[0]
     end = relaxation_length(numbers[:, j], last)[0]
     path = duration / 6 * (abs(first) / begin + 4 * abs(middle) / centre + abs(last) / end)
+
+    # The distance to the steady stretch decays as exp(-x), with the mean f1 over the path and the mean of that mean f2.
     shapes = shape_functions(path)
     start = direction * begin
     change = direction * (end - begin)
     z = start + (stretch - start) * shapes.decay + change * (1 - shapes.f1)
     mean = start + (stretch - start) * shapes.f1 + change * (0.5 - shapes.f2)
+
+    # Rows 5 and 6 are the damping of the bristles and the viscous friction per unit of load [s/m].
     damping = numbers[5, j] * (z - stretch) / duration + numbers[6, j] * dq / duration
     return Relaxed(z, load * (numbers[1, j] * mean + damping))
 
@@ -525,7 +530,10 @@ def advance(numbers, memory, j, load, step):
 
 @njit(**NJIT_CALL)
 def read(numbers, memory, j, load):
-    """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip.
+    """Return the force, stored energy and mean stretch of point j under a load.
+
+    The table at the top of the module lists the rows of `numbers` and `memory` for each law. A COULOMB point that sticks has
+    no force of its own.
 
     Parameters
     ----------

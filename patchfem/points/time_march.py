@@ -19,6 +19,7 @@ from ..friction.path_work import sampled_work
 from ..structure.histories import find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
+from .exponentials import exponential
 from .law_rows import Law
 from .laws import N_MEMORY, N_NUMBERS
 from .march_rows import (
@@ -60,7 +61,6 @@ LONG_LIST_ADVICE = (
 )
 MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
-TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
@@ -209,35 +209,6 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
-def exponential(matrix, time: float, powers) -> np.ndarray:
-    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
-
-    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
-
-    Parameters
-    ----------
-    matrix : (k, k) array
-        Matrix of the rates of the state.
-    time : float
-        [s]
-    powers : (k,) array
-        Powers of the unit of each state.
-    """
-    # In units of the time the entries of the exponent are of order 1.
-    units = time**-powers
-    ratio = units[:, None] / units
-    exponent = time * matrix / ratio
-    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
-    exponent = exponent / 2**n_squares
-    identity = np.eye(powers.size)
-    result = identity
-    for order in range(TAYLOR_DEGREE, 0, -1):
-        result = identity + exponent @ result / order
-    for _ in range(n_squares):
-        result = result @ result
-    return result * ratio
-
-
 def make_system(
     contact: Contact,
     step: float,
@@ -358,8 +329,9 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     laws = [point_set.law for point_set in contact.point_sets]
     counts = [law.numbers[0].size for law in laws]
     numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
-    memory = _join_columns(N_MEMORY, [law.memory for law in laws])
-    loads = _join_columns(1, [law.load + 0 * law.numbers[0] for law in laws])[0]
+    n_memory = max([N_MEMORY, *(len(law.memory) for law in laws)])
+    memory = _join_columns(n_memory, [law.memory for law in laws])
+    loads = np.hstack([np.zeros(0), *(law.load + 0 * law.numbers[0] for law in laws)])
     values = np.zeros((len(Point), max(loads.size, n_nodes)))
     values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : loads.size] = loads
 
@@ -411,8 +383,10 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 
 
 def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
-    """Return the columns of all points from the rows of each law, (n_rows,) for one point or (n_rows, c)."""
-    return np.hstack([np.zeros((n_rows, 0)), *(part.reshape(n_rows, -1) for part in parts)])
+    """Return the columns (n_rows, m) of all points from the rows of each law, (k,) for one point or (k, c), k <= n_rows."""
+    columns = [part.reshape(len(part), -1) for part in parts]
+    padded = [np.pad(part, ((0, n_rows - len(part)), (0, 0))) for part in columns]
+    return np.hstack([np.zeros((n_rows, 0)), *padded])
 
 
 def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
@@ -611,7 +585,6 @@ class March:
         """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
         totals = self.system.totals
         totals[:] = 0.0
-        totals[Total.IS_DIRTY] = 1.0
         self.work_sums[:] = 0.0
         self.done = 0
         self.shift = 0.0
@@ -810,11 +783,6 @@ def enlarge_lists(system: System, place: str) -> System:
     capacity = min(2 * room, MAX_LIST_STRIPS) // len(statuses)
     bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
     return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
-
-
-def count_list_bytes(n_strips: float) -> float:
-    """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
-    return 3 * STRIP_BYTES * min(n_strips, MAX_LIST_STRIPS)
 
 
 def split_losses(samples, n: int, scale: float) -> np.ndarray:
@@ -1091,8 +1059,12 @@ class Record:
         window_start = part[-1, NUMBER] - self.n_window
         while len(self.recent) > 1 and self.recent[1][0, NUMBER] <= window_start:
             rows = self.recent.pop(0)
-            if self.keeps_samples and sum(map(len, self.early)) <= checkpoint.MAX_EARLY_SAMPLES:
+            if self.keeps_samples:
                 self.early.append(rows[: -1 : self.stride])
+        # Every second sample is kept if there are too many; a cycle then need not begin with one.
+        if sum(map(len, self.early)) > checkpoint.MAX_EARLY_SAMPLES:
+            self.early = [np.concatenate(self.early)[::2]]
+            self.stride *= 2
 
     def repeat(self, count: int) -> None:
         """Append copies of the last part of a motion that repeats, instead of computing its next cycles.

@@ -35,7 +35,6 @@ PUBLIC = {
         "estimate_sampling_errors",
         "finer_errors",
         "friction_errors",
-        "merged_cell_errors",
         "total_error",
     ),
     "events": (

@@ -8,7 +8,6 @@ Out: errors by source and measure name.
 
 from collections.abc import Callable, Hashable
 from functools import partial
-from time import perf_counter
 from typing import NamedTuple
 
 from .errors import MAX_ORDER, convergence_errors
@@ -25,7 +24,7 @@ class CoarserRuns(NamedTuple):
     - rule: function (values of the reference run, *values of the coarse runs) that returns errors by
       measure name.
     - reference: settings of the reference run to which they are compared; None: the fine run.
-    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds", "cells" or
+    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds" or
       "samples"; "own" if no key of a scene sets it.
     """
 
@@ -54,7 +53,7 @@ class StepRun(NamedTuple):
 
 def estimate_errors(
     solve, fine: Values, coarse_runs: ComparisonRuns, solved_runs
-) -> tuple[list[SourceErrors], float]:
+) -> list[SourceErrors]:
     """Compute coarser runs, and estimate the errors of the measures by source.
 
     Parameters
@@ -70,12 +69,9 @@ def estimate_errors(
 
     Returns
     -------
-    errors : list of (str, dict)
+    list of (str, dict)
         Source of the error and errors by measure name, for each of the CoarserRuns.
-    seconds : float
-        Elapsed time of the new runs [s].
     """
-    begin = perf_counter()
 
     def solve_values(settings) -> Values:
         """Return the measures of a run with given settings, computed only once."""
@@ -89,4 +85,4 @@ def estimate_errors(
         errors.append(
             (coarser.source, coarser.rule(reference_values, *map(solve_values, coarser.runs)))
         )
-    return errors, perf_counter() - begin
+    return errors

@@ -168,38 +168,6 @@ def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     return errors
 
 
-def merged_cell_errors(fine: Values, *coarse: Values) -> Values:
-    """Estimate the error of each measure from runs with merged cells of a slider density.
-
-    The force of a density divided into cells is exact at the ends of each cell; its error between them is
-    of second order in the cell width. Measures that depend on the start or the end of slip have an error
-    of first order, because the stiffness jumps from cell to cell. The merges are those of
-    `friction.cells.CELL_MERGES`.
-
-    Parameters
-    ----------
-    fine : dict
-        Measures by name; floats or arrays (n,) of many runs.
-    *coarse : dict
-        Measures of each coarse run; the largest change is used.
-
-    Returns
-    -------
-    dict
-        Errors by name, for the measures of all runs.
-    """
-    changes = [signed_change(fine, values) for values in coarse]
-    errors = {}
-    for name in fine:
-        if all(name in change for change in changes):
-            order = 1.0 if find_definition(name).sample_error else 2.0
-            errors[name] = np.max(
-                [convergence_error(change[name], ratio=4.0, order=order) for change in changes],
-                axis=0,
-            )
-    return errors
-
-
 def estimate_sampling_errors(values: Values) -> Values:
     """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}

@@ -53,13 +53,19 @@ def transform_segments(step: float, records, size: int) -> Segments:
     -------
     Segments
     """
-    records = np.asarray(records)
-    starts = np.arange(0, records.shape[1] - size + 1, size - size // 2)
-    segments = records[:, starts[:, None] + np.arange(size)]
-    taper = np.sin(np.pi * np.arange(size) / size) ** 2  # periodic Hann window
-    segments = (segments - segments.mean(axis=2, keepdims=True)) * taper
-    transforms = np.fft.rfft(segments) * np.sqrt(step / np.sum(taper**2))
-    return Segments(np.fft.rfftfreq(size, step), transforms)
+    # SciPy's signal package is loaded only for records.
+    from scipy.signal import stft
+
+    frequency, _, transforms = stft(
+        np.asarray(records),
+        1 / step,
+        nperseg=size,
+        detrend="constant",
+        boundary=None,
+        padded=False,
+        scaling="psd",
+    )
+    return Segments(frequency, np.swapaxes(transforms, 1, 2))
 
 
 def average_segments(input_transforms, output_transforms) -> CrossDensities:

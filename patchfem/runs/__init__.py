@@ -77,7 +77,6 @@ PUBLIC = {
         "patch_surface",
         "shorten_file_names",
     ),
-    "rig.costs": ("count_cell_merges",),
     "rig.decays": (
         "make_laws_on_coarse_meshes",
         "tabulate_static_motions",

@@ -60,8 +60,6 @@ class Missed(NamedTuple):
         Result of the run.
     faces : tuple of Face
         Pressed interfaces of the run, or the one to which the measures belong.
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     model : Model
         Model of the run or of the interface.
     measures : Mapping
@@ -72,7 +70,6 @@ class Missed(NamedTuple):
 
     result: Result
     faces: tuple[Face, ...]
-    next_seconds: float
     model: Model
     measures: Mapping[str, Measure]
     excess: Mapping[str, float]
@@ -94,6 +91,11 @@ class Missed(NamedTuple):
         """Named measure with the largest ratio of error to allowed error."""
         return max(self.find_names(), key=self.excess.get)
 
+    def is_time_short(self, *axes: str) -> bool:
+        """Return whether accuracy.max_seconds ended the refinement along one of some axes."""
+        shortage = self.result.shortage
+        return shortage is not None and shortage.axis in axes
+
     def make_finding(self, advice: Advice) -> Finding:
         """Return the finding on these measures: errors, tolerance and advice."""
         first, *others = self.find_names()
@@ -106,9 +108,7 @@ class Missed(NamedTuple):
         return Finding(words, advice)
 
 
-def find_missed_measures(
-    result: Result, faces: tuple[Face, ...], next_seconds: float = 0.0
-) -> list[Finding]:
+def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Finding]:
     """Return a finding on the static measures of each interface that miss the tolerance, and one on those of the motion.
 
     Parameters
@@ -117,8 +117,6 @@ def find_missed_measures(
         Result of the run.
     faces : tuple of Face
         Pressed interfaces of the run.
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     """
     model = result.plan.model
     measures = result.measures
@@ -137,11 +135,11 @@ def find_missed_measures(
         missed = {name: excess.pop(full) for name, full in numbered.items() if full in excess}
         if not missed:
             return []
-        return _find_static(Missed(result, (face,), next_seconds, face.model, own, missed))
+        return _find_static(Missed(result, (face,), face.model, own, missed))
 
     findings = merge_findings(model, faces, find_on_face)
     if excess:
-        motion = Missed(result, faces, next_seconds, model, measures, excess)
+        motion = Missed(result, faces, model, measures, excess)
         findings.append(motion.make_finding(_advise_on_motion(motion)))
     return findings
 
@@ -159,11 +157,10 @@ def _find_static(missed: Missed) -> list[Finding]:
 
     (face,) = missed.faces
     findings = [missed.make_finding(_advise_on_statics(missed, face))]
-    patch = (face.static or face.patches)[0]
     if face.model.patch.gap.profile is None:
         return findings
     if face.patch.points is None or missed.model.kind != "patch":
-        element = longest_loaded_cell(patch.x, patch.active)
+        element = longest_loaded_cell(face.patch.x, face.patch.active)
         findings += map(Finding, trace_split.advise_split(face.model.patch, element))
     return findings
 
@@ -188,9 +185,7 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     # its limit.
     is_at_limit = missed.excess.keys() <= set(patch_rows.MESH_MEASURES)
     name = "mesh" if missed.model.kind == "patch" else "mesh of the pressed pieces"
-    if face.static:
-        patch_model = patch_model.with_mesh(is_static=True, slip=None)
-    solved = [(patch_model, face.unworn or face.static or face.patches)]
+    solved = [(patch_model, face.unworn or face.patches)]
     advice = _advise_mesh(missed, solved, name, is_at_limit=is_at_limit)
     return advice._replace(axis="mesh")
 
@@ -228,10 +223,8 @@ def _advise_mesh(
         return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
     if not all(patch_model.mesh.is_automatic for patch_model, _ in solved):
         return Advice(f"{cause}leave out {ELEMENT_SIZE}", ELEMENT_SIZE)
-    if missed.next_seconds:
-        limit = _round_up(MAX_SECONDS_MARGIN * missed.next_seconds)
-        text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for finer meshes"
-        return Advice(text, "accuracy.max_seconds", limit)
+    if missed.is_time_short("mesh"):
+        return _advise_time(missed, "finer meshes", cause)
     if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
         return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
@@ -245,10 +238,14 @@ def _advise_mesh(
     return Advice(text, "accuracy.tolerance", tolerance)
 
 
-def _round_up(value: float) -> float:
-    """Return a value rounded up to two significant digits."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return unit * ceil(value / unit)
+def _advise_time(missed: Missed, purpose: str, cause: str = "") -> Advice:
+    """Return the advice to allow the CPU time that further passes need, for a purpose and after a clause on the cause."""
+    # The proposed time has two significant digits.
+    seconds = MAX_SECONDS_MARGIN * missed.result.shortage.seconds
+    unit = 10.0 ** (floor(log10(seconds)) - 1)
+    limit = unit * ceil(seconds / unit)
+    text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for {purpose}"
+    return Advice(text, "accuracy.max_seconds", limit)
 
 
 def _advise_on_motion(missed: Missed) -> Advice:
@@ -259,6 +256,8 @@ def _advise_on_motion(missed: Missed) -> Advice:
     """
     name = missed.worst
     axis = refine.find_axis(missed.measures[name], name)
+    if axis != "mesh" and missed.is_time_short(axis):
+        return _advise_time(missed, "smaller time steps")._replace(axis=axis)
     advise = ADVICE_BY_AXIS.get(axis)
     advice = None if advise is None else advise(missed)
     if advice is not None:

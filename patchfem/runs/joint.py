@@ -26,7 +26,6 @@ from ..model.structure import compute_sticking_stiffness
 from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
 from .patch import mesh_levels, store
-from .patch.jenkins_elements import elements, strip_elements
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -157,17 +156,12 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
 
     It includes the shear of the pieces, asperities, holder and the stiffness of the friction law.
     """
-    f = model.friction
     load = patch.pressure.load
     if not load > 0:
         return 0.0
     if not model.partial_slip:
         return compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
-    length = _find_bond_length(model, load)
-    if patch.strips is not None:
-        strips = strip_elements(patch, f.static, length)
-        return float(sum(strip_element.stiffness.sum() for strip_element in strips))
-    return float(elements(patch, f.static, length).stiffness.sum())
+    return _sum_nodal_forces(patch, 1.0, _find_bond_length(model, load) / model.friction.static)
 
 
 def _find_bond_length(model: Model, load: float) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core import Missing
-from ..points import checkpoint, time_march
+from ..points import checkpoint
 from .plan import Plan
 from .rig import engines, numerics
 
@@ -102,7 +102,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
 
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
-    """Return the contributions of modes, drive, histories, bonds and harmonic balance of a rig.
+    """Return the contributions of modes, drive, histories and harmonic balance of a rig; a list of bonds is limited.
 
     `has_steps` tells whether the scene sets the steps per cycle.
     """
@@ -131,7 +131,8 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
 
-    parts += [
+    return [
+        *parts,
         MemoryPart(
             history.sample * width * samples,
             f"{samples} samples of the last cycles",
@@ -143,10 +144,6 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
             f"lower {length}",
         ),
     ]
-    if n_bonds := plan.unknowns.get("bond_list_about"):
-        size = time_march.count_list_bytes(n_bonds)
-        parts.append(MemoryPart(size, "the list of bonds", "raise accuracy.tail or accuracy.merge"))
-    return parts
 
 
 def free_bytes(process: Path = Path("/proc"), group: Path = Path("/sys/fs/cgroup")) -> float:
@@ -206,21 +203,16 @@ def _read_number(path: Path, name: str = "", place: int = 0) -> float:
         return float("nan")
 
 
-def reason_for_refusal(plan: Plan) -> str:
-    """Return why a run needs more memory than is free, or "" if it does not."""
+def refuse_insufficient_memory(plan: Plan) -> None:
+    """Raise Missing if a run would need more memory than is free, with the largest contribution and its remedy."""
     parts = list_parts(plan)
     free = free_bytes()
     total = sum(part.bytes for part in parts)
     if total <= free:
-        return ""
+        return
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
     largest = next(part for part in parts if part.remedy)
     if largest.bytes < 0.1 * total:
-        return f"{text}; free some memory, or run on a machine with more memory"
-    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {largest.remedy}"
-
-
-def refuse_insufficient_memory(plan: Plan) -> None:
-    """Raise Missing if a run would need more memory than is free."""
-    if text := reason_for_refusal(plan):
-        raise Missing(text, "")
+        raise Missing(f"{text}; free some memory, or run on a machine with more memory", "")
+    size = f"{largest.bytes / 1e9:.3g} GB"
+    raise Missing(f"{text}; {size} of these are for {largest.what}: {largest.remedy}", "")

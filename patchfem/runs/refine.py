@@ -3,13 +3,14 @@
 In: a function that solves a problem with a resolution, and one that judges the solution. `refine` is the only loop: each
 pass has twice the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the
 patches or the steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its
-tolerance within accuracy.max_seconds is not repeated.
+tolerance within accuracy.max_seconds is not repeated; its result names the axis and the time that would be needed.
 """
 
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
-from math import ceil, log
-from typing import NamedTuple, TypeVar
+from math import ceil, inf, log
+from time import process_time
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import TABLE as PATCH_TABLE
 from .results.patch_rows import Measures, Values
+from .results.result import TimeShortage
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
@@ -40,14 +42,49 @@ class Verdict(NamedTuple):
 
     - excess: largest ratio of error to allowed error of the measures that a finer resolution improves.
     - finer: next resolution, or None.
-    - seconds: CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    - axis: axis that the next resolution refines.
+    - seconds: CPU time [s] of the part of the last pass that the next one repeats.
+    - cost_ratio: expected ratio of the CPU times of two successive passes.
+    - max_passes: number of finer passes at the end of which the axis reaches its limit.
     - reason: why another pass follows, and its resolution; "" without one.
     """
 
     excess: float
     finer: Hashable = None
+    axis: str = ""
     seconds: float = 0.0
+    cost_ratio: float = COST_RATIO
+    max_passes: float = inf
     reason: str = ""
+
+    def predict_seconds(self) -> float:
+        """Return the expected CPU time [s] of all further passes, each of which divides the excess by ERROR_RATIO."""
+        n_passes = int(min(ceil(log(self.excess) / log(ERROR_RATIO)), self.max_passes))
+        return self.seconds * sum(self.cost_ratio**k for k in range(1, n_passes + 1))
+
+
+class TimeLimit(NamedTuple):
+    """CPU time that a run may take.
+
+    - seconds: largest CPU time of the run [s], accuracy.max_seconds.
+    - begin: CPU time of this process at which the run began [s].
+    - clock: function that returns the CPU time of this process [s].
+    """
+
+    seconds: float
+    begin: float
+    clock: Callable[[], float] = process_time
+
+
+class Refined(NamedTuple, Generic[Solution]):
+    """Last solution of a refinement.
+
+    - solution: the solution.
+    - shortage: TimeShortage if accuracy.max_seconds ended the refinement, else None.
+    """
+
+    solution: Solution
+    shortage: TimeShortage | None = None
 
 
 class WorstMeasure(NamedTuple):
@@ -67,7 +104,9 @@ def refine(
     solve: Callable[[Resolution, Solution | None], Solution | None],
     resolution: Resolution,
     judge: Callable[[Solution, list[float]], Verdict],
-) -> Solution:
+    limit: TimeLimit,
+    say: Callable[[str], None] | None = None,
+) -> Refined[Solution]:
     """Solve a problem with finer and finer resolutions, and return the last solution.
 
     Parameters
@@ -79,6 +118,10 @@ def refine(
         First resolution.
     judge : callable
         Function of a solution and of the excesses of all solutions before.
+    limit : TimeLimit
+        No pass follows after which the run would need more CPU time to meet the tolerance.
+    say : callable, optional
+        Callback for the reason of another pass.
     """
     solution = None
     excesses: list[float] = []
@@ -90,7 +133,15 @@ def refine(
         verdict = judge(solution, excesses)
         excesses.append(verdict.excess)
         resolution = verdict.finer
-    return solution
+
+        # The time that the run would need in all is compared with its limit before each further pass.
+        if resolution is not None:
+            expected = limit.clock() - limit.begin + verdict.predict_seconds()
+            if expected > limit.seconds:
+                return Refined(solution, TimeShortage(verdict.axis, expected))
+            if say is not None and verdict.reason:
+                say(verdict.reason)
+    return Refined(solution)
 
 
 def split_error(measure: Measure, name: str) -> Values:
@@ -154,7 +205,7 @@ def find_worst_measure(measures: Measures, tolerance: float, axes: Iterable[str]
     return worst
 
 
-def judge_pass(given: Model, done, total_seconds: float, excesses: list[float]) -> Verdict:
+def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     """Decide whether a run needs another pass with finer meshes or more steps.
 
     Parameters
@@ -163,8 +214,6 @@ def judge_pass(given: Model, done, total_seconds: float, excesses: list[float]) 
         Model of the first pass, with the settings that the scene fixes.
     done : run.FinishedPass
         The last pass.
-    total_seconds : float
-        CPU time [s] of all passes.
     excesses : list of float
         Excesses of the passes before.
     """
@@ -186,22 +235,15 @@ def judge_pass(given: Model, done, total_seconds: float, excesses: list[float]) 
     if not axis or (excesses and excess * MIN_ERROR_GAIN > excesses[-1]):
         return Verdict(excess)
 
-    # Each further pass divides the error by ERROR_RATIO and multiplies the time by COST_RATIO.
     finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     if finer is None:
         return Verdict(excess)
-    n_passes = ceil(log(excess) / log(ERROR_RATIO))
-    growth = sum(COST_RATIO**k for k in range(1, n_passes + 1))
-    expected = total_seconds + done.seconds * growth
-    if expected > (model.accuracy.max_seconds or MAX_SECONDS):
-        return Verdict(excess, seconds=expected)
-
     resolution = "half the element size" if axis == "mesh" else "twice the steps"
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
     )
-    return Verdict(excess, finer, reason=reason)
+    return Verdict(excess, finer, axis, done.seconds, reason=reason)
 
 
 def bound_errors(measures: Measures, before: Measures) -> Measures:

@@ -107,9 +107,13 @@ def run(
 
         start = perf_counter()
         passes = _Passes(runnable, say, progress, state_file, estimate=estimate)
-        done = refine.refine(passes.solve, runnable.model, passes.judge)
+        done, shortage = refine.refine(
+            passes.solve, runnable.model, passes.judge, passes.limit, say
+        )
+        if shortage is not None:
+            done = done._replace(result=replace(done.result, shortage=shortage))
         done.result.seconds["total"] = perf_counter() - start
-        return _complete_result(done, passes.next_seconds)
+        return _complete_result(done)
 
 
 class _Passes:
@@ -124,8 +128,8 @@ class _Passes:
 
     Attributes
     ----------
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    limit : TimeLimit
+        CPU time that all passes together may take.
     """
 
     def __init__(self, run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate):
@@ -134,10 +138,10 @@ class _Passes:
         self.progress = progress
         self.state_file = state_file
         self.estimate = estimate
-        self.next_seconds = 0.0
+        max_seconds = run_plan.model.accuracy.max_seconds or refine.MAX_SECONDS
+        self.limit = refine.TimeLimit(max_seconds, process_time())
         self._count = 0
         self._pressed: tuple[Face, ...] = ()
-        self._begin = process_time()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
         """Run a model after an earlier pass, None for the first one; return None if it cannot improve the earlier pass."""
@@ -171,12 +175,7 @@ class _Passes:
         """
         if not self.estimate:
             return refine.Verdict(0.0)
-        total = process_time() - self._begin
-        verdict = refine.judge_pass(self.plan.model, done, total, excesses)
-        self.next_seconds = verdict.seconds
-        if self.say is not None and verdict.reason:
-            self.say(verdict.reason)
-        return verdict
+        return refine.judge_pass(self.plan.model, done, excesses)
 
     def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[Face, ...]]:
         """Press the interfaces of a model, wear them, and compute its motion; return the result and the interfaces.
@@ -213,6 +212,7 @@ class _Passes:
             seconds=seconds,
             warnings=warnings,
             notes=notes,
+            limit=self.limit,
             say=self.say,
             progress=self.progress,
             estimate=self.estimate,
@@ -313,19 +313,14 @@ def _press_interfaces(
     tolerance = model.accuracy.tolerance
     solved = (before[0].unworn or before[0].patches) if before else ()
     patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
-    static = ()
-    # After wear the static measures are those of the worn patch.
-    if model.kind == "bench" and model.wear is None and not _is_open(patches[0]):
-        solved = before[0].static if before else ()
-        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate, solved)
-    return (Face(0, "", model, patches, static=static),)
+    return (Face(0, "", model, patches),)
 
 
 def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     """Return a Result with the static measures of interfaces before those of the motion."""
     static: Measures = {}
     for face in pressed:
-        patch, *coarse = face.static or face.patches
+        patch, *coarse = face.patches
         for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
@@ -361,7 +356,7 @@ def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
     result = patch_result.make_static_result(replace(inputs, plan=run_plan, warnings=warnings))
     result = replace(result, outcome=Outcome.NOT_CONVERGED)
     inputs.seconds["total"] = sum(inputs.seconds.values())
-    unmoved = (inputs.faces[0]._replace(static=(), unworn=()),)
+    unmoved = (inputs.faces[0]._replace(unworn=()),)
     return _complete_result(FinishedPass(run_plan.model, result, unmoved, 0.0))
 
 
@@ -386,24 +381,18 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunI
         faces=(face._replace(patches=worn, unworn=face.patches),),
         progress=None,
         stiffer=stiffer,
+        # The time of the wear, which has passes of its own, is not that of the motion.
+        limit=inputs.limit._replace(begin=process_time()),
     )
 
 
-def _complete_result(done: FinishedPass, next_seconds: float = 0.0) -> Result:
-    """Add accuracy warnings, notes on yielding, and definitions of the measures to a Result.
-
-    Parameters
-    ----------
-    done : FinishedPass
-        The last pass that counts.
-    next_seconds : float
-        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
-    """
+def _complete_result(done: FinishedPass) -> Result:
+    """Add accuracy warnings, notes on yielding, and definitions of the measures to the Result of the last pass."""
     result = done.result
     model = result.plan.model
 
     # What misses the tolerance, with advice by cause.
-    findings = tuple(find_missed_measures(result, done.pressed, next_seconds))
+    findings = tuple(find_missed_measures(result, done.pressed))
     warnings = [*result.warnings, *(finding.sentence for finding in findings)]
 
     outcome = result.outcome

@@ -151,17 +151,21 @@ def find_key_lines(text: str) -> dict[str, int]:
     line = 1
     position = 0
     while True:
+        # Blanks, line breaks and comments.
         start = position
         position = _BLANK_PATTERN.match(text, position).end()
         line += text.count("\n", start, position)
         path, index = opened[-1] if opened else (table, None)
 
+        # The end of an array or inline table, or the next item in it.
         if opened and text[position : position + 1] in ("]", "}", ","):
             opened.pop()
             if text[position] == ",":
                 opened.append((path, None if index is None else index + 1))
             position += 1
             continue
+
+        # The header of a table.
         if not opened and (match := _HEADER_PATTERN.match(text, position)):
             table = _record_header(
                 lines, last_item, _split_written_key(match[2]), line, is_array=bool(match[1])
@@ -180,6 +184,8 @@ def find_key_lines(text: str) -> dict[str, int]:
             position = _BLANK_PATTERN.match(text, match.end()).end()
         else:
             break
+
+        # The value: an array or an inline table with further keys, or a number, text, truth or date.
         if text[position : position + 1] in ("[", "{"):
             opened.append((path, 0 if text[position] == "[" else None))
             position += 1
@@ -189,6 +195,7 @@ def find_key_lines(text: str) -> dict[str, int]:
         else:
             break
 
+    # A table that has no header of its own.
     for path, line in list(lines.items()):
         while "." in path:
             path = path.rpartition(".")[0]

@@ -221,10 +221,14 @@ def finish_scene(
     SceneError
         With all mistakes at once.
     """
+    # First the values of each key, then rules on tables, then combinations that no engine computes yet. Each adds its
+    # mistakes to the draft, so that the user sees all of them.
     read_tables(draft)
     kind = check_scene(draft)
     is_valid = not draft.has_mistakes
     check_combinations(draft, kind)
+
+    # Defaults can be filled in only if no value is missing, and files be compared only with valid tables.
     completed = complete_tables(draft.tables, kind) if is_valid else None
     for key, message in faults(draft.tables, not draft.has_mistakes) if faults else ():
         draft.add_mistake(key, message)

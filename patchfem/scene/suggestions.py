@@ -51,12 +51,16 @@ def require_key(key: str, value: TomlValue = "") -> Key:
     known = find_key(key)
     if known is not None:
         return known
+
+    # The first `depth` pieces of the key are known, the next one is not.
     pieces = split_key(key)
     depth = next(k for k in range(len(pieces)) if not find_key(".".join(pieces[: k + 1])))
     table_key = ".".join(pieces[:depth])
     model = find_key(table_key).inner if table_key else Tables
     if model is None:
         raise ValueError(f"{table_key} is a value, not a table")
+
+    # The pieces behind the unknown one make it a table, in which the value stands as in a file.
     for piece in reversed(pieces[depth + 1 :]):
         value = {piece: value}
     path = ".".join(pieces[: depth + 1])
@@ -170,8 +174,9 @@ def _suggest_name(
         if owners:
             return "' or '".join(f"{_name_item(name)}.{key}" for name in present[:1] or owners)
 
-    # If the file contains both keys, neither is a misspelling of the other. The unknown key of --set may be meant
-    # for a key that the file contains.
+    # Keys that may have been meant: those that the table does not contain yet (`free`) and that accept the value
+    # (`fitting`), above all those that it needs (`lacking`). If the file contains both keys, neither is a misspelling
+    # of the other. The unknown key of --set may be meant for a key that the file contains.
     path = f"{table_key}.".lstrip(".")
     is_set = f"{path}{key}" in sets
     keys = list_keys(model)
@@ -180,6 +185,9 @@ def _suggest_name(
     free = [name for name in keys if name not in written and keys[name].accepts_value]
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
+
+    # The first candidate, from the best reason to the weakest: a similar spelling, a common word, the only key that is
+    # needed, a similar key for another kind of value, a similar key that is there already.
     word = key.lower()
     words = set(word.split("_"))
     return next(

@@ -72,13 +72,19 @@ def _name_effects(key: str, table: Table) -> list[str]:
 
 
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
-    """Yield the TOML lines of a table, at `table_key`, and of the tables inside it."""
+    """Yield the TOML lines of a table, and of the tables inside it.
+
+    `table_key` is the dotted key of the table, in which items of arrays have numbers, as in "structure.mode.0".
+    """
+    # Keys without a value, and those without a meaning for the law or kind that the table names, are left out.
     unused = find_choices(table).unused
     inner = []
     for name, key in list_keys(type(table)).items():
         value = getattr(table, key.attribute)
         if value in (None, ()) or name in unused:
             continue
+
+        # Inner tables are collected as (header, dotted key, table). A material is written as an inline table.
         path = f"{table_key}.{name}" if table_key else name
         header = _ITEM_PATTERN.sub("", path)
         if isinstance(value, tuple) and isinstance(value[0], Table):

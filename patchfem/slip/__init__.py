@@ -23,6 +23,5 @@ PUBLIC = {
         "comparison_mode_count",
         "find_sufficient_modes",
         "jenkins_set",
-        "scale_limits",
     ),
 }

@@ -299,15 +299,6 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.array(yielded[::-1])
 
 
-def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
-    """Return elements with the same stiffness whose yield forces are multiplied by a factor > 0."""
-    return replace(
-        elements,
-        yield_displacement=frozen_array(factor * elements.yield_displacement),
-        limit=frozen_array(factor * elements.limit),
-    )
-
-
 def shear_modes(
     tangential: np.ndarray,
     limit: np.ndarray,

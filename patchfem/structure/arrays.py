@@ -53,15 +53,15 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             with np.load(path, allow_pickle=False) as file:
                 return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
         variables = read_variables(path)
-    arrays = {name: variables[name] for name in ARRAY_NAMES if name in variables}
-    for name, values in arrays.items():
-        _refuse_large(name, values.shape)
 
     # MATLAB has no vectors: a matrix with a single row or column stands for one.
-    full = {
-        name: values.toarray() if issparse(values) else values for name, values in arrays.items()
-    }
-    return {name: values.ravel() if 1 in values.shape else values for name, values in full.items()}
+    arrays = {}
+    for name in filter(variables.__contains__, ARRAY_NAMES):
+        values = variables[name]
+        _refuse_large(name, values.shape)
+        full = values.toarray() if issparse(values) else values
+        arrays[name] = full.ravel() if 1 in full.shape else full
+    return arrays
 
 
 def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
@@ -123,8 +123,9 @@ def build_basis(
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
-    M, K, C = (_to_matrix(data.get(name), name) for name in ("M", "K", "C"))
-    n = len(M)
+    # A single number is a matrix (1, 1).
+    matrices_by_name = {name: np.atleast_2d(data[name]) for name in ("M", "K", "C") if name in data}
+    n = matrices_by_name["M"].shape[-1]
     if pairs and "slide" in data:
         raise PatchfemError(
             "contains `slide`, but [[structure.interface]] also defines where sliding "
@@ -153,9 +154,7 @@ def build_basis(
         force = np.eye(n)[driven_mass - 1] if driven_mass else data.get("force", output)
 
     return matrices.build_basis(
-        M,
-        K,
-        C,
+        **matrices_by_name,
         faces=faces,
         output=output,
         base=data.get("base"),
@@ -173,15 +172,3 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
     if not data.keys().isdisjoint(REMOVED_ARRAYS):
         removed = f"; {describe_removed('modes as arrays', 'a file of modes as arrays')}"
     raise PatchfemError(f"lacks {missing_name}; the file contains {names}{removed}")
-
-
-def _to_matrix(values, name: str):
-    """Convert a single number to a matrix (1, 1), and return matrices and None unchanged.
-
-    Raises PatchfemError, which names the array `name`, for other `values`.
-    """
-    if values is None or np.ndim(values) == 2:
-        return values
-    if np.size(values) != 1:
-        raise PatchfemError(f"{name} must be square, not of shape {np.shape(values)}")
-    return np.reshape(values, (1, 1))

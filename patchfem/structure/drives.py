@@ -97,7 +97,7 @@ def make_release(period: float) -> PiecewiseDrive:
 
     `period` [s] serves as the length of a cycle, of which such a signal has none of its own.
     """
-    return PiecewiseDrive((DriveSegment(0.0),), period, False)
+    return make_step(0.0, period, moving=False)
 
 
 def make_levels(

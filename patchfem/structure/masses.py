@@ -11,13 +11,9 @@ def make_slide_rows(pairs, n: int) -> np.ndarray:
 
     `pairs` holds k pairs (i, j) of masses, numbered from 1; 0 is the base.
     """
-    rows = np.zeros((len(pairs), n))
-    for row, (i, j) in zip(rows, pairs):
-        if i:
-            row[i - 1] += 1.0
-        if j:
-            row[j - 1] -= 1.0
-    return rows
+    motions = np.eye(n + 1)[:, 1:]  # row 0, the base, does not move
+    first, second = np.array(pairs, int).reshape(-1, 2).T
+    return motions[first] - motions[second]
 
 
 def build_basis(
@@ -46,7 +42,6 @@ def build_basis(
     ModalBasis
     """
     n = len(masses)
-    damper_rows = _make_weighted_rows(dampers, n)
     unit = np.eye(n)
     return matrices.build_basis(
         np.diag(np.asarray(masses, float)),
@@ -54,7 +49,7 @@ def build_basis(
         output=unit[output - 1],
         force=None if driven_mass is None else unit[driven_mass - 1],
         spring_rows=_make_weighted_rows(springs, n),
-        damper_rows=damper_rows if len(damper_rows) else None,
+        damper_rows=_make_weighted_rows(dampers, n),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError
-from ..inputs.symmetric import read_numbers, symmetrize
+from ..inputs.symmetric import read_row, symmetrize
 from .modes import make_basis
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
@@ -97,24 +97,27 @@ def build_basis(
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
     # Rows of the interfaces and of the output; the sign of each mode follows from them.
-    faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
+    if faces is None:
+        faces = np.zeros((0, n))
+    else:
+        faces = np.atleast_2d(read_row(faces, "slide", n, allows_rows=True))
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
-    output = _check_row(output, n, "output")
+    output = read_row(output, "output", n)
     sign = _find_shape_signs(phi, output)
     phi = phi * sign
     zeta, damping = split_damping(D * np.outer(sign, sign), omega)
 
     # Participation of the drive.
     if force is not None:
-        participation = -phi.T @ _check_row(force, n, "force")
+        participation = -phi.T @ read_row(force, "force", n)
     else:
-        base = np.ones(n) if base is None else _check_row(base, n, "base")
+        base = np.ones(n) if base is None else read_row(base, "base", n)
         participation = phi.T @ (M @ base)
 
     slides = faces @ phi
     return make_basis(
-        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        tuple(names or map(str, range(1, n + 1))),
         1.0,
         omega=omega,
         zeta=zeta,
@@ -189,8 +192,8 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
 def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) for a stiffness K [N/m].
 
-    `root` is the Cholesky factor (n, n) of the mass matrix, or its diagonal (n,). The columns of the shapes are
-    eigenvectors y of L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
+    `root` is the Cholesky factor (n, n) of the mass matrix. The columns of the shapes are eigenvectors y of
+    L^-1 K L^-T. L^-T y is the mode shape of unit modal mass.
     """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
@@ -215,19 +218,15 @@ def _require_finite(per_mass) -> np.ndarray:
     return per_mass
 
 
-def _factor_mass(M):
-    """Return the Cholesky factor (n, n) of a mass matrix M, or its square roots (n,) if M is diagonal."""
+def _factor_mass(M) -> np.ndarray:
+    """Return the Cholesky factor (n, n) of a mass matrix M."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
-    if not (M - np.diag(diagonal)).any():
-        root = scale
-        is_positive = bool((root > 0).all())
-    else:
-        try:
-            root = cholesky(M, lower=True)
-            is_positive = bool((np.diag(root) > np.sqrt(len(M) * EIGENVALUE_TOL) * scale).all())
-        except LinAlgError:
-            is_positive = False
+    try:
+        root = cholesky(M, lower=True)
+        is_positive = bool((np.diag(root) > np.sqrt(len(M) * EIGENVALUE_TOL) * scale).all())
+    except LinAlgError:
+        is_positive = False
     if not is_positive:
         massless = np.flatnonzero(diagonal <= 0)
         example = f" (coordinate {massless[0] + 1} has none)" if massless.size else ""
@@ -239,16 +238,11 @@ def _factor_mass(M):
 
 
 def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
-    """Solve L X = right with the Cholesky factor L of the mass matrix, or L^T X = right if `transpose`.
+    """Solve L X = right with the Cholesky factor L (n, n), `root`, of the mass matrix, or L^T X = right if `transpose`.
 
-    `root` is L (n, n), or its diagonal (n,) if the mass matrix is diagonal.
+    An overflow is not refused here, but by `_require_finite`.
     """
-    if root.ndim == 2:
-        return solve_triangular(
-            root, right, lower=True, trans="T" if transpose else "N", check_finite=False
-        )
-    with np.errstate(over="ignore"):  # `_require_finite` raises an error instead
-        return right / root[:, None]
+    return solve_triangular(root, right, lower=True, trans=int(transpose), check_finite=False)
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
@@ -315,18 +309,6 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
             D = trim_round_off(rotation.T @ D @ rotation, np.maximum(scale, scale.max()))
         first = last
     return phi, D
-
-
-def _check_row(row, n: int, name: str) -> np.ndarray:
-    """Return a row of numbers as an array (n,), after checking that it has n finite real entries.
-
-    A column is returned as a row. If `name`, the name of the row in the error message, is "slide", the result may have
-    several rows (k, n).
-    """
-    if name == "slide":
-        return read_numbers(row, name, (n,), (None, n))
-    is_column = np.ndim(row) == 2 and 1 in np.shape(row)
-    return read_numbers(np.ravel(row) if is_column else row, name, (n,))
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:

@@ -38,7 +38,12 @@ class RandomRecord(RecordedDrive):
 
 
 def draw_random_record(
-    frequency, density, duration: float, seed: int, period: float
+    frequency,
+    density,
+    duration: float,
+    seed: int,
+    period: float,
+    band: tuple[float | None, float | None] = (None, None),
 ) -> RandomRecord:
     """Draw a random record with a given spectral density.
 
@@ -54,6 +59,8 @@ def draw_random_record(
         Seed of the random numbers.
     period : float
         Duration [s] of a cycle of the drive.
+    band : tuple of float or None
+        Lowest and highest frequency [Hz] of the record, or None for an end of the spectrum.
 
     Returns
     -------
@@ -62,10 +69,17 @@ def draw_random_record(
     Raises
     ------
     PatchfemError
-        If fewer than `MIN_SPECTRAL_LINES` spectral lines, 1/duration apart, lie in the band.
+        If the band reaches beyond the spectrum, or has fewer than `MIN_SPECTRAL_LINES` lines, 1/duration apart.
     """
-    low = float(frequency[0])
-    high = float(frequency[-1])
+    ends = [float(frequency[0]), float(frequency[-1])]
+    low, high = (end if given is None else given for given, end in zip(band, ends))
+    if low < ends[0] or high > ends[1]:
+        raise PatchfemError(
+            f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from {ends[0]:g} to {ends[1]:g} Hz",
+            "drive.from" if low < ends[0] else "drive.to",
+        )
+
+    # Spectral lines in the band.
     n_rows = int(np.ceil(duration * NOISE_ROWS_PER_PERIOD * high))
     step = duration / n_rows
     first_line = int(np.ceil(low * duration - SPECTRAL_LINE_TOL))
@@ -98,51 +112,9 @@ def _build_random(drive: DriveKeys) -> RandomRecord:
     else:
         frequency = (keys.from_, keys.to)
         density = (keys.spectrum, keys.spectrum)
-    frequency, density = _cut_spectrum(
-        np.array(frequency, float), np.array(density, float), keys.from_, keys.to
-    )
     duration = keys.duration if keys.duration is not None else keys.cycles * drive.period
-    return draw_random_record(frequency, density, duration, keys.seed or 0, drive.period)
-
-
-def _cut_spectrum(
-    frequency, density, low: float | None, high: float | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Restrict a spectrum to the range between two frequencies [Hz].
-
-    Between its values the spectrum is linear in double logarithmic scale.
-
-    Parameters
-    ----------
-    frequency, density : (k,) array
-        Frequencies [Hz] and densities of the spectrum.
-    low, high : float or None
-        Ends of the range [Hz], or None for an end of the spectrum.
-
-    Returns
-    -------
-    frequency, density : (j,) array
-        Values in the range, and at both of its ends.
-
-    Raises
-    ------
-    PatchfemError
-        If an end of the range lies outside the spectrum.
-    """
-    low = frequency[0] if low is None else low
-    high = frequency[-1] if high is None else high
-    if low < frequency[0] or high > frequency[-1]:
-        raise PatchfemError(
-            f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from "
-            f"{frequency[0]:g} to {frequency[-1]:g} "
-            "Hz",
-            "drive.from" if low < frequency[0] else "drive.to",
-        )
-    inner = frequency[(frequency > low) & (frequency < high)]
-    cut_frequency = np.array([low, *inner, high])
-    return cut_frequency, np.exp(
-        np.interp(np.log(cut_frequency), np.log(frequency), np.log(density))
-    )
+    band = (keys.from_, keys.to)
+    return draw_random_record(frequency, density, duration, keys.seed or 0, drive.period, band)
 
 
 # Function that builds the signal of the waveform of this module

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError
+from ..inputs.damage import list_some
 from ..inputs.universal import DIRECTION_NAMES
 from .modes import make_basis
 
 # Pattern of a node with a direction, such as "12:+x"
 DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
-MAX_LISTED_NODES = 12  # largest number of nodes with directions that an error message lists
 # Largest mass that the modes represent, as a fraction of the moving mass; a larger one shows that
 # the mass or the node of the base motion is wrong
 MAX_MASS_FRACTION = 1.05
@@ -88,10 +88,7 @@ def _list_directions(motion: Motions) -> str:
 
     `motion` has the keys (node, axis).
     """
-    names = [f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)]
-    text = ", ".join(names[:MAX_LISTED_NODES])
-    n_more = len(names) - MAX_LISTED_NODES
-    return f"{text} and {n_more} more" if n_more > 0 else text
+    return list_some([f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)])
 
 
 def build_basis(

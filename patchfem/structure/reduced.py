@@ -123,6 +123,8 @@ class Reduction(NamedTuple):
 def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
     """Reduce the sparse matrices of a structure to its boundary and its lowest modes.
 
+    The matrices are projected on natural modes and on static shapes, one for each coordinate of the boundary.
+
     Parameters
     ----------
     K, M, C : (n, n) sparse arrays
@@ -152,14 +154,15 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         _compute_craig_bampton_shapes if method == CRAIG_BAMPTON else _compute_free_interface_shapes
     )
 
-    # More modes are computed than are kept, for the error estimate.
+    # More modes are computed than are kept, because a run with all of them gives the error of a run with the kept ones.
     count = 2 * modes + N_EXTRA_MODES
     with use_one_blas_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
         stiffness = _project(K, shapes, PROJECTION_TOL)
         mass = _project(M, shapes, PROJECTION_TOL)
         damping = None if C is None else _project(C, shapes, matrices.ENTRY_TOL)
-        # The static shapes are orthogonal to the modes with respect to K.
+        # The static shapes are orthogonal to the modes with respect to K, and the modes to each other with unit modal
+        # mass. So their part of the stiffness is diag(omega^2); round-off of the projection is overwritten.
         n_modes = computed.omega.size
         stiffness[:n_modes] = 0.0
         stiffness[:, :n_modes] = 0.0
@@ -418,7 +421,7 @@ def build_basis(
     # Boundary and drive in the coordinates of the reduction.
     motion = reduction.boundary @ selection
     force = -selection.T @ reduction.base_load if driven_mass is None else motion[driven_mass - 1]
-    boundary_names = names or [str(k + 1) for k in range(n_boundary)]
+    boundary_names = names or map(str, range(1, n_boundary + 1))
     mode_names = [f"mode {k + 1}" for k in range(len(mass) - n_boundary)]
 
     basis = matrices.build_basis(

@@ -30,33 +30,15 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
         If it is infinite: on an undamped resonance, or at 0 with a rigid mode.
     """
     omega = np.atleast_1d(np.asarray(omega, float))
-    rows_out = np.atleast_2d(rows_out)
-    rows_in = np.atleast_2d(rows_in)
-    n = basis.omega.size
-    # Uncoupled modes: a sum over the modes
-    if basis.damping is None:
-        stiffness = basis.omega**2 - omega[:, None] ** 2
-        stiffness = stiffness + 2j * omega[:, None] * basis.zeta * basis.omega
-        is_singular = np.any(stiffness == 0, axis=1)
-        if is_singular.any():
-            _refuse_infinite(omega[is_singular][0])
-        return np.einsum("on,kn,in->koi", rows_out, 1 / stiffness, rows_in) / basis.mass
-
-    # Coupled modes: one system of equations for each frequency
     each_omega = omega[:, None, None]
-    stiffness = np.diag(basis.omega**2) + 1j * each_omega * basis.damping
-    stiffness = stiffness - each_omega**2 * np.eye(n)
-    forces = np.broadcast_to(rows_in.T.astype(complex), (omega.size, n, len(rows_in)))
+    stiffness = np.diag(basis.omega**2) - each_omega**2 * np.eye(basis.omega.size)
+    stiffness = stiffness + 1j * each_omega * basis.damping_matrix
     try:
-        return rows_out @ np.linalg.solve(stiffness, forces) / basis.mass
+        motion = np.linalg.solve(stiffness, np.atleast_2d(rows_in).T[None])
     except np.linalg.LinAlgError:
-        is_singular = np.linalg.matrix_rank(stiffness) < n
-        _refuse_infinite(omega[is_singular][0] if is_singular.any() else omega[0])
-
-
-def _refuse_infinite(omega: float) -> None:
-    """Raise PatchfemError that the response is infinite at the circular frequency omega [rad/s]."""
-    raise PatchfemError(
-        f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
-        "neither damping nor stiffness there"
-    )
+        frequency = omega[np.linalg.cond(stiffness).argmax()] / (2 * np.pi)
+        raise PatchfemError(
+            f"structure: the response at {frequency:.9g} Hz is infinite, because a mode has neither damping nor "
+            "stiffness there"
+        ) from None
+    return np.atleast_2d(rows_out) @ motion / basis.mass

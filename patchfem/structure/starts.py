@@ -5,10 +5,10 @@ import numpy as np
 from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 
-def start_at_rest(basis: ModalBasis) -> InitialState:
-    """Return the initial state of a modal basis at rest without displacement."""
-    zero = frozen_array(np.zeros(basis.omega.size))
-    return InitialState(zero, zero)
+def start_at_rest(basis: ModalBasis, z=0.0) -> InitialState:
+    """Return the initial state of a modal basis at rest with the coordinates z (n,) [m]."""
+    zero = np.zeros_like(basis.omega)
+    return InitialState(frozen_array(zero + z), frozen_array(zero))
 
 
 def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> InitialState:
@@ -66,12 +66,11 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
         If no mode moves the output.
     """
     is_rigid = (basis.omega == 0) & (basis.output != 0)
-    shape = np.zeros(basis.omega.size)
     if is_rigid.any():
-        shape[is_rigid] = basis.output[is_rigid]
+        shape = np.where(is_rigid, basis.output, 0.0)
     else:
-        is_elastic = basis.omega > 0
-        shape[is_elastic] = basis.output[is_elastic] / basis.omega[is_elastic] ** 2
+        none = np.zeros_like(basis.omega)
+        shape = np.divide(basis.output, basis.omega**2, out=none, where=basis.omega > 0)
     output = float(shape @ basis.output)
     if output == 0:
         raise PatchfemError(
@@ -79,9 +78,7 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
             "of this point; give [structure.start]",
             "structure",
         )
-    return InitialState(
-        frozen_array(displacement / output * shape), frozen_array(np.zeros(shape.size))
-    )
+    return start_at_rest(basis, displacement / output * shape)
 
 
 def start_from_base_step(basis: ModalBasis, displacement: float) -> InitialState:
@@ -91,6 +88,4 @@ def start_from_base_step(basis: ModalBasis, displacement: float) -> InitialState
 
     z are the coordinates of the modal `basis` [m], and base their participations in the motion of the base.
     """
-    return InitialState(
-        frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size))
-    )
+    return start_at_rest(basis, -displacement * basis.base)

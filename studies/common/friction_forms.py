@@ -8,14 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import quad
-from scipy.special import gamma, gammainc, gammaincc, gammaln, hyp1f1, xlogy
+from scipy.special import gamma, gammainc, gammaln, xlogy
 
 from patchfem.closed_forms.contact import require_positive
-
-
-def _reading(reading):
-    if reading not in ("stretch", "report"):
-        raise ValueError(f"reading must be 'stretch' or 'report', got {reading!r}")
 
 
 def weight_along(relative_path, order=1.0):
@@ -124,39 +119,6 @@ def virgin_force(slide, length, order=1.0, initial=1.0):
     with np.errstate(divide="ignore", invalid="ignore"):
         first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
     return gammainc(order + 1, x) + first
-
-
-def reversal_force(back, length, order=1.0, reading="stretch"):
-    """Return the friction/limit after a long slide and a slide back; it is positive in the first direction.
-
-    x = back/length; report: 2 Q(p + 1, 2x) - 1, so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
-    e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
-    ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
-
-    Parameters
-    ----------
-    back : float
-        Slide back >= 0 [m].
-    length : float
-        Bond length [m].
-    order : float
-    reading : {"stretch", "report"}
-    """
-    require_positive(length=length)
-    _reading(reading)
-    x = np.asarray(back, float) / length
-    if np.any(x < 0):
-        raise ValueError("'back' must not be negative")
-    if reading == "report":
-        if order <= -1:
-            raise ValueError(f"order must exceed -1, got {order}")
-        return 2 * gammaincc(order + 1, 2 * x) - 1
-    if order < 0:
-        raise ValueError(f"with reading 'stretch' order must not be negative, got {order}")
-    if order == 1:
-        return 2 * np.exp(-x) - 1
-    old = x ** (order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
-    return np.exp(-2 * x) - gammainc(order + 1, x) - old
 
 
 def stretch_loop(amplitude, length):

@@ -1,20 +1,22 @@
 """What does "nearly critically damped in the vicinity of 148 Hz" (Figure 27) say about the rig?
 
 The block slid during the whole modal test. A block that does not slip moves with the base, and its response has no
-peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.8 mil rms, and one fitted mode is
+peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.9 mil rms, and one fitted mode is
 critically damped: at 101 Hz for a rigid Coulomb block, at 128 to 135 Hz for a block that climbs its grooves, and at 295
 Hz with the second load path fitted to Table 1.
 
-Only the grooves pass 148 Hz, at 4.5 g rms: 144 to 160 Hz with a damping ratio of 1.3, in four records of 20 s. A rigid
-block nears its own 143 Hz from below as it slides more, 131 Hz at 6 g rms, 142 Hz at 12 g. The second path, which
-explains the displacements of Table 1 best, cannot have acted in this test: its mode lies near 300 Hz where it is nearly
-critical and near 260 Hz at 3 g. An added spring that lifts 143 to 148 Hz would have 0.071 of the flexures' stiffness
-and give way by 27 mil before 4 g made it slip, 336 times what was measured at 4 g. For large slides the damping is that
-of statistical linearisation, 0.003 + sqrt(2/pi) mu N/(2 m omega sigma_v). A slide of 1.4 mil rms is 17 times the 0.08
-mil at 4 g and 143 Hz: if the test was a random one, it was the hardest of all. The report says neither how it was
-driven nor how hard. That the load suppresses yaw is not reproduced: one point of contact leaves its peak at 128 Hz
-(engaged.py has what pieces with a width do, and the coherence of these tests). Of the print only the caption could be
-read (28 lb, where the text says 26).
+Only the grooves pass 148 Hz, at 4.5 g rms: 145 to 160 Hz with a damping ratio of 1.3, in four records of 20 s; at 5.1 g
+rms the ratio is 1.04 to 1.10. The block on grooves is followed from event to event, where earlier versions took time
+steps and found 144 to 160 Hz: its motion is so sensitive that another step tolerance changes these frequencies by up to
+1.3 Hz. A rigid block nears its own 143 Hz from below as it slides more, 131 Hz at 6 g rms, 142 Hz at 12 g. The second
+path, which explains the displacements of Table 1 best, cannot have acted in this test: its mode lies near 300 Hz where
+it is nearly critical and near 260 Hz at 3 g. An added spring that lifts 143 to 148 Hz would have 0.071 of the flexures'
+stiffness and give way by 27 mil before 4 g made it slip, 336 times what was measured at 4 g. For large slides the
+damping is that of statistical linearisation, 0.003 + sqrt(2/pi) mu N/(2 m omega sigma_v). A slide of 1.4 mil rms is 17
+times the 0.08 mil at 4 g and 143 Hz: if the test was a random one, it was the hardest of all. The report says neither
+how it was driven nor how hard. That the load suppresses yaw is not reproduced: one point of contact leaves its peak at
+128 Hz (engaged.py has what pieces with a width do, and the coherence of these tests). Of the print only the caption
+could be read (28 lb, where the text says 26).
 
 Run: python studies/report/figure_27.py
 """

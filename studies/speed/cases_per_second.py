@@ -1,17 +1,19 @@
 """How many friction cases does a second of one processor answer, and to what error?
 
-Together 970 cases, with errors; their amplitudes are wrong by 3e-6 in the middle and 2.4e-5 rms, and 2 of 2000 lie
-outside their errors. One by one from event to event, with a step tolerance of 1e-8, 12 cases; a loop of thirty lines
-14 300, 5930, 2890 and 1530 at 100 to 800 steps a cycle, wrong by 4.6e-5 to 6.3e-8 in the middle and 4.5e-3 to 7.8e-5 rms;
-DOP853 1.6. Two cores did much else; with less beside it, an earlier run gave 1219, 14.6 with a step tolerance of 1e-12,
-22 430 to 2806, and 2.5 to 2.7.
+Together 1913 cases, with errors; their amplitudes are wrong by 2.4e-6 in the middle and 6.2e-6 rms, and none of 2000
+lies outside its error. One by one from event to event, with a step tolerance of 1e-12, 27 cases. The two cores had little
+else to do.
+
+An earlier run compares with other ways, while both cores did much else: together 970 cases and one by one 12; a loop of
+thirty lines 14 300, 5930, 2890 and 1530 at 100 to 800 steps a cycle, wrong by 4.6e-5 to 6.3e-8 in the middle and 4.5e-3
+to 7.8e-5 rms; DOP853 1.6.
 
 Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a
 base acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of method "exact".
 The marched cases and method "exact" are timed from the values of the keys to columns of some 20 measures with
 error bars; the loop of thirty lines (this file of version 1.10) gives an amplitude alone, and no error; SciPy's DOP853 went
 from event to event, in Python, no step longer than an eighth of a cycle, on the first three of the same cases (this file at
-be63a014). CPU seconds of one thread, all in one run, compiled code made before.
+be63a014). CPU seconds of one thread, compiled code made before.
 
 Run: python studies/speed/cases_per_second.py            (2000 cases)
      python studies/speed/cases_per_second.py --laws     (whole sweeps of all laws and of patches)

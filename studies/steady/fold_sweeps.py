@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from patchfem.response import locate_reversals
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
@@ -97,12 +98,10 @@ def sweep(
     seen = runner.run(
         runner.plan(scene.load(FOLDER / "stiffened.toml", sets)), estimate=False
     ).response
-    turn = np.abs(seen.output) > 0
-    turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & (
-        np.abs(seen.output[1:-1]) >= np.abs(seen.output[2:])
-    )
-    frequency = first + (last - first) * seen.time[turn] / seen.time[-1]
-    amplitude = np.abs(seen.output[turn])
+    # A long sweep has few samples in a cycle, so that its reversals lie between them.
+    time, turns = locate_reversals(seen.time, seen.output, seen.output_rate)
+    frequency = first + (last - first) * time / seen.time[-1]
+    amplitude = np.abs(turns)
     f, a = steady.branch(True)
     upper = np.interp(steady.folds, f, a)[0]
     lower = steady.branch(False)

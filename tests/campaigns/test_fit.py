@@ -291,7 +291,7 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
     ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is needed"),
     ("time [s],displacement [um],force [lb]\n" + BODY, ":1: force [lb]: unknown unit; use one of N, kN, lbf"),
     ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: there are columns force and friction_ratio"),
-    (HEAD + "0,0,0\n1,1\n", ":3: three cells are needed, time, displacement and force, not '1,1'"),
+    (HEAD + "0,0,0\n1,1\n", ":3: the number of cells must be 3 (time, displacement, force), not 2 as in '1,1'"),
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
     (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "only 2 rows are used"),
 ])  # fmt: skip
@@ -308,8 +308,16 @@ def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
     """Invalid options of `--hold`, missing files and unsuitable scenes are refused."""
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, message in (
-        (["--hold", "cycle=3"], 2, "no row of"),
-        (["--hold", "run=3"], 2, "has no column of labels"),
+        (
+            ["--hold", "cycle=3"],
+            2,
+            "--hold cycle=3: none of the rows of loop.csv with a reading has",
+        ),
+        (
+            ["--hold", "run=3"],
+            2,
+            "no column run by which rows can be held out or left out; use cycle",
+        ),
         (["--hold", "cycle"], 2, "column=value,value"),
         (["--hold", "cycle=1,2"], 2, "only 0 rows are"),
     ):

@@ -85,6 +85,9 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     )
     np.testing.assert_allclose(rows[:, :5], measured, rtol=1e-12)
     np.testing.assert_allclose(rows[:, 5:], measured[:, [1, 3]], rtol=1e-5)
+    # a free motion loses 1 - exp(-2 pi zeta) of its amplitude in a cycle
+    loss = 100 * (1 - np.exp(-2 * np.pi * measured[:, 3].max()))
+    assert any(f"the amplitude falls by up to {loss:.2g} %" in note for note in result["notes"])
 
 
 def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):

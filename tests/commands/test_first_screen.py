@@ -78,6 +78,13 @@ def test_exact_quiet_run_prints_nothing(tmp_path, words, out):
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
+def test_exact_results_are_named_if_the_picture_fails(tmp_path):
+    """A picture that cannot be written ends a run with code 4, below the line that names its results."""
+    answer = run_template(tmp_path, "bench", "--plot", tmp_path / "none/a.png")
+    assert answer.code == 4 and "a.png: cannot be written" in answer.err
+    assert answer.out.splitlines()[-1].startswith(f"results: {tmp_path / 'out'}")
+
+
 def test_always_help_has_valid_example_of_every_command():
     """The help lists every command with an example that can be parsed, in lines of at most 80 characters."""
     screen = run_cli().out

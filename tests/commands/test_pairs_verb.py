@@ -77,7 +77,10 @@ def test_exact_table_has_a_line_for_each_pair(pairs_table, pairs_answer):
             ":1: a header like `before,after` is needed, not 'before,then' (no column after)",
         ),
         ("before,after\n\n", ": no pair below its header"),
-        ("before,after\na.csv\n", ":2: two cells are needed, before and after, not 'a.csv'"),
+        (
+            "before,after\na.csv\n",
+            ":2: the number of cells must be 2 (before, after), not 1 as in 'a.csv'",
+        ),
         ("before,after\na.csv,\n", ":2: after: the name of a file is needed"),
         (
             "before,after,direction\na.csv,b.csv,z\n",

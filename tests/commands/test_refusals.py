@@ -41,6 +41,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
+        ((*STATIC, "--plot", "a.jpg"), ("a.jpg: a picture is written as .png, .svg, .pdf",)),
         ((*STATIC, "--of", "damping"), ("sweep --of was removed",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
@@ -118,6 +119,8 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         ),
         (("trace.csv", "--units", "mm"), ("the units ('mm',) are not those of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),
+        (("trace.csv", "--plot", "a"), ("a: a picture is written as .png, .svg, .pdf",)),
+        (("trace.csv", "--split", "rig.toml", "--plot", "a.png"), ("--split: takes one FILE",)),
     ],
     "new": [
         (

@@ -1,6 +1,5 @@
 """`patchfem sweep`: cases, tables, refusals, commands that repeat a sweep, and plans."""
 
-import csv
 import json
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from scene_texts import COULOMB, POINT, SHORT
+from sweep_tables import read_rows
 
 import patchfem as pf
 from patchfem.export import runs, store
@@ -44,12 +44,6 @@ def assert_equals_single_run(found, measure, part="value", tolerance=1e-12) -> N
 def sweep_into(out, rig_scene, *words):
     """Sweep a scene into a folder with the command line, and return the answer."""
     return run_cli("sweep", rig_scene, *words, "-o", out, "--no-page")
-
-
-def read_rows(out) -> list:
-    """Return the rows of the table of a sweep."""
-    with open(out / "sweep.csv", encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):

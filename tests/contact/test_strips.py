@@ -83,7 +83,7 @@ def test_order_two_centre_of_partly_open_rigid_pad():
     )
 
 
-@pytest.mark.parametrize("ratio", [0.1, 30.0])
+@pytest.mark.parametrize("ratio", [0.01, 0.1, 30.0])
 def test_exact_rolled_pad_on_exponential_layer(ratio):
     """The centre of a rolled pad on an exponential layer is L(1/2 - 1/B + 1/(exp(B) - 1)), with B = roll L/u0.
 

@@ -3,18 +3,13 @@ by SciPy."""
 
 import numpy as np
 import pytest
-from modal_bases import make_modal_basis
+from modal_bases import make_shaken_modes
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
 from patchfem.dynamics import LawGroup, limit_cycles
 from patchfem.dynamics.harmonic.laws import Jenkins
-
-
-def make_modes(omega, zeta, slide, output) -> ModalBasis:
-    """Return a modal basis with modal mass 0.5."""
-    return make_modal_basis(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
 
 
 def modal_accelerations(modes: ModalBasis, y, force: float):
@@ -30,7 +25,7 @@ def test_exact_limit_cycle_of_block_agrees_with_closed_form(zeta):
     """The limit cycle of a block on rigid friction agrees with its closed form within 1e-9. Each
     half period loses 2 F/k and multiplies the amplitude by exp(pi |zeta|/sqrt(1 - zeta^2)); to
     first order the amplitude is 4 F/(pi |c| w)."""
-    modes = make_modes([750.0], [zeta], [1.0], [2.0])
+    modes = make_shaken_modes([750.0], [zeta], [1.0], [2.0])
     force = 9.0
     [cycle] = limit_cycles.find_relay_cycles(modes, modes.slide, force, force)
     gain = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2))
@@ -67,7 +62,7 @@ def reversal_state(modes: ModalBasis, force: float, half_period: float) -> np.nd
 def test_exact_limit_cycle_of_two_modes_agrees_with_dop853(zeta):
     """DOP853, started at a reversal of the limit cycle of two modes, reaches the opposite state
     after half a period, within 1e-8; the second mode may be critically damped."""
-    modes = make_modes([750.0, 2600.0], [-0.01, zeta], [1.0, 0.7], [1.0, -0.4])
+    modes = make_shaken_modes([750.0, 2600.0], [-0.01, zeta], [1.0, 0.7], [1.0, -0.4])
     [cycle] = limit_cycles.find_relay_cycles(modes, modes.slide, 9.0, 10.0)
     start = reversal_state(modes, 9.0, np.pi / cycle.omega)
 
@@ -98,7 +93,7 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
     leave it."""
     stiffness = np.array([2e4, 1e4, 3e4])
     yield_slides = np.array([1e-4, 2e-4, 4e-4])
-    modes = make_modes([750.0], [-0.01], [1.0], [1.0])
+    modes = make_shaken_modes([750.0], [-0.01], [1.0], [1.0])
     limit = float(stiffness @ yield_slides)
     (low, high), min_amplitude = limit_cycles.find_balance_cycles(
         modes, LawGroup(modes, Jenkins(stiffness, yield_slides)), modes.slide, limit
@@ -154,7 +149,7 @@ def test_exact_backbone_of_rigid_friction_agrees_with_closed_form():
     """Frequency and damping of a block on rigid friction agree with their closed form within 1e-7.
     At an amplitude A, with h = F/k lost per half period, the gain G = (A/h + 1)/(A/h - 1) gives the
     net damping ratio -z by pi z/sqrt(1 - z^2) = ln G."""
-    modes = make_modes([750.0], [0.003], [1.0], [2.0])
+    modes = make_shaken_modes([750.0], [0.003], [1.0], [2.0])
     force = 9.0
     zeta = 0.003
     h = force / (0.5 * 750.0**2)

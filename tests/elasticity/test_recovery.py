@@ -42,13 +42,18 @@ def grid_piece(grid, layers=COATED):
 
 
 @cache
+def triangle_mesh():
+    """Return triangles of a coated piece that grow from its interface."""
+    return triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+
+
+@cache
 def all_cells():
     """Return the cells of a tensor grid, of mixed quads and triangles, and of triangles alone, all coated."""
-    triangles = triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
     return (
         get_cells(grid_piece(SMALL)),
         mesh_cells(mesh_of_grid(SMALL, 0.5, seed=2)),
-        mesh_cells(triangles),
+        mesh_cells(triangle_mesh()),
     )
 
 
@@ -184,11 +189,7 @@ def test_exact_coating_traction_balances_load_and_moment(mesh_kind, seed, plane)
         piece = grid_piece(SMALL, layers)
         x = SMALL.x
     else:
-        mesh = (
-            mesh_of_grid(SMALL, 0.5, seed=2)
-            if mesh_kind == "mixed"
-            else triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
-        )
+        mesh = mesh_of_grid(SMALL, 0.5, seed=2) if mesh_kind == "mixed" else triangle_mesh()
         piece = elasticity.Piece(mesh, layers)
         x = mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
@@ -226,7 +227,7 @@ def test_exact_error_estimate_agrees_with_refined_energy(split):
     mesh = (
         mesh_of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
         if split is not None
-        else triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+        else triangle_mesh()
     )
     finest = mesh.refine().refine()
     pressure = 1e8 * np.maximum(1 - (finest.x / 0.6e-3) ** 2, 0)

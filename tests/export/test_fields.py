@@ -1,7 +1,7 @@
 """fields.vtkhdf and its exports agree with the run when VTK, PyVista, meshio and h5py read them."""
 
 import csv
-import tomllib
+import shutil
 
 import h5py
 import meshio
@@ -11,31 +11,16 @@ import pyvista
 from command_line import run_cli
 from exported import frame_values, write_small_series
 from scene_texts import CROWNED_BENCH
+from vtk_frames import read_with_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
-from patchfem import PatchfemError
-from patchfem.export import page
 from patchfem.export.fields.blocks import FIELDS
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
 PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file
 MAX_ESTIMATE_ROUNDING = 1e-2  # that of stress_error, which is an estimate itself
-
-
-def read_with_vtk(path) -> list:
-    """Return the frames of a file as VTK reads them."""
-    reader = vtkHDFReader()
-    reader.SetFileName(str(path))
-    reader.UpdateInformation()
-    frames = []
-    for number in range(reader.GetNumberOfSteps()):
-        reader.SetStep(number)
-        reader.Update()
-        frames.append((reader.GetTimeValue(), pyvista.wrap(reader.GetOutputDataObject(0)).copy()))
-    return frames
 
 
 def assert_block_equal(grid, block, number: int) -> None:
@@ -74,15 +59,6 @@ def test_exact_vtk_reads_pieces(tmp_path, capfd):
         np.testing.assert_allclose(
             grids["interface"]["worn_depth"], worn.mean(axis=0), 2 * MAX_ROUNDING
         )
-
-
-def test_exact_load_of_file_is_load_of_run(bench_folder):
-    """In every frame areas times pressure of the file add up to the load within 1e-10."""
-    line = read_frames(bench_folder / NAME).blocks["interface"]
-    scene = tomllib.loads((bench_folder / "scene.resolved.toml").read_text("utf-8"))
-    load = float(scene["contact"]["load"].removesuffix(" N"))
-    for pressure in line.point_data["normal_stress"]:
-        assert line.point_data["weight"][0] @ pressure == pytest.approx(load, rel=1e-10)
 
 
 def test_exact_coating_carries_load_and_friction(bench_folder):
@@ -240,16 +216,15 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         ("interface/PointData/normal_stress", -1.0, False),
     ],
 )
-def test_refuses_impossible_mesh_of_a_page(tmp_path, name, value, is_refused):
+def test_refuses_impossible_mesh_of_a_page(bench_folder, tmp_path, name, value, is_refused):
     """A page names the file whose cells have nodes that do not exist; pressures that are all below 0 are drawn."""
-    write_small_series(tmp_path / "out")
-    path = tmp_path / "out" / NAME
-    with h5py.File(path, "r+") as file:
+    folder = shutil.copytree(bench_folder, tmp_path / "out")
+    with h5py.File(folder / NAME, "r+") as file:
         file[f"VTKHDF/{name}"][...] = value
+    answer = run_cli("report", folder, "-o", tmp_path / "page.html")
     if is_refused:
-        with pytest.raises(
-            PatchfemError, match=f"{path}: not the fields .* node that does not exist"
-        ):
-            page.make_stress_panels(path)
+        assert answer.code == 2 and f"{folder / NAME}: not the fields" in answer.err
+        assert "a cell has a node that does not exist" in answer.err
     else:
-        assert len(page.make_stress_panels(path)) == 1
+        assert answer.code == 0
+        assert "von Mises stress in both pieces" in (tmp_path / "page.html").read_text("utf-8")

@@ -178,28 +178,6 @@ def test_bonds_have_the_loop_of_dahl():
         assert abs(last.final.y[3]) == pytest.approx(np.tanh(amplitude), rel=1e-9)
 
 
-def test_pressed_springs_equal_the_elastic_plastic_law_under_a_constant_load():
-    """The law for a load that varies, whose load does not vary."""
-    values = []
-    for law in (
-        masing.from_elements([8.0], [0.1]),
-        LawNumbers("pressed_springs", (1.0, 0.1), (0.0, 0.8), (0.8, 0.8)),
-    ):
-        motion = runs.run_case(make_oscillator(law, load=0.8, cycles=40, rtol=1e-11))
-        values.append(
-            [
-                motion.values[name]
-                for name in (
-                    "relative_displacement_amplitude",
-                    "loop_area",
-                    "slip_amplitude",
-                    "stick_fraction",
-                )
-            ]
-        )
-    assert values[0] == pytest.approx(values[1], rel=1e-8)
-
-
 def test_coulomb_contact_that_lifts_off_follows_the_load():
     """Sliding at constant speed under 1 + 1.5 cos t: work and open time of the positive part of the load."""
     law = coulomb(0.5)

@@ -87,26 +87,28 @@ def test_exact_nonlinear_value_has_transformed_interval():
     assert fit.intervals.ends[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
 
 
-def test_exact_undetermined_product_is_reported():
-    """Two values that are determined only by their product, and a value without effect, are reported."""
+@pytest.mark.parametrize(
+    "power, end", [(1, "only their product is known"), (1.003, "has no effect)")]
+)
+def test_exact_undetermined_product_is_reported(power, end):
+    """Two values that are determined only by a product of powers, and a value without effect, are reported."""
     data = 2 * np.sin(3 * LINE) + LINE
 
     def residual(v):
-        return v[0] * v[1] * np.sin(3 * LINE) + v[2] * LINE - data + 0.0 * v[3]
+        return v[0] * v[1] ** power * np.sin(3 * LINE) + v[2] * LINE - data + 0.0 * v[3]
 
     fit = Problem(residual, [0.1, 0.1, 0, 0], [10, 100, 5, 1]).solve()
-    assert fit.values[0] * fit.values[1] == pytest.approx(2, rel=1e-8) and fit.values[
-        2
-    ] == pytest.approx(1)
+    assert fit.values[0] * fit.values[1] ** power == pytest.approx(2, rel=1e-8)
+    assert fit.values[2] == pytest.approx(1)
     assert np.isnan(fit.intervals.ends[[0, 1, 3]]).all() and fit.intervals.ends[2] == pytest.approx(
         [1, 1]
     )
-    assert np.abs(fit.intervals.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
-    assert fit.intervals.unknown[0, 0] * fit.intervals.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
-    product, flat = describe_fit(fit, "abcd")
-    assert "a and b cannot be determined separately" in product and product.endswith(
-        "only their product is known"
+    assert np.abs(fit.intervals.unknown) == pytest.approx(
+        np.array([[1, 1 / power, 0, 0]]), abs=1e-6
     )
+    assert fit.intervals.unknown[0, 0] * fit.intervals.unknown[0, 1] < 0
+    product, flat = describe_fit(fit, "abcd")
+    assert "a and b cannot be determined separately" in product and product.endswith(end)
     assert flat == "d has no effect on the computed data, so its value is not determined"
 
 

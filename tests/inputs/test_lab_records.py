@@ -34,6 +34,14 @@ def test_exact_signal_of_universal_file(tmp_path):
         read_signal(path, "force")
 
 
+@pytest.mark.parametrize("kind", [0, 9, 13])
+def test_exact_force_of_universal_file_by_data_type(tmp_path, kind):
+    """A force signal is the record of a force, of an exciting force, or of an unknown quantity, beside others."""
+    sets = [SI, make_record(TIME, SLIDE, 12), make_record(TIME, FORCE, kind)]
+    _, value = read_signal(write_universal(tmp_path / "a.uff", sets), "force")
+    assert np.array_equal(value, FORCE)
+
+
 def test_exact_units_of_dataset_164_and_channel_labels(tmp_path):
     """Units of dataset 164 (inch, lbf) are converted; the unit of a channel label takes precedence."""
     datasets = [
@@ -120,7 +128,10 @@ def replace_value(values, index=3, value=np.nan):
     "datasets, message",
     [
         ([SI], "no record over time"),
-        ([make_record(replace_value(TIME, value=0.0), FORCE, 13)], "of sample 4 is not later than"),
+        (
+            [make_record(replace_value(TIME, value=0.0), FORCE, 13)],
+            ": sample 4: time 0 s is not later than",
+        ),
         (
             [make_record(TIME, FORCE, 13), make_record(TIME + 1, SLIDE, 8)],
             "is sampled at other times than",

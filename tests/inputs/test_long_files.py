@@ -51,7 +51,6 @@ def test_exact_numbers_of_long_table(write_table, end):
     rows = np.column_stack([np.arange(float(count)), values])
     path = write_table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end)
     columns = read_path_table(path)
-    assert columns.rows == count
     assert columns.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
     assert columns.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
 
@@ -64,9 +63,9 @@ def test_exact_numbers_of_long_table(write_table, end):
         ("nan,1", "'nan' is not a finite"),
         ("1_0,1", "'1_0' is not"),
         ("1,", "'' is not"),
-        ("1", "two cells"),
-        ("", "two cells"),
-        ("1,2,3", "two cells"),
+        ("1", "cells must be 2 (time, displacement), not"),
+        ("", "cells must be 2 (time, displacement), not"),
+        ("1,2,3", "cells must be 2 (time, displacement), not"),
     ],
 )
 def test_refuses_invalid_cell_with_line_number(write_table, n_rows, cell, message):

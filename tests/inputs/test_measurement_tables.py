@@ -70,6 +70,26 @@ def test_refuses_faulty_measurement_table(tmp_path, text, message):
     assert str(caught.value).startswith(f"{path}{message}")
 
 
+@pytest.mark.parametrize("text", [
+    "frequency [{}],input [g]\n143,5\n",
+    "frequency [Hz],{}\n143,5\n",
+    "frequency [Hz],input [g],{}\n143,5,1\n",
+    HEAD + "143,5,{},,\n",
+    HEAD + "143,5,-{},,\n",
+    HEAD + "143,5,6,,{}\n",
+    HEAD + "143,{}\n",
+])  # fmt: skip
+@pytest.mark.parametrize("word", ["1" * 300, "a" * 10_000, "a\x07" * 5_000])
+def test_always_quoted_text_of_faulty_table_is_short(tmp_path, text, word):
+    """A message about a long text in a table quotes only its beginning, in printable characters."""
+    path = tmp_path / "t.csv"
+    path.write_text(text.format(word), "utf-8")
+    with pytest.raises(PatchfemError) as caught:
+        read_table(path)
+    message = str(caught.value)
+    assert message.isprintable() and len(message) < 400 + len(str(path))
+
+
 @pytest.mark.parametrize(
     "header",
     [

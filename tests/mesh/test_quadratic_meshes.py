@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshio
 import numpy as np
 import pytest
-from any_mesh_cases import GRID, NAMES, make_pair
+from any_mesh_cases import GRID, NAMES, make_pair, write_msh22, write_vtu
 from scipy.spatial import cKDTree
 
 from patchfem.core import PatchfemError
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.elasticity.elasticity import Layers
 from patchfem.mesh import read_pieces
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 
 LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")
 ABAQUS = {"triangle6": "CPE6", "quad8": "CPE8R"}
 
 
 def make_quadratic_pair(kind):
-    """Return points (N, 2), cells and edges of second order with their tags, from the linear pair of grids."""
+    """Return points (N, 2), and blocks of cells and edges of second order with their tags, from the linear pair of grids."""
     pair = make_pair("triangles" if kind == "triangle6" else "quads")
     corners, tags = (
         (pair.triangles, pair.triangle_tags)
@@ -45,15 +46,18 @@ def make_quadratic_pair(kind):
         for cell in corners.tolist()
     ]
     edges = [[a, b, middle(a, b)] for a, b in pair.edges.tolist()]
-    return np.array(points), np.array(cells), tags, np.array(edges), pair.edge_tags
+    blocks = [(kind, np.array(cells), tags), ("line3", np.array(edges), pair.edge_tags)]
+    return SimpleNamespace(points=np.array(points), blocks=blocks)
 
 
 def write_pair(folder, kind, ending, surfaces=False):
     """Write the pair to a file and return its path."""
-    points, cells, tags, edges, edge_tags = make_quadratic_pair(kind)
+    mesh = make_quadratic_pair(kind)
     path = folder / f"pair{ending}"
     if ending == ".inp":
-        lines = ["*NODE", *(f"{k + 1}, {x!r}, {y!r}" for k, (x, y) in enumerate(points.tolist()))]
+        (_, cells, tags), (_, edges, edge_tags) = mesh.blocks
+        points = mesh.points.tolist()
+        lines = ["*NODE", *(f"{k + 1}, {x!r}, {y!r}" for k, (x, y) in enumerate(points))]
         lines.append(f"*ELEMENT, TYPE={ABAQUS[kind]}")
         lines += [", ".join(map(str, [k + 1, *(cell + 1)])) for k, cell in enumerate(cells)]
         for tag, name in NAMES.items():
@@ -73,19 +77,9 @@ def write_pair(folder, kind, ending, surfaces=False):
                 nodes = np.unique(edges[edge_tags == tag]) + 1
                 lines += [f"*NSET, NSET={name}", *map(str, nodes)]
         path.write_text("\n".join(lines) + "\n")
-        return path
-    mesh = meshio.Mesh(
-        np.column_stack([points, 0 * points[:, 0]]), [(kind, cells), ("line3", edges)]
-    )
-    both = [np.asarray(part, np.int32) for part in (tags, edge_tags)]
-    if ending == ".vtu":
-        mesh.cell_data = {"tag": both}
-        meshio.write(path, mesh)
-        return path
-    mesh.cell_data = {"gmsh:physical": both, "gmsh:geometrical": both}
-    mesh.field_data = {name: np.array([tag, 2]) for name, tag in CELL_TAGS.items()}
-    mesh.field_data |= {name: np.array([tag, 1]) for name, tag in EDGE_TAGS.items()}
-    meshio.write(path, mesh, file_format="gmsh22", binary=True)
+    else:
+        write = write_vtu if ending == ".vtu" else write_msh22
+        write(mesh, path)
     return path
 
 

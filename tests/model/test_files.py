@@ -62,7 +62,7 @@ FAULTS = {
               "d.csv:3: time 0 s is not later than"),
     "structure": (ARRAYS, "a.npz", b"PK\x03\x04 no archive", "structure.file", "a.npz cannot be read"),
     "structure, no stiffness": (ARRAYS, "a.npz", make_matrices(K=[]), "structure.file",
-                                "a.npz: K must be square, not of shape (0,)"),
+                                "a.npz: K must be square with at least one row, not of shape (1, 0)"),
     "structure, no slide": (POINT + COULOMB + ARRAYS, "a.npz", make_matrices(slide=[0.0, 0.0]), "structure.file",
                             "a.npz: `slide` of an interface is 0 in every mode"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",

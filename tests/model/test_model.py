@@ -2,6 +2,7 @@
 needs."""
 
 from dataclasses import FrozenInstanceError, astuple, fields, is_dataclass, replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from scene_texts import (
     TRIANGLE,
 )
 
+import patchfem
 from patchfem.model import build
 from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
@@ -109,6 +111,18 @@ def test_exact_resolved_text_contains_derived_values():
         == model.bonds.rest_speed
         == 1e-3 * model.speed_scale
     )
+
+
+def test_exact_sliding_speed_of_a_rig_is_that_of_its_interface():
+    """A force on a heavy frame moves the interface with the speed of the frame, 5 mm at 1 Hz, from which the default rest
+    speed of bonds follows; a base that moves a mode with the ratio .8 moves its interface by .8 times .8 of its speed."""
+    text = (files(patchfem) / "scene/templates/joint_laws/lugre.toml").read_text("utf-8")
+    rig = build(loads(text)).rig
+    assert rig.slide_speed_scale == pytest.approx(2 * np.pi * 5e-3, rel=1e-5)
+    bonds = build(loads(POINT + GROWING + STRUCTURE))
+    partial = build(loads(POINT + GROWING + STRUCTURE, sets=["structure.mode.axial.slide=0.8"]))
+    assert bonds.bonds.rest_speed == 1e-3 * bonds.rig.speed_scale
+    assert partial.bonds.rest_speed == pytest.approx(0.64 * bonds.bonds.rest_speed, rel=1e-12)
 
 
 # ---- runs of a model

@@ -12,7 +12,6 @@ from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds, Coulomb, points_element
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.hybrid.laws.masing import from_elements
 from patchfem.points.contacts import (
     make_contact,
     make_cubic_spring,
@@ -80,27 +79,6 @@ def test_exact_nonlinear_springs_conserve_energy_and_period(spring, period):
         errors.append(abs(np.diff(times).mean() / period - 1))
         assert errors[-1] < 5 / steps**2
     assert np.log(errors[0] / errors[2]) / np.log(25) == pytest.approx(2.0, abs=0.1)
-
-
-def test_order_two_for_chain_with_three_interfaces():
-    """A free-free chain of three masses with elastic-plastic interfaces converges with order two.
-
-    The reference is the engine that integrates such elements from yield to yield.
-    """
-    modes = make_chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
-    drive = SineDrive(1.0, 1.3)
-    laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
-    elements = [from_elements([f / e], [e]) for f, e in laws]
-    reference = problems.run_motion(modes, drive, elements, 4, window=2).extremes
-    contact = make_contact([ElasticPlastic(f, e).element(1.0) for f, e in laws], modes.interfaces)
-    errors = []
-    for steps in (100, 200, 400, 800):
-        result = march(modes, drive, contact, 4, steps, window=2)
-        assert result.outcome is None
-        errors.append(np.abs(result.extremes - reference).max())
-        assert energy_balance(result.ledger) <= 1e-10
-    assert errors[-1] < 2e-5 * np.abs(reference).max()
-    assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(2.0, abs=0.25)
 
 
 def march_random_chain(seed):

@@ -110,17 +110,6 @@ def test_exact_bouncing_block_conserves_energy_and_solves_contact(n_slots):
     assert np.ptp(total) <= 1e-12 * total[0]
 
 
-def test_exact_nodal_forces_agree_with_unilateral_solution():
-    """At every snapshot of a slowly varying tilt the nodal forces agree within 1e-12 with a new
-    solution of the contact."""
-    sets = crowned_contact()
-    drive = SineDrive(200.0, 2 * np.pi * 2)
-    basis = make_modes([40.0], [1.0], [0.0], [400.0], 0.5)
-    result = march_pressed(basis, drive, sets, "plastic", 1, 200, frames=40)
-    assert len(check_nodal_forces(sets, result.snapshots)) >= 4
-    assert len(result.snapshots) == 40 and result.outcome is None
-
-
 @pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["tanh", "plastic"])
 def test_order_two_for_combined_slide_heave_and_pitch(name):

@@ -9,6 +9,7 @@ from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 from patchfem.core import Outcome, SineDrive
 from patchfem.friction import Bonds, Coulomb
 from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.points import checkpoint
 from patchfem.points import time_march as engine
 from patchfem.points.contacts import (
     make_bond_contact,
@@ -161,3 +162,17 @@ def test_exact_parts_of_a_march_do_not_matter(monkeypatch):
         runs.append(march(BASIS, DRIVE, make_compliant_contact(), 33, STEPS, repeats=False))
     assert np.array_equal(runs[0].window.slide, runs[1].window.slide)
     assert np.array_equal(runs[0].extremes, runs[1].extremes)
+
+
+def test_exact_long_march_keeps_thinned_samples_of_all_cycles(monkeypatch):
+    """Of more early samples than there is room for, those at larger distances are kept: every cycle has some.
+
+    Once the samples ended where the room was full, with a gap up to the last cycles.
+    """
+    whole = march(BASIS, DRIVE, make_tanh_contact(), 40, STEPS, repeats=False).response
+    monkeypatch.setattr(checkpoint, "MAX_EARLY_SAMPLES", 300)
+    thinned = march(BASIS, DRIVE, make_tanh_contact(), 40, STEPS, repeats=False).response
+    assert len(thinned.time) <= 300 + 18 * STEPS < len(whole.time)
+    assert np.diff(thinned.time).max() < 0.3 * DRIVE.period
+    places = np.searchsorted(whole.time, thinned.time)
+    assert np.array_equal(thinned.slide, whole.slide[places])

@@ -104,8 +104,8 @@ def test_exact_batch_agrees_with_single_runs(kind):
 def test_always_95_of_100_measures_lie_within_both_errors(law):
     """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors.
 
-    Motion, stick and forces differ by a quarter of the tolerance at most. Reversals of `tanh` are not resolved: its secant
-    stiffness, a difference of nearly equal forces, differs by four tolerances.
+    Motion, stick and forces differ by a quarter of the tolerance at most, and 99 of 100 measures by five times the errors,
+    also where a change between two marches is small by accident, or where the secant stiffness of `tanh` is 0.
     """
     cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
@@ -114,13 +114,17 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert (results.outcome == singles.outcome).all() and results.notes == singles.notes
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
     assert np.mean([row.holds for row in rows]) >= 0.95
+    enlarged = [row._replace(error=5 * row.error, doubt=5 * row.doubt) for row in rows]
+    assert np.mean([row.holds for row in enlarged]) >= 0.99
+    n_compared = 0
     for name in CLOSE_MEASURES & singles.values.keys():
-        factor = 5.0 if law == "tanh" and name == "secant_stiffness" else 0.25
         expected = singles.values[name]
         is_known = np.isfinite(expected)
         allowed = cases[0].accuracy.tolerance * np.abs(expected) + singles.floors[name]
         difference = np.abs(results.values[name] - expected)
-        assert (difference <= factor * allowed)[is_known].all(), name
+        assert (difference <= 0.25 * allowed)[is_known].all(), name
+        n_compared += is_known.any()
+    assert n_compared >= 4
 
 
 # Changes after which a rig is not one mode with one point under a sine, or has no motion.
@@ -274,3 +278,16 @@ def test_always_loop_errors_of_sweep_are_close_to_single_runs():
         single, shared = (pf.run(case).measures["loop_area"] for case in pair)
         assert shared.error <= 1.5 * single.error
         assert abs(shared.value - single.value) <= shared.error + single.error
+
+
+def test_always_shared_mesh_resolves_zones_of_slip_of_every_case():
+    """The mesh of a sweep over the slide resolves the friction work of small slides too, whose zones of slip are short.
+
+    On the mesh that the static measures need, the loop area of a small slide misses the tolerance.
+    """
+    tilted = TILTED + '[contact.tilt]\nangle = "1e-4 rad"\n' + SHEAR + COULOMB + LOOP
+    amplitudes = ("0.03 um", "0.06 um", "0.1 um", "0.4 um")
+    cases = build_family(tilted, "accuracy.tolerance=1e-2", "slide.amplitude", amplitudes)
+    for amplitude, case in zip(amplitudes, with_shared_meshes(cases), strict=True):
+        assert case.patch.mesh.shared is not None
+        assert pf.run(case).measures["loop_area"].error_ratio(1e-2) <= 1, amplitude

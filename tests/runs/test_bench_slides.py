@@ -73,7 +73,8 @@ def test_saved_state_belongs_to_the_path_and_not_to_its_name(write_path_scene):
     ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: unknown unit; use one of m, km"),
     (HEAD + "0,0\n\n", ":2: a path needs at least two rows"),
     (HEAD + "0,0\n1,nan\n", ":3: displacement: 'nan' is not a finite number"),
-    (HEAD + "0,0\n1,1,2\n", ":3: two cells"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s is not later than"),
+    (HEAD + "0,0\n1,1,2\n", ":3: the number of cells must be 2"),
+    (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s is not later than"),
     (HEAD + "0,5\n1,1\n", ":2: displacement starts at 5e-06"), (HEAD + "1,0\n2,1\n", ":2: time starts at 1"),
     (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
 ])  # fmt: skip

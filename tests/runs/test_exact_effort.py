@@ -1,9 +1,13 @@
-"""The expected cost of the exact engine, the choice of the engine, and the limit of the cost."""
+"""The expected cost of the exact engine, and the choice of the engine."""
+
+from importlib.resources import files
 
 import numpy as np
 import pytest
 from scene_runs import run_scene
 from scene_texts import COULOMB, DRIVE, MODE, POINT
+
+import patchfem as pf
 
 LIMIT = 0.3 * 26 * 4.4482216152605
 SLOW = POINT + COULOMB + MODE + DRIVE.replace("5 g", "18 g").replace("= 30", "= 12")
@@ -33,3 +37,20 @@ def test_exact_averaged_law_with_extreme_damping_is_marched():
     assert result.settings.engine == "march"
     force = result.measures["friction_force_peak"]
     assert abs(force.value - LIMIT) <= force.error <= 1e-8 * force.value
+
+
+def test_exact_block_on_a_heavy_frame_is_solved_from_event_to_event():
+    """The force on a heavy frame does not act on the light block that it rubs, so that the bristles of the block do not
+    make the motion expensive. The motion from event to event and the march agree within the error of the march."""
+    scene = (files(pf) / "scene/templates/joint_laws/lugre.toml").read_text("utf-8")
+    runs = {
+        method: pf.run(scene, **{"accuracy.method": method})
+        for method in ("auto", "exact", "march")
+    }
+    engines = [result.settings.engine for result in runs.values()]
+    assert engines == ["hybrid", "hybrid", "march"]
+    for name in ("relative_displacement_amplitude", "loop_area", "stick_fraction"):
+        auto, exact, march = (result.measures[name] for result in runs.values())
+        assert abs(auto.value - exact.value) <= auto.error + exact.error
+        assert abs(march.value - exact.value) <= march.error
+        assert auto.error < march.error / 100

@@ -4,6 +4,7 @@ outcomes."""
 import numpy as np
 import pytest
 from scene_texts import GROOVED, SLIDE, STRUCTURE
+from scipy.integrate import cumulative_trapezoid
 
 import patchfem as pf
 from patchfem.core import Outcome
@@ -100,5 +101,10 @@ def test_always_lifted_mass_leaving_grooves_is_outcome(text):
     assert all(
         item.error is not None for item in result.measures.values() if item.value is not None
     )
-    load = result.response.extra["normal_load"]
+    response = result.response
+    load = response.extra["normal_load"]
     assert load.min() <= 0.05 * load.max()
+    # the impulse of the load beyond the static one is the vertical momentum of the lifted mass
+    impulse = cumulative_trapezoid(load - 60, response.time, initial=0)
+    momentum = 1.5 * 7.5e-6 * WAVE * np.sin(WAVE * response.slide) * response.slide_rate
+    np.testing.assert_allclose(impulse, momentum - momentum[0], 0, 0.15 * momentum.max())

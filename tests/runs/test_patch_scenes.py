@@ -198,6 +198,8 @@ def test_exact_summary_states_contact_intervals(tmp_path, shape, ends, pattern):
     answer = run_cli("run", path, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and re.search(pattern, answer.out, re.M), answer.out[:300]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    times = [effect["seconds"] for effect in summary["effects"]]
+    assert 0 < max(times) <= summary["seconds"]["total"]
     contact = summary["contact"]
     measures = {name: measure["value"] for name, measure in summary["measures"].items()}
     intervals = np.array(contact["stretches"])

@@ -50,6 +50,25 @@ def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolera
         assert measure.error <= tolerance * reference or result.warnings
 
 
+def test_always_error_of_peak_contains_the_rise_at_a_corner(tmp_path):
+    """The error of the peak covers its change on a mesh four times finer, on which the pressure at a corner that the
+    profile just reaches has become the largest one."""
+    s = np.linspace(-1, 1, 501)
+    z = -0.48e-6 * np.cos(np.pi * s + 2.42) - 0.25e-6 * np.cos(2 * np.pi * s + 3.52)
+    text = (
+        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\n'
+        'load = "1100 N"\nsubstrate = "steel"\n'
+    )
+    coarse, fine = (
+        pf.run(load_profile(tmp_path, 6.35e-3 * s, z, text, f"contact.element_size={size} mm"))
+        for size in (0.2, 0.05)
+    )
+    one, other = (result.measures["pressure_peak"] for result in (coarse, fine))
+    assert abs(one.value - other.value) <= one.error + other.error
+    places = [abs(each.patch.x[each.patch.pressure.sigma_n.argmax()]) for each in (coarse, fine)]
+    assert places[0] < 6.3e-3 and places[1] == pytest.approx(6.35e-3)
+
+
 # Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of elements of order 5
 # (support/patch_of_order_four.py of version 1.10 agrees).
 CROWN_REFERENCE = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)

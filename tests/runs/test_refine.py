@@ -1,6 +1,7 @@
 """A run is repeated with a finer resolution until its main measures meet the tolerance."""
 
 import re
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -85,6 +86,58 @@ def test_exact_bench_has_more_steps_until_its_peak_meets_the_tolerance():
     for result in (fixed, done):
         peak = result.measures["friction_ratio_peak"]
         assert abs(peak.value - truth) <= peak.error
+
+
+@pytest.mark.parametrize("excess, passes", [(1.0, 1), (3.9, 2), (15.0, 3), (15e3, 4)])
+@pytest.mark.parametrize("is_short", [False, True])
+def test_exact_passes_of_a_run_end_where_it_would_need_more_time(excess, passes, is_short):
+    """Each pass takes twice the time of the one before and divides the excess by four; the axis has three finer passes.
+
+    A run whose passes would take more than its time ends with the first one, and knows what they would take. The clock is
+    that of the test.
+    """
+    clock = [100.0]
+
+    def solve(resolution: int, before: int | None) -> int:
+        """Take the CPU time of a resolution."""
+        clock[0] += resolution
+        return resolution
+
+    def judge(solution: int, excesses: list[float]) -> refine.Verdict:
+        """Ask for twice the resolution until the excess is met, at most for three passes."""
+        left = excess / 4 ** len(excesses)
+        if left <= 1 or solution == 8:
+            return refine.Verdict(left)
+        n_passes = 3 - len(excesses)
+        return refine.Verdict(left, 2 * solution, "steps", solution, 2.0, n_passes)
+
+    needed = 2.0**passes - 1
+    limit = refine.TimeLimit(needed - 0.5 if is_short else needed, 100.0, lambda: clock[0])
+    solution, shortage = refine.refine(solve, 1, judge, limit)
+    if is_short and passes > 1:
+        assert (solution, shortage) == (1, ("steps", needed))
+    else:
+        assert (solution, shortage) == (2 ** (passes - 1), None)
+
+
+def test_exact_steps_of_a_rig_are_refined_within_its_time():
+    """The steps of a rig are refined until its main measures meet the tolerance, or else a finding names axis and key."""
+    scene = (files(pf) / "scene" / "templates" / "rig.toml").read_text("utf-8")
+    march = {"accuracy.method": "march"}
+    once = pf.run(scene, **march, **{"accuracy.max_seconds": 1e-6})
+    done = pf.run(scene, **march)
+    assert once.settings.steps_per_cycle == 400 < done.settings.steps_per_cycle
+    assert find_excess(done) <= 1 and not done.warnings and done.shortage is None
+    (finding,) = once.findings
+    assert finding.advice.axis == once.shortage.axis == "steps"
+    assert finding.advice.key == "accuracy.max_seconds"
+    assert finding.advice.value >= once.shortage.seconds > 1e-6
+    assert once.warnings == [finding.sentence]
+
+    # A method without steps does not use the key, and says so.
+    fixed = {"accuracy.method": "harmonic", "accuracy.max_seconds": 1e-6}
+    (remark,) = [text for text in pf.run(scene, **fixed).warnings if "max_seconds" in text]
+    assert "is not used, because this run is never repeated" in remark
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Memory of a run: its parts, the limits, and refusals before large arrays are allocated."""
 
 import os
+import re
 import tracemalloc
 
 import numpy as np
@@ -19,6 +20,7 @@ from scene_texts import (
 )
 
 from patchfem import plan
+from patchfem.core import Missing
 from patchfem.runs import memory
 from patchfem.scene import loads
 
@@ -63,10 +65,10 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     monkeypatch.setattr(memory, "free_bytes", lambda: GIGABYTE)
     tracemalloc.start()
     run_plan = plan_text(text, *sets)
-    reason = memory.reason_for_refusal(run_plan)
+    with pytest.raises(Missing, match=f"^about .* 1 GB are free.*{re.escape(key)}"):
+        memory.refuse_insufficient_memory(run_plan)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert reason.startswith("about ") and f"{key}" in reason and "1 GB are free" in reason
     # The plan of a bench generates its samples to count them.
     assert peak < (7e8 if run_plan.kind == "bench" else 3e7)
 

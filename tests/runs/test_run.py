@@ -6,9 +6,7 @@ import resource
 import socket
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,9 +22,7 @@ from scene_texts import (
     SMALL_PATCH,
     STRUCTURE,
 )
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
-from vtkmodules.vtkIOHDF import vtkHDFReader
+from vtk_frames import read_with_vtk
 
 from patchfem.effects import EFFECTS
 from patchfem.runs.plan import plan
@@ -65,44 +61,6 @@ def read_netcdf(folder):
     """Return the dataset result.nc of a results folder."""
     with xr.open_dataset(folder / "result.nc", engine="h5netcdf") as data:
         return data.load()
-
-
-class FieldReader:
-    """Blocks of arrays of fields.vtkhdf as VTK's own reader returns them."""
-
-    def __init__(self, folder):
-        self.reader = vtkHDFReader()
-        self.reader.SetFileName(str(folder / "fields.vtkhdf"))
-        self.reader.UpdateInformation()
-        self.steps = self.reader.GetNumberOfSteps()
-
-    def frame(self, step):
-        self.reader.SetStep(step)
-        self.reader.Update()
-        blocks = self.reader.GetOutputDataObject(0)
-        blocks_by_name = {
-            blocks.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(blocks.GetBlock(k))
-            for k in range(blocks.GetNumberOfBlocks())
-        }
-        return SimpleNamespace(time=self.reader.GetTimeValue(), **blocks_by_name)
-
-    @staticmethod
-    def _block(grid):
-        points = grid.GetPointData()
-        cells = grid.GetCellData()
-        ends, nodes = (
-            vtk_to_numpy(a).copy()
-            for a in (grid.GetCells().GetOffsetsArray(), grid.GetCells().GetConnectivityArray())
-        )
-        return SimpleNamespace(
-            place=vtk_to_numpy(grid.GetPoints().GetData()).copy(),
-            cells=[nodes[a:b] for a, b in pairwise(ends)],
-            **{
-                part.GetArrayName(i): vtk_to_numpy(part.GetArray(i)).copy()
-                for part in (points, cells)
-                for i in range(part.GetNumberOfArrays())
-            },
-        )
 
 
 # Files that every run writes.
@@ -150,30 +108,22 @@ def test_exact_shear_stress_sums_to_friction_force(run_case):
 def test_exact_displacements_of_both_pieces_close_the_gap(run_case, name):
     """The displacements of both pieces at the interface differ by the gap, which is zero under pressure."""
     folder, _ = run_case(name)
-    fields = FieldReader(folder)
+    frames = read_with_vtk(folder / "fields.vtkhdf")
     data = read_netcdf(folder)
-    for step in (0, fields.steps - 1):
-        frame = fields.frame(step)
-        lower_nodes, upper_nodes = (
-            np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper)
+    for step in (0, len(frames) - 1):
+        lower, upper, interface = (
+            frames[step][1][part] for part in ("lower", "upper", "interface")
         )
-        np.testing.assert_allclose(
-            frame.lower.place[lower_nodes], frame.upper.place[upper_nodes], atol=1e-15
-        )
-        np.testing.assert_allclose(
-            frame.lower.place[lower_nodes], frame.interface.place, atol=1e-15
-        )
-        np.testing.assert_allclose(
-            frame.interface.displacement, frame.lower.displacement[lower_nodes], atol=1e-15
-        )
-        opening = (
-            frame.upper.displacement[upper_nodes, 1] - frame.lower.displacement[lower_nodes, 1]
-        )
-        np.testing.assert_allclose(opening, frame.interface.gap, atol=1e-12)
+        lower_nodes, upper_nodes = (np.flatnonzero(one.points[:, 1] == 0) for one in (lower, upper))
+        for piece, nodes in ((lower, lower_nodes), (upper, upper_nodes)):
+            np.testing.assert_allclose(piece.points[nodes], interface.points, atol=1e-15)
+        below, above = lower["displacement"][lower_nodes], upper["displacement"][upper_nodes]
+        np.testing.assert_allclose(interface["displacement"], below, atol=1e-15)
+        opening = above[:, 1] - below[:, 1]
+        np.testing.assert_allclose(opening, interface["gap"], atol=1e-12)
         np.testing.assert_allclose(opening[data.normal_stress[step] > 0], 0.0, atol=1e-12)
-        np.testing.assert_allclose(
-            frame.interface.normal_stress, data.normal_stress[step], rtol=1e-6
-        )
+        np.testing.assert_allclose(interface["normal_stress"], data.normal_stress[step], rtol=1e-6)
+        np.testing.assert_allclose(interface["weight"], data.weight, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
@@ -181,20 +131,19 @@ def test_exact_every_row_of_elements_carries_the_load(run_case, name):
     """The stresses on a horizontal section through either piece balance the normal load and the
     friction force."""
     folder, _ = run_case(name)
-    fields = FieldReader(folder)
+    frames = read_with_vtk(folder / "fields.vtkhdf")
     data = read_netcdf(folder)
-    for step in range(0, fields.steps, 5):
-        frame = fields.frame(step)
+    for step in range(0, len(frames), 5):
         shear = (
             float((data.weight * data.shear_stress).sum("x")[step])
             if "shear_stress" in data
             else 0.0
         )
-        for body in (frame.lower, frame.upper):
-            corners = body.place[np.array(body.cells)]
+        for body in (frames[step][1][side] for side in ("lower", "upper")):
+            corners = body.points[body.cell_connectivity.reshape(-1, 4)]
             width = np.ptp(corners[:, :, 0], axis=1)
             height = corners[:, :, 1].mean(axis=1)
-            stress = body.stress.astype(float)
+            stress = body["stress"].astype(float)
             _, row = np.unique(height.round(9), return_inverse=True)
             assert row.max() > 5
             np.testing.assert_allclose(

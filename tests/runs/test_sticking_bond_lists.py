@@ -73,13 +73,11 @@ tolerance = 0.01
 @pytest.mark.parametrize(
     "text", [RIG.format(reading="report", push=5.739), MASSES], ids=["mode", "masses"]
 )
-def test_always_plan_estimates_strips_of_stuck_block(text):
-    """The plan estimates at least the strips of bonds of a stuck block, one per step, and at most 1.5 times as many."""
-    scene = load(text)
-    run_plan = plan(scene)
-    result = run(scene)
-    strips = result.motion.energies["strips"]
-    assert strips <= run_plan.unknowns["bond_list_about"] <= 1.5 * strips
+def test_always_stuck_block_leaves_a_strip_in_each_step(text):
+    """The steps of a stuck block are not halved, because each of them leaves a strip of bonds."""
+    result = run(load(text))
+    steps = result.settings.steps_per_cycle * result.plan.model.rig.drive.cycles
+    assert 0.6 * steps < result.motion.energies["strips"] <= 1.01 * steps
     # A warning states the missing error.
     assert any("accuracy.steps_per_cycle" in text for text in result.warnings)
 

@@ -103,7 +103,7 @@ REFUSALS = [
     (
         POINT + PLASTIC + STRUCTURE,
         "friction.bond_length=1e-13 um; accuracy.method=exact",
-        r"more than the limit of \d+ s; lower drive.cycles or the stiffness of",
+        "more than the limit of 3e.06 steps of a run; lower drive.cycles or the stiffness of",
     ),
     (
         PAIR + FORCED,

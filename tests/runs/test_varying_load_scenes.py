@@ -3,22 +3,16 @@ load."""
 
 import numpy as np
 import pytest
+from scene_runs import run_scene
 from scene_texts import COATED, DRIVE, MODE, RIG, make_friction_table
 
 from patchfem.core import Outcome
 from patchfem.export.run_data import collect_data
-from patchfem.runs.run import run
-from patchfem.scene import loads
 
 PITCH = RIG.replace("slide = 0.1", 'slide = 0.1\npitch = "40 rad/m"').replace(
     "cycles = 200", "cycles = 12"
 )
-COARSE_SETTINGS = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]
-
-
-def run_text(text, *sets, estimate=False):
-    """Return the result of a scene with --set options."""
-    return run(loads(text, "a.toml", sets), estimate=estimate)
+COARSE_SETTINGS = "contact.element_size=400 um; accuracy.steps_per_cycle=200"
 
 
 # The Coulomb and tanh cases would each compile a time loop that no other test needs.
@@ -38,7 +32,7 @@ def test_exact_pitching_mode_balances_energy_and_fields(law):
     text = PITCH.replace('"nonlocal"', law).replace(
         'static = 0.3\nbond_length = "1 um"', "static = 0.3"
     )
-    result = run_text(text, *COARSE_SETTINGS)
+    result = run_scene(text, COARSE_SETTINGS, estimate=False)
     assert result.measures["energy_balance"].value <= 1e-10
     assert result.measures["energy_created"].value == 0
     fields = result.fields
@@ -63,9 +57,8 @@ def test_always_coulomb_friction_with_heave_and_pitch_converges(steps):
         + 'normal = 0.3\npitch = "1 rad/m"\n'
         + DRIVE
     )
-    result = run_text(
-        text, "accuracy.method=march", "drive.cycles=12", f"accuracy.steps_per_cycle={steps}"
-    )
+    changes = f"accuracy.method=march; drive.cycles=12; accuracy.steps_per_cycle={steps}"
+    result = run_scene(text, changes, estimate=False)
     assert result.outcome is not Outcome.NOT_CONVERGED, result.message
     assert result.measures["energy_balance"].value <= 1e-10
 
@@ -76,10 +69,10 @@ def test_exact_load_that_is_zero_at_the_start(law):
     load = '[normal]\nload = "20 N"\namplitude = "20 N"\nfrequency = "50 Hz"\nphase = "180 deg"\n'
     text = load + make_friction_table(law) + MODE + DRIVE
     marched, exact = (
-        run_text(text, f"accuracy.method={method}", "drive.cycles=10", *steps, estimate=True)
-        for method, steps in (
-            ("march", ["accuracy.steps_per_cycle=200", "accuracy.tolerance=0.05"]),
-            ("exact", []),
+        run_scene(text, f"drive.cycles=10; accuracy.method={method}")
+        for method in (
+            "march; accuracy.steps_per_cycle=200; accuracy.tolerance=0.05",
+            "exact",
         )
     )
     for name in ("relative_displacement_amplitude", "friction_work"):

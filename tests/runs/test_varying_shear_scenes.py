@@ -2,26 +2,21 @@
 
 import numpy as np
 import pytest
+from scene_runs import run_scene
 from scene_texts import RIG
-
-from patchfem.runs.run import run
-from patchfem.scene import loads
 
 MOVING_RIG = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"')
 MOVING_RIG = MOVING_RIG.replace("cycles = 200", "cycles = 6")
 MOVING_RIG = MOVING_RIG.replace("slide = 0.1", 'slide = 0.1\nnormal = 0.3\npitch = "40 rad/m"')
-SETTINGS = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200", "contact.shear={}"]
+COARSE = "contact.element_size=400 um; accuracy.steps_per_cycle=200"
+SHEAR = "contact.shear={}"
 PLASTIC = "friction.law=elastic-plastic"
 
 
-def run_rig(*sets, estimate=False):
-    """Return the result of the rig with --set options."""
-    return run(loads(MOVING_RIG, "a.toml", sets), estimate=estimate)
-
-
-def displacement_amplitude(result) -> float:
-    """Return the amplitude of the relative displacement [m]."""
-    return result.measures["relative_displacement_amplitude"].value
+def run_rig(changes: str):
+    """Return the result of the rig with changed keys, and the amplitude of its relative displacement [m]."""
+    result = run_scene(MOVING_RIG, f"{COARSE}; {changes}", estimate=False)
+    return result, result.measures["relative_displacement_amplitude"].value
 
 
 @pytest.mark.share(0)
@@ -29,21 +24,14 @@ def displacement_amplitude(result) -> float:
 def test_order_of_amplitude_in_number_of_shear_modes(law):
     """The amplitude converges with the number of shear modes: 8 of 33 modes agree within 3e-4 and
     16 within 3e-5, while a piece without shear differs by more than 3e-3."""
-    results = {k: run_rig(*SETTINGS, law, f"accuracy.shear_modes={k}") for k in (8, 16, 33)}
-    deviations = [
-        abs(displacement_amplitude(results[k]) / displacement_amplitude(results[33]) - 1)
-        for k in (8, 16)
-    ]
-    assert deviations[0] <= 3e-4 and deviations[1] <= 3e-5 and deviations[1] < deviations[0]
-    assert (
-        abs(
-            displacement_amplitude(run_rig(*SETTINGS[:2], law))
-            / displacement_amplitude(results[33])
-            - 1
-        )
-        > 3e-3
+    _, rigid = run_rig(law)
+    results, amplitudes = zip(
+        *(run_rig(f"{SHEAR}; {law}; accuracy.shear_modes={k}") for k in (8, 16, 33))
     )
-    for result in results.values():
+    first, second, rigid_deviation = np.abs(np.array([*amplitudes[:2], rigid]) / amplitudes[2] - 1)
+    assert first <= 3e-4 and second <= 3e-5 and second < first
+    assert rigid_deviation > 3e-3
+    for result in results:
         assert result.measures["energy_balance"].value <= 1e-10
         assert result.measures["energy_created"].value == 0
         assert np.ptp(result.response.extra["normal_load"]) > 0.5 * result.patch.pressure.load
@@ -53,7 +41,7 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
     """The displacement of the holder is the sum of slip, elastic displacement of the pieces and
     bond stretch. The stretch is at most that of springs of stiffness mu sigma/eps_0, and the
     traction at most mu times the pressure."""
-    result = run_rig(*SETTINGS, PLASTIC, "accuracy.shear_modes=33")
+    result, _ = run_rig(f"{SHEAR}; {PLASTIC}; accuracy.shear_modes=33")
     fields = result.fields
     weight = result.patch.pieces.interface.weight
     n_checked = 0

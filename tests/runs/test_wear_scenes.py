@@ -53,6 +53,22 @@ def test_exact_worn_volume_is_coefficient_times_load_times_path():
     )
 
 
+@pytest.mark.parametrize("phase", [0, 45, 90])
+def test_always_worn_volume_under_oscillating_load_is_integral_of_load_over_path(phase):
+    """Under a load that oscillates with twice the frequency of the slide, the worn volume is kappa n times the integral of
+    the load over the path, within its error. The integral was related to the load at the start of the last cycle in place
+    of the mean load."""
+    load = f'[normal]\nload = "100 N"\namplitude = "50 N"\nfrequency = "286 Hz"\nphase = "{phase} deg"\n'
+    model = pf.build(load + COULOMB + SINE + WEAR)
+    volume = pf.run(model).measures["worn_volume"]
+    time = np.linspace(0, 1 / 143, 200_001)
+    path = np.abs(np.diff(10e-6 * np.sin(2 * np.pi * 143 * time)))
+    forces = model.point.evaluate(time)
+    expected = KAPPA * CYCLES * float((forces[1:] + forces[:-1]) / 2 @ path)
+    assert abs(volume.value - expected) <= volume.error + 1e-9 * expected
+    assert volume.error <= 1e-3 * volume.value
+
+
 def test_static_measures_after_wear_are_those_of_the_worn_patch():
     """After wear the pressure peak is that of the worn field within 1 %, with pieces that are elastic in shear.
 

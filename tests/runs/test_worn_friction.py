@@ -6,6 +6,7 @@ import pytest
 
 import patchfem as pf
 from patchfem import SceneError
+from patchfem.formatting import format_length
 from patchfem.runs import compute_wear
 from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.scene import loads
@@ -119,11 +120,10 @@ def test_always_wear_beyond_friction_table_gives_warning():
         "wear.jumps=4",
     )
     assert result.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
-    assert [
-        warning
-        for warning in result.warnings
-        if "is larger than the last value of wear.friction.depth, 1 um" in warning
-    ]
+    depth = format_length(result.measures["worn_volume"].value / AREA, 3)
+    (warning,) = [text for text in result.warnings if "wear.friction.depth, 1 um," in text]
+    assert warning.startswith(f"the mean worn depth, {depth}, is larger than the last value")
+    assert warning.endswith(f"extend the table wear.friction to a depth of at least {depth}")
 
 
 @pytest.mark.parametrize(

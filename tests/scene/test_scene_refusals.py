@@ -130,60 +130,52 @@ def test_refuses_missing_key_at_its_table(text, pattern, header, key, says):
     assert says in message
 
 
-def test_refuses_unbreakable_initial_bonds_with_shear():
-    """Initial bonds that no force can break are refused with [contact.shear]."""
-    assert "whose bonds at rest no force can move" in get_only_mistake(
-        RIG, "contact.shear={}", "friction.reading=report", "friction.order=-0.5"
-    )
-    sets = [
-        "contact.shear={}",
-        "friction.reading=report",
-        "friction.order=-0.5",
-        "friction.initial_bonds=0",
-    ]
-    assert loads(RIG, sets=sets).friction.initial_bonds == 0
-    sets = [
-        "friction.law=nonlocal",
-        "friction.bond_length=1 um",
-        "friction.reading=report",
-        "friction.order=-0.5",
-    ]
-    assert loads(BENCH, sets=sets).friction.order == -0.5
-    assert "must be > -1" in get_only_mistake(RIG, "friction.reading=report", "friction.order=-1")
+OFFSET = "contact.load_line.offset"
+MOMENT = "contact.load_line.moment"
+ORDER = "friction.reading=report; friction.order"
+LOAD_LINE = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
+FREE_ROLL = PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
+APPROACH = FREE_ROLL.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
+LIMITS = [  # text, settings, and what the message says; no message if the scene is valid
+    (RIG, f"contact.shear={{}}; {ORDER}=-0.5", "whose bonds at rest no force can move"),
+    (RIG, f"contact.shear={{}}; {ORDER}=-0.5; friction.initial_bonds=0", ""),
+    (BENCH, f"friction.law=nonlocal; friction.bond_length=1 um; {ORDER}=-0.5", ""),
+    (RIG, f"{ORDER}=-1", "must be > -1"),
+    (LOAD_LINE, "", f"{OFFSET}: missing; a length"),
+    (LOAD_LINE, f"{OFFSET}=1 mm; {MOMENT}=0.05 N m", "exclude each other"),
+    (LOAD_LINE, f"{OFFSET}=-6.35 mm", "|offset| < length/2 = 0.00635 m"),
+    (LOAD_LINE, f"{MOMENT}=1 N m", "|moment|/load < length/2"),
+    (LOAD_LINE, f"{MOMENT}=-1e-3 N m; contact.load=0 N", "|moment|/load < length/2"),
+    (LOAD_LINE, f"{OFFSET}=6.34 mm", ""),
+    (LOAD_LINE, f"{OFFSET}=1 mm; contact.load=0 N", ""),
+    (FREE_ROLL, "", ""),
+    (FREE_ROLL, "contact.strips.roll=1 mrad", "keep only one of these two keys"),
+    (FREE_ROLL, "contact.strips.count=1", "raise contact.strips.count"),
+    (FREE_ROLL, "contact.strips.offset=-4.7625 mm", "|offset| < 0.0047625 m"),
+    (APPROACH, "", "use contact.load in place of [contact.approach]"),
+    (RIG, "structure.mode.axial.base=1e40", "sum of `base`^2"),
+    (RIG, "structure.mode.axial.base=1e200", "outside the computable range"),
+    (RIG, "structure.mode.axial.frequency=1e300 Hz", "outside the computable range"),
+    (RIG, "structure.moving_mass=1e-300 kg", "range; a magnitude from 1e-50 to 1e+50 kg is needed"),
+    (RIG, "structure.stiffening.cubic=1e-300 N/m^3", "; 0 or a magnitude from 1e-50 to 1e+50 N/m^3 is needed"),
+    # A load has only an upper limit of its magnitude.
+    (RIG, "contact.load=1e60 N", "1e+60 N is outside the computable range; a magnitude of at most 1e+50 N is needed"),
+    (RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n'), "", "unknown key"),
+    (RIG.replace("[structure]\n", '[structure]\n"a\\n\\u001bb" = 1\n'), "", "unknown key"),
+    ("deep = " + "[" * 250 + "]" * 250 + "\n" + RIG, "", "unknown key"),
+    (RIG, "friction.static=" + "9" * 400, "a plain number is needed"),
+]  # fmt: skip
 
 
-def test_refuses_load_line_outside_patch():
-    """A load line outside the patch is refused, given by its offset or by a moment."""
-    text = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
-    assert "contact.load_line.offset: missing; a length" in get_only_mistake(text)
-    assert "exclude each other" in get_only_mistake(
-        text, "contact.load_line.offset=1 mm", "contact.load_line.moment=0.05 N m"
-    )
-    assert "|offset| < length/2 = 0.00635 m" in get_only_mistake(
-        text, "contact.load_line.offset=-6.35 mm"
-    )
-    assert "|moment|/load < length/2" in get_only_mistake(text, "contact.load_line.moment=1 N m")
-    assert "|moment|/load < length/2" in get_only_mistake(
-        text, "contact.load_line.moment=-1e-3 N m", "contact.load=0 N"
-    )
-    assert (
-        loads(text, sets=["contact.load_line.offset=6.34 mm"]).contact.load_line.offset == 0.00634
-    )
-    assert (
-        loads(text, sets=["contact.load_line.offset=1 mm", "contact.load=0 N"]).contact.load == 0.0
-    )
-
-
-def test_refuses_free_roll_without_load_or_strips():
-    """A free roll of strips is refused with a fixed roll, a single strip, a too large offset or a prescribed approach."""
-    at = "contact.strips.offset"
-    text = PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
-    assert loads(text).contact.strips.offset == 1e-3
-    assert "keep only one of these two keys" in get_only_mistake(text, "contact.strips.roll=1 mrad")
-    assert "raise contact.strips.count" in get_only_mistake(text, "contact.strips.count=1")
-    assert "|offset| < 0.0047625 m" in get_only_mistake(text, f"{at}=-4.7625 mm")
-    approach = text.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
-    assert "use contact.load in place of [contact.approach]" in get_only_mistake(approach)
+@pytest.mark.parametrize("number", range(len(LIMITS)))
+def test_refuses_keys_beyond_their_limits(number):
+    """Keys beyond a limit that other keys determine, odd keys and huge numbers are refused in one line, others accepted."""
+    text, changes, says = LIMITS[number]
+    sets = changes.split("; ") if changes else []
+    if says:
+        assert says in get_only_mistake(text, *sets)
+    else:
+        loads(text, sets=sets)
 
 
 COMBINATIONS = [
@@ -261,35 +253,6 @@ def test_refuses_invalid_toml(text, start):
 def test_refuses_unquoted_value_with_correction(text, end):
     """A value without quotes or digits is refused with its correct form."""
     assert get_only_mistake(text).endswith(end) and "not valid TOML" in get_only_mistake(text)
-
-
-def test_refuses_odd_keys_and_huge_numbers():
-    """Odd keys and huge numbers are refused with one line each."""
-    assert "sum of `base`^2" in get_only_mistake(RIG, "structure.mode.axial.base=1e40")
-    assert "outside the computable range" in get_only_mistake(
-        RIG, "structure.mode.axial.base=1e200"
-    )
-    assert "outside the computable range" in get_only_mistake(
-        RIG, "structure.mode.axial.frequency=1e300 Hz"
-    )
-    assert get_only_mistake(RIG, "structure.moving_mass=1e-300 kg").endswith(
-        "1e-300 kg is outside the computable range; a magnitude from 1e-50 to 1e+50 kg is needed"
-    )
-    assert get_only_mistake(RIG, "structure.stiffening.cubic=1e-300 N/m^3").endswith(
-        "; 0 or a magnitude from 1e-50 to 1e+50 N/m^3 is needed"
-    )
-    # a load has only an upper limit of its magnitude
-    assert get_only_mistake(RIG, "contact.load=1e60 N").endswith(
-        "1e+60 N is outside the computable range; a magnitude of at most 1e+50 N is needed"
-    )
-    assert "unknown key" in get_only_mistake(
-        RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n')
-    )
-    assert "unknown key" in get_only_mistake(
-        RIG.replace("[structure]\n", '[structure]\n"a\\n\\u001bb" = 1\n')
-    )
-    assert "unknown key" in get_only_mistake("deep = " + "[" * 250 + "]" * 250 + "\n" + RIG)
-    assert "a plain number is needed" in get_only_mistake(RIG, "friction.static=" + "9" * 400)
 
 
 def test_refuses_unreadable_file(tmp_path):

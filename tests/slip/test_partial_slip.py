@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LOAD, TILTS, draw_gap, make_coated_pair
 from pressed import press
-from yielding_points import jenkins_forces, solve_all_points, solve_box_problem
+from yielding_points import jenkins_forces, solve_all_points
 
 from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
-from patchfem.slip import find_sufficient_modes, jenkins_set, scale_limits
+from patchfem.slip import find_sufficient_modes, jenkins_set
 from patchfem.slip.shear_modes import shear_modes
 
 MU = 0.3
@@ -26,45 +26,27 @@ def friction_limit(cells, angle):
     return MU * press(pair, tilt(pair.interface.x, angle), LOAD).sigma_n * pair.interface.weight
 
 
-def test_exact_scaled_limits_equal_recomputed_elements():
-    """Elements whose limits are scaled by a factor equal elements computed for the scaled friction
-    limits, within 1e-11."""
+def test_exact_yield_displacements_are_in_proportion_to_limits():
+    """Friction limits that are multiplied by a factor multiply the yield displacements by this factor, and leave the
+    stiffnesses unchanged, within 1e-11."""
     pair = make_coated_pair(20)
     limit = friction_limit(20, 1e-4)
-    scaled = scale_limits(jenkins_set(pair.tangential, limit), 0.37)
-    recomputed = jenkins_set(pair.tangential, 0.37 * limit)
-    assert np.array_equal(scaled.points, recomputed.points)
+    elements = jenkins_set(pair.tangential, limit)
+    scaled = jenkins_set(pair.tangential, 0.37 * limit)
+    assert np.array_equal(scaled.points, elements.points)
     for name in ("yield_displacement", "limit"):
-        assert getattr(scaled, name) == pytest.approx(getattr(recomputed, name), rel=1e-11)
+        assert getattr(scaled, name) == pytest.approx(0.37 * getattr(elements, name), rel=1e-11)
     for name in ("stiffness", "force_matrix"):
         assert (
-            np.abs(getattr(scaled, name) - getattr(recomputed, name)).max()
-            < 1e-11 * np.abs(recomputed.stiffness).max()
+            np.abs(getattr(scaled, name) - getattr(elements, name)).max()
+            < 1e-11 * np.abs(elements.stiffness).max()
         )
-
-
-def test_exact_point_forces_agree_with_box_problem():
-    """The force at every point, computed from the stretch of the elements, agrees with the
-    box-constrained solution within 1e-10 of the friction limit."""
-    pair = make_coated_pair(100)
-    limit = friction_limit(100, 1e-4)
-    group = jenkins_set(pair.tangential, limit)
-    c = pair.tangential[np.ix_(group.points, group.points)]
-    slip = np.zeros(group.points.size)
-    force = np.zeros(group.points.size)
-    element_slip = np.zeros(group.stiffness.size)
-    for slide in np.array([0.3, 0.9, -0.4, 0.1, -2.0]) * group.yield_displacement[-1]:
-        force, slip_increment = solve_box_problem(c, group.limit, slide - slip, force)
-        slip = slip + slip_increment
-        stretch = np.clip(slide - element_slip, -group.yield_displacement, group.yield_displacement)
-        element_slip = slide - stretch
-        assert np.abs(group.force_matrix @ stretch - force).max() <= 1e-10 * limit.sum()
 
 
 @given(seed=st.integers(0, 2**32 - 1), bond_length=st.sampled_from([0.0, 1e-7, 1e-6]))
 def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
-    """For random rough gaps the force of the elements agrees with the solution for all points
-    within 1e-10 of the friction limit."""
+    """For random rough gaps the force of the elements, and at last the force at every point, agree with the
+    solution for all points within 1e-10 of the friction limit."""
     rng = np.random.default_rng(seed)
     pair = make_coated_pair(40)
     gap = draw_gap(rng, pair.interface.x, 10 ** rng.uniform(-8, -5))
@@ -76,9 +58,10 @@ def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
     # 40 reversals, from micro-slip to gross sliding
     swing = rng.uniform(0.0, 1.0, 40) * (-1.0) ** np.arange(40) + 0.2 * rng.normal()
     path = group.yield_displacement[-1] * 10 ** rng.uniform(-1, 0.3) * swing
-    expected = solve_all_points(c, limit[touching], path).sum(axis=1)
-    force = jenkins_forces(path, group.stiffness, group.yield_displacement)[0]
-    assert np.abs(force - expected).max() <= 1e-10 * limit.sum()
+    expected = solve_all_points(c, limit[touching], path)
+    force, stretch = jenkins_forces(path, group.stiffness, group.yield_displacement)
+    assert np.abs(force - expected.sum(axis=1)).max() <= 1e-10 * limit.sum()
+    assert np.abs(group.force_matrix @ stretch - expected[-1]).max() <= 1e-10 * limit.sum()
 
 
 @pytest.mark.parametrize("shape", ["crown", "tilt"])

@@ -10,10 +10,7 @@ from patchfem.core import PatchfemError
 from patchfem.structure import compute_receptance, masses
 from patchfem.structure.bonded import add_spring, remove_springs
 
-
-def sdof_basis(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
-    """Return the basis of a single mode."""
-    return make_modal_basis(omega, zeta, [slide], mass=mass)
+ONE_MODE = make_modal_basis(3.0, 0.01, [0.8], mass=2.0)
 
 
 @given(st.integers(0, 10**6))
@@ -47,6 +44,6 @@ def test_always_added_spring_equals_included_spring(seed):
 def test_refuses_removing_spring_stiffer_than_modes():
     """Removing a spring or damper larger than that of the modes is refused."""
     with pytest.raises(PatchfemError, match=r"is 111\.1 % of the stiffness"):
-        remove_springs(sdof_basis(), [9 * 2 / 0.64 / 0.9])
+        remove_springs(ONE_MODE, [9 * 2 / 0.64 / 0.9])
     with pytest.raises(PatchfemError, match=r"bonded\.damping is larger than the damping"):
-        remove_springs(sdof_basis(), [5.0], 1.0)
+        remove_springs(ONE_MODE, [5.0], 1.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import pyuff
+from lab_files import SI, write_universal
 from scene_texts import COATED, PLASTIC
 
 from patchfem.core import PatchfemError
@@ -27,10 +27,8 @@ def damped_basis():
     )
 
 
-def write_universal(path, datasets):
-    """Write datasets to a universal file and return its path."""
-    pyuff.UFF(str(path)).write_sets(datasets, mode="overwrite")
-    return path
+# What the datasets 55 of both kinds of modes have in common
+SHAPES = {"type": 55, "data_ch": 2, "spec_data_type": 8, "load_case": 1, "node_nums": NODES}
 
 
 def normal_modes(modal_masses=(1.0, 4.0, 0.25), **change):
@@ -39,14 +37,10 @@ def normal_modes(modal_masses=(1.0, 4.0, 0.25), **change):
     for k, modal_mass in enumerate(modal_masses):
         zeros = np.zeros(3)
         sets.append(
-            {
-                "type": 55,
+            SHAPES
+            | {
                 "analysis_type": 2,
-                "data_ch": 2,
-                "spec_data_type": 8,
-                "load_case": 1,
                 "mode_n": k + 1,
-                "node_nums": NODES,
                 "r1": zeros,
                 "r2": RIG.shapes[:, k] * np.sqrt(modal_mass),
                 "r3": zeros,
@@ -67,14 +61,10 @@ def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
         damped_omega = RIG.omega[k] * np.sqrt(1 - ZETA[k] ** 2)
         shape = complex(scale) * RIG.shapes[:, k]
         sets.append(
-            {
-                "type": 55,
+            SHAPES
+            | {
                 "analysis_type": 3,
-                "data_ch": 2,
-                "spec_data_type": 8,
-                "load_case": 1,
                 "mode_n": k + 1,
-                "node_nums": NODES,
                 "r1": 0 * shape,
                 "r2": shape + 0j,
                 "r3": 0 * shape,
@@ -86,14 +76,11 @@ def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
     return sets
 
 
-UNITS_MM = {
-    "type": 164,
+UNITS_MM = SI | {
     "units_code": 5,
     "units_description": "mm",
-    "temp_mode": 1,
-    "length": 1000.0,
-    "force": 1000.0,
-    "temp": 1.0,
+    "length": 1e3,
+    "force": 1e3,
     "temp_offset": 0.0,
 }
 

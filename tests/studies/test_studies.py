@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import run_cli
+from scipy.special import gamma
 from study_module import load_study
 
 STUDIES = Path(__file__).parents[2] / "studies"
@@ -47,6 +48,10 @@ def test_figure_13_curves_have_stated_peaks(tmp_path):
         [1.35, 2.30, 3.89, 5.32], abs=5e-3
     )
     assert "<svg" in (tmp_path / "figure.svg").read_text()
+    x = np.array([1e-12, 0.03, 2.5, 40.0])
+    for order in (-0.9, 0.4, 7.5):  # equation 2.14
+        weight = x**order * np.exp(-x) / gamma(order + 1)
+        assert figure.weight_along(x, order) == pytest.approx(weight, rel=1e-12)
 
 
 def test_figure_14_curve_has_stated_values(tmp_path):

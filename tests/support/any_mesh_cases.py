@@ -116,7 +116,9 @@ def make_pair(kind="mixed", grid=GRID):
 
 
 def find_cell_blocks(m):
-    """Return (cell type, cells, tags) of the triangles, quadrilaterals and lines that the mesh contains."""
+    """Return (cell type, cells, tags) of the triangles, quadrilaterals and lines, or of the `blocks`, of a mesh."""
+    if hasattr(m, "blocks"):
+        return m.blocks
     blocks = [
         ("triangle", m.triangles, m.triangle_tags),
         ("quad", m.quads, m.quad_tags),
@@ -198,8 +200,6 @@ def write_inp(m, path, lines=True, capitals=True):
 
 def write_med(m, path):
     """Write a mesh as a MED file in which every family of cells belongs to one group."""
-    import meshio
-
     cell_blocks = find_cell_blocks(m)
     names = sorted({int(tag) for _, _, tags in cell_blocks for tag in tags})
     mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in cell_blocks])

@@ -1,13 +1,32 @@
-"""Surface files for the tests: variants of X3P, SDF, .npy, .mat, exports of Dektak."""
+"""Surface files for the tests: X3P, .npy, .mat, exports of Dektak; how they are read and compared."""
 
 import io
 import zipfile
 
 import numpy as np
-from scipy.io import savemat
+import pytest
+from matlab_files import matlab5_bytes
+
+from patchfem.surface import read_surface
+from patchfem.surface.areal import Areal
 
 SPACE = "http://www.opengps.eu/2008/ISO5436_2"
 TYPES = {"I": "<i2", "D": "<f8"}
+
+
+def read_content(folder, content, name="scan.txt", units=None, encoding="utf-8"):
+    """Write bytes or a text to a file and return the surface that it contains."""
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode(encoding))
+    return read_surface(path, units)
+
+
+def assert_scan_equal(found, steps, z, rel=1e-14, tolerance=0.0) -> None:
+    """Assert that a surface is a scan with the given steps and heights, within a relative and an absolute tolerance."""
+    assert isinstance(found, Areal) and found.z.shape == z.shape and not found.z.flags.writeable
+    assert found.z == pytest.approx(z, rel=rel, abs=tolerance, nan_ok=True)
+    for axis, step in ((found.x, steps[0]), (found.y, steps[1])):
+        assert axis == pytest.approx(np.arange(axis.size) * step, rel=1e-15, abs=1e-22)
 
 
 def draw_scan(rows=4, count=6, seed=2) -> np.ndarray:
@@ -55,9 +74,7 @@ def make_npy(array) -> bytes:
 
 def make_mat(packed=True, **arrays) -> bytes:
     """Return variables as a MATLAB file of version 5."""
-    out = io.BytesIO()
-    savemat(out, arrays, do_compression=packed)
-    return out.getvalue()
+    return matlab5_bytes(arrays, packed)
 
 
 def make_dektak(z, length=50.0, results=True) -> bytes:

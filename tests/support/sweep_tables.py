@@ -1,5 +1,7 @@
 """Tables of sweeps from given values, for tests of their analysis."""
 
+import csv
+
 import numpy as np
 
 from patchfem.campaigns.sweeps.sweep_table import MeasureColumn, SweepTable, SweptKey
@@ -45,3 +47,9 @@ def make_random_table(points, measures, **more) -> SweepTable:
     """Return the table of random cases with the coordinates (n, keys) as values of k0, k1, ..."""
     keys = {f"k{axis}": column for axis, column in enumerate(points.T)}
     return make_table(keys, measures, shape=(len(points),), is_random=True, **more)
+
+
+def read_rows(folder) -> list[dict]:
+    """Return the rows of sweep.csv."""
+    with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

@@ -83,7 +83,8 @@ def test_exact_missing_ends_are_ignored():
     x = np.linspace(-10e-3, 10e-3, 4001)
     z = np.where(np.abs(x - 1e-3) < 7e-3, x, np.nan)
     profile = place_over_patch(make_trace(x, z), NODES)
-    assert "the trace is centred on the patch, which adds -1 mm to x" in profile.notes[0]
+    words = "to 6.35 mm; the trace is centred on the patch, which adds -1 mm to x"
+    assert f"the patch, from -6.35 mm {words}" in profile.notes[0]
     assert not profile.missing.any()
     assert average_at_nodes(profile, NODES) == pytest.approx(NODES + 1e-3, abs=1e-15)
 

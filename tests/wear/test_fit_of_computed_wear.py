@@ -1,5 +1,7 @@
 """Fit of a computed worn depth to a measured one: known coefficient, place and direction, errors and refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,18 @@ def test_exact_coefficient_place_and_direction(ratio, side):
     # the width grows, so the last depth in proportion gives another coefficient
     assert abs(found.proportional / found.coefficient.value - 1) > 0.04
     assert found.difference_rms < 2e-8
+
+
+def test_exact_symmetric_depth_has_no_direction():
+    """A symmetric depth fits both ways; the noise of a bin rises with the root of the correlation length."""
+    history, ways = make_history(), [measure_depth(0.7, side) for side in (1, -1)]
+    history = replace(history, depth=history.depth + history.depth[:, ::-1])
+    measured = ways[0]._replace(depth=ways[0].depth + ways[1].depth)
+    found, correlated = (
+        fit_wear(measured._replace(correlation=length), history) for length in (1.0, 25.0)
+    )
+    assert found.is_mirrored is None and found.centre.low < CENTRE < found.centre.high
+    assert correlated.depths.noise == pytest.approx(5 * found.depths.noise)
 
 
 def test_always_interval_covers_true_coefficient():

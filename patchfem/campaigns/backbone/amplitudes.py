@@ -119,6 +119,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     if joint.is_linear:
         return amplitudes
 
+    # The force of phase resonance is not needed here.
     joint = joint._replace(has_force=False)
     known = estimate_curve(joint, amplitudes)
 
@@ -130,6 +131,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
         for values in (known.frequency, known.damping):
             step = np.abs(np.diff(values))
             is_wide |= step > MAX_CURVE_CHANGE * (np.nanmax(values) - np.nanmin(values))
+        # Halves of a step would be closer than MIN_SPACING where its ends are within MIN_SPACING^2.
         is_wide &= known.amplitude[1:] > MIN_SPACING**2 * known.amplitude[:-1]
         if not is_wide.any():
             break

@@ -23,7 +23,7 @@ class SteadyLoop(NamedTuple):
     - run: the run.
     - model: model of the run.
     - steps: number of steps per cycle.
-    - change: change of each of LOOP_MEASURES by the later half of the cycles.
+    - change: change of each of LOOP_MEASURES from the run with half as many cycles.
     """
 
     run: bench.BenchRun
@@ -33,14 +33,17 @@ class SteadyLoop(NamedTuple):
 
 
 def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> SteadyLoop:
-    """Compute a friction loop with a doubled number of cycles until it is steady within the tolerance.
+    """Compute a friction loop with more and more cycles, until it is steady within the tolerance.
+
+    The number of cycles is doubled from run to run, up to `MAX_LOOP_CYCLES`. A loop is steady if its stiffness and its
+    area are those of the run with half as many cycles.
 
     Parameters
     ----------
     model : Model
-        Model of the rig.
+        Model of the rig, whose contact and friction law are used.
     patch : Patch or None
-        Pressed patch.
+        Pressed patch, or None for a contact at a point.
     slide : float
         Amplitude of the sinusoidal displacement [m].
     frequency : float
@@ -49,22 +52,34 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
     Returns
     -------
     SteadyLoop
-        The last run, its settings, and the change by the later half of the cycles.
+        The last run, its settings, and the change from the run with half as many cycles.
     """
     tolerance = model.accuracy.tolerance
-    rested = replace(decays.with_automatic_method(model), kind="bench", rig=None)
+    # The contact alone: a bench, on which the displacement is prescribed.
+    bench_model = replace(decays.with_automatic_method(model), kind="bench", rig=None)
     cycles = FIRST_CYCLES
     before = None
     while True:
-        path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None)
-        contact = replace(rested, slide=path)
+        path = SlidePath(
+            kind="sine",
+            amplitude=slide,
+            frequency=frequency,
+            speed=None,
+            run_in=0.0,
+            cycles=cycles,
+            corners=None,
+        )
+        contact = replace(bench_model, slide=path)
         steps = steps_per_cycle(contact)
         run = bench.run_bench(contact, patch, steps)
+
+        # Measures of the last cycle, against those with half as many cycles.
         if before is not None:
             change = [abs(run.values[name] - before[name]) for name in LOOP_MEASURES]
             limits = [tolerance * abs(run.values[name]) for name in LOOP_MEASURES]
             is_steady = all(step <= limit for step, limit in zip(change, limits))
             if cycles >= MAX_LOOP_CYCLES or is_steady:
                 return SteadyLoop(run, contact, steps, change)
+
         before = run.values
         cycles *= 2

@@ -295,19 +295,25 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
         """
         return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
 
+    # Without the contact, the bonded spring at rest alone holds the interface.
     free = modes.omega[joint.mode] / (2 * np.pi)
     if model.rig.springs.interlock is not None:
         free = find(modes.interfaces[:1], model.rig.springs.interlock[0])
     if joint.stuck_mode.omega is None:
         reason = "no friction acts" if joint.is_linear else "a rigid contact leaves no motion"
         return ModeFrequencies(free, None, reason=reason)
+
+    # Stuck: the stiffness of the patch in full stick holds the interface, if the mode does not contain it yet. Modes
+    # that were measured with the joint include it.
     stiffness = find_stuck_patch_stiffness(model, (joint.patch, *joint.coarser))
-    # Modes that were measured with the joint include the stiffness of the joint.
     has_joint = len(modes.interfaces) > 1 or model.rig.structure.bolted is not None
     if stiffness is not None and not has_joint:
         stuck = find(modes.interfaces, stiffness.value)
         high = find(modes.interfaces, stiffness.value + stiffness.error)
         return ModeFrequencies(free, stuck, high - stuck)
+
+    # Otherwise the mode of the joint is that with all elastic parts of the contact, and the error is that of the joint
+    # which was subtracted from the modes.
     free_error = 0.0
     if joint.stiffer is not None:
         shift = joint.stiffer.model.rig.modes.omega[joint.mode] - modes.omega[joint.mode]

@@ -302,6 +302,8 @@ def build_joint(model: Model, name: str) -> JointMode:
             "structure",
         )
 
+    # The pressed patch on its mesh and on coarser ones, of which None marks the end. The joint that was bolted in the modal
+    # test is taken off the modes of `model`.
     patch = None
     stiffer = None
     coarser: tuple[Patch | None, ...] = (None,)
@@ -309,6 +311,7 @@ def build_joint(model: Model, name: str) -> JointMode:
         model, (patch, *others), stiffer = solve_without_joint(model)
         coarser = (*others, None)
 
+    # First the mode without its contact, which has no frequency of stick.
     number = _find_mode(model.rig, name)
     modes = model.rig.modes
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
@@ -334,6 +337,7 @@ def _check_mode(joint: JointMode) -> None:
     rig = model.rig
     has_friction = model.friction is not None or bool(rig.friction.interfaces)
 
+    # Friction without a limit, beside a nonlinear spring that alone would have a backbone.
     if not joint.friction_limit and rig.springs.is_nonlinear and has_friction:
         raise PatchfemError(
             "the load or the coefficient of friction is 0, so no friction acts; for the backbone "
@@ -341,12 +345,14 @@ def _check_mode(joint: JointMode) -> None:
             "friction.static",
         )
 
+    # The mode has a natural frequency while the joint slides or while it sticks.
     if not (modes.omega[joint.mode] or joint.stuck_mode.omega):
         raise PatchfemError(
             "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
         )
 
-    # A mode that moves neither contact nor output has no curve of damping over amplitude.
+    # Damping depends on the amplitude only if the mode moves the contact, or if a spring is nonlinear. The amplitude is the
+    # motion of the output (`reach` per unit of the mode).
     moves_contact = np.abs(modes.interfaces @ joint.shape).max(initial=0.0) > 0
     if not (joint.is_linear or rig.springs.is_nonlinear or moves_contact):
         raise PatchfemError(

@@ -88,6 +88,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
 
     It is None if the law has no closed form.
     """
+    # The law alone gives the loop of an interface: nothing in series with it yields, and no spring is nonlinear.
     model = joint.model
     modes = joint.modes
     is_soft = (
@@ -96,9 +97,10 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     if model.friction is None or is_soft or len(model.rig.friction.interfaces) > 1:
         return None
 
+    # Slides of the contact are sought that give the amplitudes of the output. The rows of `best` are amplitude, frequency,
+    # damping ratio, loss and force.
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
-
     for _ in range(MAX_AMPLITUDE_STEPS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
@@ -112,6 +114,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
         # The deflection shape differs from the stuck mode shape, so that the output amplitude is missed.
         slides = slides * amplitudes / best[0]
 
+    # Amplitudes that are not met have no point.
     best = np.where(has_amplitude, best, np.nan)
     best[0] = amplitudes
     relative = ROUND_OFF_ERROR + (EQUAL_AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)

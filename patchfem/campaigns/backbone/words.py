@@ -108,10 +108,9 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     `joint` is the mode with its contact.
     """
     band = backbone.band
-    reasons = [
-        f"Method {method} has no curve here: {reason}."
-        for method, reason in backbone.missing.items()
-    ]
+    reasons = []
+    for method, reason in backbone.missing.items():
+        reasons.append(f"Method {method} has no curve here: {reason}.")
     if band is None:
         return (NO_CURVE, *reasons)
     if joint.is_linear:

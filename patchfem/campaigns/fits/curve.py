@@ -25,6 +25,7 @@ from ...response.errors import convergence_error
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
+from ..backbone.records import METHODS
 from ..backbone.words import describe_span
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
@@ -45,7 +46,6 @@ MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the
 SAME_ERROR_TOL = 0.1
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
-METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 # Largest relative difference of a measured amplitude and that of its computed point.
 SAME_AMPLITUDE_TOL = 1e-6
@@ -241,18 +241,18 @@ class CurveModel(FreeKeys):
     def solve(
         self, measured: MeasuredCurve, method: str, starts: int = 1, kind: str = "", start=None
     ) -> Fit:
-        """Fit the keys to a measured curve by a method of the backbone.
+        """Fit the keys to a measured curve by least squares.
 
         Parameters
         ----------
         measured : MeasuredCurve
-            Frequency and damping ratio with their errors.
+            Frequencies [Hz] and damping ratios (2, k) at k amplitudes, with their standard deviations.
         method : str
-            From METHODS.
+            Method by which a backbone computes the curve of the model, such as "balance".
         starts : int
-            Number of starting points.
+            Number of starting points of the search.
         kind : str
-            Value of `IntervalKind`.
+            How confidence intervals are computed: "rows" for independent rows, "series" for correlated ones, "" for none.
         start : (n,) array, optional
             First starting point in place of that of the scene.
 
@@ -342,7 +342,8 @@ def fit_curve(
     curves = CurveModel(scene, ranges, measured.amplitude)
     curves.require_enough_rows(curve_file, measured.value.size, "values")
 
-    # The fast method gives the start of the search by the reference method, and the errors that the table does not give.
+    # METHODS are the reference method and the fast one, which gives the start of the search by the reference method, and the
+    # errors that the table does not give.
     reasons = {}
     for method in reversed(METHODS):
         try:

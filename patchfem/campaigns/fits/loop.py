@@ -21,6 +21,7 @@ from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
+from ..held_out import select_held_out
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys, solve_contact
 
@@ -257,29 +258,38 @@ def fit_hysteresis_loop(
     loop = read_loop(loop_file)
     held_out = np.zeros(loop.reading.size, bool)
     for selector in options.hold:
-        held_out |= loop.select_rows(selector)
+        held_out |= select_held_out(
+            selector, loop.path, loop.labels, _has_label, lambda _, label: label
+        )
     time, notes = _find_row_times(scene, loop)
     keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
     keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
 
+    # Mistakes in the files that the scene names do not depend on the keys. They are raised here, because a search takes an
+    # error as a failed evaluation.
     with locate_errors(scene):
-        build(scene)  # mistakes in the files that the scene names do not depend on the keys
+        build(scene)
 
-    # least squares of the deviations, as fractions of the largest force
+    # Least squares of the deviations, as fractions of the largest force. A force that depends on the time steps is fitted
+    # with the largest steps first, without intervals.
     bench = BenchModel(keys, loop, time, say)
     scale = np.abs(loop.reading[~held_out]).max(initial=0.0)
     problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
         fit = problem.solve(interval_kind="series" if bench.is_exact else "")
     except NotConverged:
-        keys.base.override(keys.assign([bound.low for bound in ranges]))  # raises its mistakes
+        # If a value of the keys makes the scene invalid, its mistakes are raised instead.
+        keys.base.override(keys.assign([bound.low for bound in ranges]))
         raise
+
+    # The steps are halved until the force at this result converges, and the search goes on from there.
     if not bench.is_exact:
-        # the steps are chosen at the result of the fit with the largest steps
         first = fit
         bench.refine_steps(first.values)
         fit = replace(problem, start=first.values).solve(1, "series")
         fit = fit.count_earlier_search(first)
+
+    # The warnings need the fitted loop, and belong to its keys.
     fitted = FittedLoop(
         keys=keys.make_fitted_keys(fit),
         loop=loop,
@@ -289,6 +299,22 @@ def fit_hysteresis_loop(
         steps_per_row=bench.steps_per_row,
     )
     return replace(fitted, keys=keys.make_fitted_keys(fit, _warn_of_doubtful_fit(fitted)))
+
+
+def _has_label(column: str, label: str, text: str) -> bool:
+    """Return whether a label is that of the option --hold; texts of numbers are compared as numbers.
+
+    `column` is that of the label.
+    """
+    return _parse_label(label) == _parse_label(text)
+
+
+def _parse_label(text: str) -> float | str:
+    """Return the text of a label as a number if it is one, or else unchanged."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
@@ -338,6 +364,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     n_independent = fitted.keys.fit.intervals.rows
     warnings = []
 
+    # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
     if fitted.rms > MIN_RMS * peak and n_independent < MIN_INDEPENDENT * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
@@ -345,10 +372,11 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
             "is systematic"
         )
 
-    # A law with memory carries no force before its first slide.
+    # The model carries no force before its first slide. A law without memory does not depend on the start, and rows that
+    # are held out are not fitted.
     first_force = abs(loop.reading[0])
-    starts_at_rest = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
-    if first_force > MAX_FIRST_FORCE * peak and not starts_at_rest:
+    needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
+    if first_force > MAX_FIRST_FORCE * peak and not needs_no_start:
         warnings.append(
             f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
             "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "

@@ -9,6 +9,7 @@ import numpy as np
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
 from ...scene.keys.quantities import parse_quantity
+from ..held_out import find_cells, select_held_out
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_DISPLACEMENT = 0.01 * 25.4e-6
@@ -64,19 +65,13 @@ class Readings:
         """Indices of the rows without any reading."""
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
-    def column_values(self, name: str) -> list[float | str]:
-        """Return the value (n,) of the table column `name` for each reading.
-
-        Raises PatchfemError for a column other than "frequency", "input", "flag" and "run".
-        """
-        if name == "run":
-            return [self.row_names[k] for k in self.row]
-        if name not in ("frequency", "input", "flag"):
-            raise PatchfemError(
-                f"{self.path}: there is no column {name} by which rows can be held out or left out; "
-                "use frequency, input, flag or run"
-            )
-        return [getattr(self.rows[k], name) for k in self.row]
+    @property
+    def columns(self) -> dict[str, list[float | str]]:
+        """Values (n,) of the columns of the table for each reading, by column, and its row name as "run"."""
+        columns = {"run": [self.row_names[k] for k in self.row]}
+        for name in ("frequency", "input", "flag"):
+            columns[name] = [getattr(self.rows[k], name) for k in self.row]
+        return columns
 
     def select_readings(self, selector: str) -> np.ndarray:
         """Return a mask (n,) of the readings whose row matches a selector "column=value,value".
@@ -84,23 +79,7 @@ class Readings:
         Examples are "frequency=135 Hz,150 Hz" and "run=143 Hz repeat". Raises PatchfemError for a
         value without a unit, and for a value that no row has.
         """
-        name, equals, values = (part.strip() for part in selector.partition("="))
-        if not equals or not values:
-            raise PatchfemError(
-                f"--hold {selector}: write column=value,value, for example frequency=135 Hz,150 Hz"
-            )
-        column = self.column_values(name)
-        selected = np.zeros(self.row.size, bool)
-        for text in map(str.strip, values.split(",")):
-            is_equal = np.array([_cell_matches(name, value, text) for value in column])
-            if not is_equal.any():
-                known = ", ".join(dict.fromkeys(_format_cell(name, value) for value in column))
-                raise PatchfemError(
-                    f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
-                    f"has {text} in the column {name}; the values of this column are {known}"
-                )
-            selected |= is_equal
-        return selected
+        return select_held_out(selector, self.path, self.columns, _cell_matches, _format_cell)
 
     def group_by_column(self, name: str, selected: np.ndarray) -> dict[str, np.ndarray]:
         """Group the readings of a mask `selected` (n,) by the values of the table column `name`.
@@ -108,7 +87,7 @@ class Readings:
         Returns masks (n,) by the text of the value, in the order of the rows.
         """
         groups: dict[str, np.ndarray] = {}
-        for reading, value in enumerate(self.column_values(name)):
+        for reading, value in enumerate(find_cells(self.columns, name, self.path)):
             if selected[reading]:
                 group = groups.setdefault(_format_cell(name, value), np.zeros(selected.size, bool))
                 group[reading] = True

@@ -232,12 +232,13 @@ def _advise_condition(
     training : (n,) array of bool
         Mask of the fitted readings.
     """
+    # Information of a repetition about the keys: the sum of g g^T over its readings, with the change g of a log ratio per
+    # key. The gradient is the mean over the readings of the condition.
     condition = readings.condition[training]
     is_acceleration = readings.is_acceleration[training]
     information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
     for is_of_kind in (is_acceleration, ~is_acceleration):
         for k in set(condition[is_of_kind].tolist()):
-            # a repetition gives one reading of each kind
             gradient = fit.intervals.effects[is_of_kind & (condition == k)].mean(axis=0)
             information[k] += np.outer(gradient, gradient)
     places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in readings.conditions]

@@ -86,6 +86,7 @@ def compute_chunk(
         Elapsed time [s] without compilation, and a tuple of CaseResults and a list of the data that
         `work.extract` returns for each case.
     """
+    # Cases that differ in numbers alone share what the numbers do not change. The batch numbers its cases from 0.
     begin = perf_counter() - compiled.COMPILE_SECONDS[0]
     models = _build_similar_models(work, numbers)
     if models is None:

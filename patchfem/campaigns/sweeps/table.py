@@ -37,6 +37,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         lines = list(table.iterate_rows(skips_blank=True))
     except PatchfemError as error:
         return None, [str(error)]
+
+    # The table that a sweep wrote has results from the column "outcome" on.
     keys = table.names[: [*table.names, OUTCOME_COLUMN].index(OUTCOME_COLUMN)]
     if not all(keys) or not keys or not lines:
         return None, [
@@ -44,6 +46,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         ]
     doubled = [key for key, count in Counter(keys).items() if count > 1]
     errors = [f"{path}:1: {key}: two columns have this key; remove one of them" for key in doubled]
+
+    # Each column is an axis of the sweep; row i of all axes is a case.
     axes = []
     for column, (key, unit) in enumerate(zip(keys, table.units)):
         axis, wrong_cells = _parse_column(key, unit, [cells[column] for _, cells in lines])

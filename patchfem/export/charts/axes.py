@@ -122,9 +122,18 @@ def make_figure(panels: list[Panel]):
 
 
 def save(figure, target, ending: str, dpi: float = 150.0) -> None:
-    """Write a figure of matplotlib into a file or a stream, such that equal figures give equal files.
+    """Write a figure of matplotlib such that equal figures give equal files.
 
-    `ending` is the format without a dot, such as "svg", and `dpi` the number of pixels per inch.
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure to write.
+    target : str, Path or file object
+        File, or stream, which is open for text if the format is "svg".
+    ending : str
+        Format without a dot, such as "svg".
+    dpi : float
+        Number of pixels per inch.
     """
     from matplotlib import rc_context
 
@@ -139,7 +148,14 @@ def _to_svg(figure) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
-def write_plot(answer: Answer, path) -> None:
+def find_picture_format(path: Path) -> str:
+    """Return the format of a picture by the ending of its file, such as "svg"; PatchfemError for another ending."""
+    if path.suffix.lower() not in PICTURE_ENDINGS:
+        raise PatchfemError(f"{path}: a picture is written as {', '.join(PICTURE_ENDINGS)}")
+    return path.suffix.lower()[1:]
+
+
+def write_plot(answer: Answer, path: Path) -> None:
     """Write the first chart of an answer, and of a backbone all three charts, as .png, .svg or .pdf.
 
     Raises
@@ -149,15 +165,13 @@ def write_plot(answer: Answer, path) -> None:
     Missing
         If the file cannot be written.
     """
-    ending = Path(path).suffix.lower()
-    if ending not in PICTURE_ENDINGS:
-        raise PatchfemError(f"{path}: a picture is written as {', '.join(PICTURE_ENDINGS)}")
+    ending = find_picture_format(path)
     panels = make_panels({"": answer}, CHARTS[answer.kind])
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
     with write_atomically(path) as partial:
         figure = make_figure(panels[: PICTURE_CHARTS.get(answer.kind, 1)])
-        save(figure, partial, ending[1:])
+        save(figure, partial, ending)
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):

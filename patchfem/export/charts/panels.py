@@ -66,6 +66,8 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
     first = next(iter(selected.values()))
+    if chart.style == "line" and first[_find_x(first, chart)].values.size == 1:
+        chart = replace(chart, style="points")  # a line through a single point is not visible
     axes = _make_axes(list(selected.values()), chart)
     if chart.style == "map":
         return _make_map(first, chart, *axes)
@@ -127,8 +129,9 @@ def _select(data: Variables, chart: Chart) -> Variables:
     names = [name for name, _ in _split_names(chart.y)]
     if not x_name or not any(name in data and np.any(data[name].values) for name in names):
         return {}
-    if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
-        return {}  # a single point, or a curve over another variable
+    x_values = np.asarray(data[x_name].values, float)
+    if chart.style == "line" and x_values.size > 1 and np.ptp(x_values) == 0:
+        return {}  # a curve over another variable
     if chart.style == "map" and "frame_time" in data:
         # frame 0 is the pressed state; the slip rate of frame 1 would need an earlier frame of the motion
         data = _take(data, "frame", np.arange(2, data["frame_time"].values.size))
@@ -295,33 +298,3 @@ def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Pan
     curve = Curve("", x[::step], values[:, ::step], rows=rows, meanings=variable.meanings)
     label = colours.label
     return Panel(chart.title, "map", x_axis, y_axis, [curve], chart.caption, colour_label=label)
-
-
-def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
-    """Return the panel of a map that changes over time.
-
-    Parameters
-    ----------
-    frames : dict
-        `x` (k,) and `y` (j,) [m], `times` (f,) [s], `values` (f, j, k).
-    title : str
-        Title of the chart, and name of the values.
-    unit : str
-        SI unit of the values.
-    """
-    positions = np.concatenate([frames["x"], frames["y"]])
-    x_axis = make_axis("x", "m", positions)
-    y_axis = make_axis("y", "m", positions)
-    colours = make_axis(title, unit, frames["values"])
-    times = make_axis("time", "s", frames["times"])
-    curves = [
-        Curve(
-            name=f"{format_number(float(time) * times.scale, 5)} {times.unit}",
-            x=frames["x"] * x_axis.scale,
-            y=values * colours.scale,
-            rows=frames["y"] * y_axis.scale,
-        )
-        for time, values in zip(frames["times"], frames["values"], strict=True)
-    ]
-    caption = "The colours are the same in all frames; the interface is at y = 0."
-    return Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=colours.unit)

@@ -3,8 +3,6 @@
 They take answers of kind "sweep", from memory or from their folders.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import NamedTuple
@@ -49,19 +47,21 @@ class SweepView(NamedTuple):
         """Whether the cases are all combinations of the values of the keys."""
         return self.data[self.axis].dims == (self.axis,)
 
-    def split_lines(self, name: str, default: float | str = np.nan) -> np.ndarray:
-        """Return a variable as (lines, values of the key on the axis), or the default if it is missing."""
-        if name not in self.data:
-            return np.array(default)
+    def split_lines(self, name: str) -> np.ndarray:
+        """Return a variable as (lines, values of the key on the axis)."""
         variable = self.data[name]
         place = variable.dims.index(self.axis) if self.others else 0
         moved = np.moveaxis(variable.values, place, -1)
         return moved.reshape(-1, moved.shape[-1])
 
     def find_symbols(self) -> np.ndarray:
-        """Return the symbol of each case (lines, values): "circle", or "x" if the case did not settle."""
-        has_settled = np.isin(self.split_lines("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
-        return np.where(has_settled, "circle", "x")
+        """Return the symbol of each case (lines, values): "circle", or "x" if the case did not settle.
+
+        Arrays that a user has selected may have no outcome; then one "circle" stands for all cases.
+        """
+        if "outcome" not in self.data:
+            return np.array("circle")
+        return np.where(np.isin(self.split_lines("outcome"), FINAL_OUTCOMES), "circle", "x")
 
     def name_lines(self) -> list[str]:
         """Return the values of the other keys of each line as text; [""] for a single line."""
@@ -104,19 +104,19 @@ def list_keys(answer: Answer) -> list[str]:
 def list_measures(answers: Answers) -> list[str]:
     """Return the measures that have a value in at least one case.
 
-    The main ones that change come first, in the order of the verdict, then the others.
+    The main ones that change come first, in the order of the verdict, then the other main ones, then all others.
     """
-    names = {
-        name: None
-        for answer in answers.values()
-        for name in answer.data
-        if f"{name}_error" in answer.data and np.isfinite(answer.data[name].values).any()
-    }
+    known = [
+        name for answer in answers.values() for name in answer.data if _has_values(answer, name)
+    ]
     ranges = [name for answer in answers.values() for name in answer.quantities]
     changing = [name.removeprefix("smallest_") for name in ranges if name.startswith("smallest_")]
-    main = [*changing, *(name for name in MAIN_MEASURES if name not in changing)]
-    order = {name: place for place, name in enumerate(dict.fromkeys(main))}
-    return sorted(names, key=lambda name: order.get(name, len(order)))
+    return [name for name in dict.fromkeys((*changing, *MAIN_MEASURES, *known)) if name in known]
+
+
+def _has_values(answer: Answer, name: str) -> bool:
+    """Return whether a variable of a sweep is a measure, which has errors, with a value in at least one case."""
+    return f"{name}_error" in answer.data and bool(np.isfinite(answer.data[name].values).any())
 
 
 def spread_indices(size: int, count: int) -> np.ndarray:
@@ -133,6 +133,8 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
             continue
         x_axis, x = view.scale(view.axis)
         for name in chart.y.split():
+            if name not in answer.data:
+                continue
             values = view.split_lines(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
                 keep = thin(values, MAX_DRAWN_CASES // 2)
@@ -171,9 +173,10 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
     All sweeps have the units of the first one.
     """
     curves = []
-    axes = None
+    axes = ()
     for title, answer in answers.items():
-        if name not in answer.data:
+        # the name may be that of a swept key of another sweep
+        if not _has_values(answer, name):
             continue
         view = view_sweep(answer)
         shares = answer.details.get("ranking", {}).get(name)
@@ -182,22 +185,24 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         x_axis, x = view.scale(view.axis)
         axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
 
+        # the interval of a quantity without negative values does not reach below zero
         values = view.split_lines(name) * axes[1].scale
-        errors = np.broadcast_to(view.split_lines(f"{name}_error") * axes[1].scale, values.shape)
+        errors = view.split_lines(f"{name}_error") * axes[1].scale
+        least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
         symbols = np.broadcast_to(view.find_symbols(), values.shape)
+        arrays = (values, np.maximum(values - errors, least), values + errors, symbols)
 
-        texts = view.name_lines()
+        labels = view.name_lines()
         lines = spread_indices(len(values), MAX_CHART_LINES)
         for line in lines:
             keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
-            y, error, marks = (array[line][keep] for array in (values, errors, symbols))
-            # the interval of a quantity without negative values does not reach below zero
-            least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
-            has_band = not np.isnan(error).all()
-            band = (np.maximum(y - error, least), y + error) if has_band else (None, None)
-            has_settled = (marks == "circle").all()
-            label = join_names(title, texts[line])
-            curves.append(Curve(label, x[keep], y, *band, symbols=None if has_settled else marks))
+            y, low, high, marks = (array[line][keep] for array in arrays)
+            curve = Curve(join_names(title, labels[line]), x[keep], y)
+            if not np.isnan(high).all():
+                curve = replace(curve, low=low, high=high)
+            if (marks == "x").any():
+                curve = replace(curve, symbols=marks)
+            curves.append(curve)
     return Panel(name.replace("_", " "), "dots" if view.is_grid else "points", *axes, curves)
 
 

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...formatting import format_number
+from ..charts.panel import Curve, Panel, make_axis
 from .vtkhdf import Frames, read_frames
 
 GRID_POINTS = (61, 60)  # columns and rows of the grid
@@ -51,19 +53,15 @@ def contact_window(frames: Frames) -> tuple[float, float, float, float]:
     return float(left), float(right), float(-reach), float(reach)
 
 
-def stress_frames(path: Path) -> dict[str, np.ndarray]:
-    """Return the von Mises stress around the contact in the last cycle, on a regular grid.
+def make_stress_panels(path: Path) -> list[Panel]:
+    """Return the film of the von Mises stress around the contact in the last cycle; [] if the pieces do not touch.
+
+    The stress is drawn on a regular grid, and a static patch has one frame.
 
     Parameters
     ----------
     path : Path
-        A file of fields. A static patch has one frame.
-
-    Returns
-    -------
-    dict
-        `x` (61,) and `y` (60,) [m], y > 0 in the upper piece; `times` (f,) [s] of at most 30 frames;
-        `values` (f, 60, 61) [Pa] of the cell at each point, NaN outside the pieces.
+        A file of fields.
 
     Raises
     ------
@@ -72,15 +70,40 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     """
     frames = read_frames(path)
     cycle = last_frames(frames.times)
-    numbers = cycle[
-        np.linspace(0, cycle.size - 1, min(MAX_FILM_FRAMES, cycle.size)).round().astype(int)
-    ]
+    count = min(MAX_FILM_FRAMES, cycle.size)
+    numbers = cycle[np.linspace(0, cycle.size - 1, count).round().astype(int)]
     left, right, bottom, top = contact_window(frames)
     columns, rows = GRID_POINTS
     x = np.linspace(left, right, columns)
     y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
+    stress = _sample_stress(frames, numbers, x, y)
+    if not np.nanmax(stress, initial=0.0) > 0:
+        return []
 
-    values = np.full((numbers.size, rows, columns), np.nan)
+    # all frames have the same scales
+    title = "von Mises stress in both pieces"
+    x_axis, y_axis = (make_axis(name, "m", np.concatenate([x, y])) for name in "xy")
+    colours = make_axis(title, "Pa", stress)
+    times = make_axis("time", "s", frames.times[numbers])
+    curves = [
+        Curve(
+            name=f"{format_number(float(time) * times.scale, 5)} {times.unit}",
+            x=x * x_axis.scale,
+            y=values * colours.scale,
+            rows=y * y_axis.scale,
+        )
+        for time, values in zip(frames.times[numbers], stress, strict=True)
+    ]
+    caption = "The colours are the same in all frames; the interface is at y = 0."
+    return [Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=colours.unit)]
+
+
+def _sample_stress(frames: Frames, numbers: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the von Mises stress (f, j, k) [Pa] of the cell at each point of a grid, NaN outside the pieces.
+
+    `numbers` (f,) are those of the frames, and `x` (k,) and `y` (j,) [m] the ascending coordinates of the grid.
+    """
+    values = np.full((numbers.size, y.size, x.size), np.nan)
     for side in ("lower", "upper"):
         block = frames.blocks[side]
         stress = block.cell_data["von_mises"][numbers]
@@ -93,4 +116,4 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
         for cell in np.flatnonzero((last > first).all(axis=1)):
             across, down = map(slice, first[cell], last[cell])
             values[:, down, across] = stress[:, cell, None, None]
-    return {"x": x, "y": y, "times": frames.times[numbers], "values": values}
+    return values

@@ -10,12 +10,11 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError, SineDrive
 from ...disk.atomic_write import write_atomically
-from ...friction.cells import join_cells
 from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
 from ...runs.patch import mesh_levels
-from ...runs.rig import costs, engines, joints
+from ...runs.rig import engines, joints
 
 
 def export_structure(model: Model, out: Path) -> str:
@@ -125,10 +124,7 @@ def make_elements(model: Model) -> dict[str, np.ndarray]:
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
 
-    # as many elements as the first run would use, which merges neighbours in pairs
     groups = [_sort_elements(*joint.list_elements()) for joint in joints.list_joints(model, patch)]
-    for _ in range(costs.count_cell_merges(model)):
-        groups = [join_cells(2, 0, *group) for group in groups]
     stiffness, yields = (np.concatenate(parts) for parts in zip(*groups))
     direction = np.repeat(modes.interfaces, [group[0].size for group in groups], axis=0)
     return {"limit": stiffness * yields, "stiffness": stiffness, "direction": direction}

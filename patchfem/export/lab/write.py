@@ -47,7 +47,9 @@ def export_histories(folder: Path, out: Path) -> str:
 
     tail = ""
     if out.suffix.lower() == ".csv":
-        write_text(out, format_columns(columns))
+        # all digits, with units in the headings
+        cells = {f"{column.label} [{column.unit}]": column.values.tolist() for column in columns}
+        write_text(out, format_csv(cells))
     elif out.suffix.lower() == ".mat":
         write_matlab(out, answer)
     else:
@@ -111,10 +113,3 @@ def write_matlab(path: Path, answer: Answer) -> None:
     content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
     with write_atomically(path) as partial, open(partial, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)
-
-
-def format_columns(columns: list[Column]) -> str:
-    """Return columns of equal length as CSV with units in the header and all digits."""
-    return format_csv(
-        {f"{column.label} [{column.unit}]": column.values.tolist() for column in columns}
-    )

@@ -1,7 +1,5 @@
 """The answer of a sweep: quantities, arrays and origin from its table and its analysis."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress

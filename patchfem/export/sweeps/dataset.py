@@ -6,7 +6,7 @@ from ...core import PatchfemError
 from .. import netcdf
 from ..answer import Answer
 from ..charts import axes as drawing
-from ..charts.sweeps import list_keys, make_measure_panel
+from ..charts.sweeps import list_keys, list_measures, make_measure_panel
 
 
 def to_dataset(answer: Answer):
@@ -23,7 +23,7 @@ def draw_sweep(dataset, measure: str, axes=None):
     Parameters
     ----------
     dataset : xarray.Dataset
-        From `to_dataset`, or the content of sweep.nc.
+        From `to_dataset`, or the content of sweep.nc, also of selected values of the keys.
     measure : str
         Name of a variable that has an error.
     axes : matplotlib.axes.Axes, optional
@@ -32,13 +32,17 @@ def draw_sweep(dataset, measure: str, axes=None):
     Raises
     ------
     PatchfemError
-        If the dataset is not that of a sweep, or does not have this measure.
+        If the dataset is not that of a sweep, has no value of this measure, or has a single case without a dimension.
     """
     answer = netcdf.from_dataset(dataset, "sweep")
-    names = [name for name in answer.data if f"{name}_error" in answer.data]
+    names = list_measures({"": answer})
     if measure not in names:
         listed = ", ".join(sorted(names)) or "none; give a Dataset returned by pf.sweep"
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
-    keys = [str(name) for name in dataset.coords if name != "case"]
+    # a key of which one value was selected is no longer a dimension
+    coordinates = dataset.coords.items()
+    keys = [str(name) for name, values in coordinates if values.ndim and name != "case"]
+    if not keys:
+        raise PatchfemError("plot.sweep: the Dataset has a single case; select fewer keys")
     panel = make_measure_panel({"": replace(answer, details={"of": {"keys": keys}})}, measure)
     return drawing.draw_panels([panel], axes, "plot.sweep")

@@ -1,7 +1,5 @@
 """Computation of a sweep into its folder, which reuses existing results and writes the tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ measure) and `messages` (JSON: message of each failed case by its place in the f
 cases.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The sentences of a sweep: largest change, limit or peak, ranking, and what limits the trust."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
@@ -159,6 +157,8 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
         others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
         counts[f"over the tolerance in {_label(name)}{others}"] = missed[name]["count"]
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
+    if not clauses and len(table) == 1:
+        return "The only case settled and meets the tolerance."
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
     return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}."

@@ -1,16 +1,15 @@
-"""Choice of the algorithm (engine) that sums eq. 2.17, and of its settings, by tolerance and cost.
+"""Choice of the algorithm (engine) that sums eq. 2.17, and of its settings, by the tolerance.
 
 The recursion is exact for reading="stretch" with p = 1. The list of strips (`list_kernels`) sums every law. It has two
 settings: the fraction of the friction limit that its cut-off may lose, and the width up to which it merges strips. The
-engines `direct`, `truncated` and `merged` use none, the first, and both. The cheapest one depends on the law, the strokes
-and the steps.
+engines `direct`, `truncated` and `merged` use none, the first, and both. Which of them has the shortest list depends on
+the law, the strokes and the steps.
 """
 
 from dataclasses import dataclass
-from math import ceil, inf, sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
-from ... import cost_model
 from .list_numbers import MAX_DAMAGE, cutoff_age, sum_form
 from .list_rows_kernels import FORM_GROWING, FORM_REPORT, MAX_STRIP_LENGTH
 from .parameters import Bonds
@@ -30,9 +29,6 @@ MERGE_ERROR_GROWING = 6.0  # bound for reading="report" with growing bonds
 # Error that merging adds at any merge width for growing bonds with p < 0; it is due to bonds that
 # form at a reversal
 NEGATIVE_ORDER_ERROR = 3e-4
-# Number of evaluations of the list per step of a rig: three for each of two or three trial
-# increments
-N_PASSES_PER_STEP = 9
 # Largest change of the force due to the cut-off, as a fraction of the friction limit
 MAX_TAIL = 1e-6
 MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
@@ -40,14 +36,13 @@ MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
 
 @dataclass(frozen=True, slots=True)
 class EngineChoice:
-    """Algorithm (engine) that sums the bonds of eq. 2.17, with its settings, cost and error bound.
+    """Algorithm (engine) that sums the bonds of eq. 2.17, with its settings and error bound.
 
     - engine: name of the engine
     - tail: fraction of the friction limit that the cut-off may lose
     - merge: width [eps_0] up to which strips are merged
     - error: bound of the total error / friction limit
-    - strips: expected length of the list
-    - seconds: CPU seconds per step
+    - strips: expected length of the list, to which its CPU time is proportional
     """
 
     engine: str
@@ -55,7 +50,6 @@ class EngineChoice:
     merge: float
     error: float
     strips: float
-    seconds: float
 
     def reach(self, order: float) -> float:
         """Return the age [bond lengths] beyond which bonds are dropped, or inf if none are dropped."""
@@ -63,7 +57,7 @@ class EngineChoice:
 
 
 # The recursion is exact and keeps no strips.
-RECURSION = EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
+RECURSION = EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0)
 
 
 def unsupported_reason(engine: str, law: Bonds) -> str:
@@ -144,7 +138,7 @@ def choose_engine(
         return choices["merged" if merge > 0 else "truncated"]
     if choices["merged"].error > 0.1 * tolerance:
         return choices["truncated"]
-    return min(choices["truncated"], choices["merged"], key=lambda choice: choice.seconds)
+    return min(choices["truncated"], choices["merged"], key=lambda choice: choice.strips)
 
 
 def _merge_error_factor(law: Bonds) -> float:
@@ -157,7 +151,7 @@ def _merge_error_factor(law: Bonds) -> float:
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> EngineChoice:
-    """Estimate length, cost and error of a bond list with given settings.
+    """Estimate length and error of a bond list with given settings.
 
     Parameters
     ----------
@@ -177,7 +171,7 @@ def _estimate(
     Returns
     -------
     EngineChoice
-        With the expected number of strips, the CPU seconds per step and the bound of the error.
+        With the expected number of strips and the bound of the error.
     """
     # Every increment of a step adds a strip, or several if it is longer than a strip may be.
     form = sum_form(law)
@@ -193,19 +187,7 @@ def _estimate(
         # Strips of age R are joined up to merge exp(R/3), but not beyond a reversal
         strips = min(strips, 5 / merge + 20 + 2 * reach / stroke + 180 * (form == FORM_GROWING))
 
-    # A strip costs a fixed time per evaluation; the number of evaluations depends on the rule that averages the force
-    # over an increment.
-    seconds_per_strip = cost_model.STRIP_SECONDS[int(form)]
-    if law.order not in (0, 1, 2):
-        seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
-    panels = 1 if increment <= 1 else 2 + ceil(increment).bit_length()
-    # A long increment takes five Gauss points per panel instead of the two values of Simpson's
-    # rule.
-    factor = 1 if increment <= 0.1 else 5 / 2 * panels
-    pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
-    seconds = cost_model.LIST_STEP_SECONDS + N_PASSES_PER_STEP * pass_seconds * factor
-
     error = tail + (_merge_error_factor(law) * merge**2 if merge > 0 else 0.0)
     if merge > 0 and form == FORM_GROWING and law.order < 0:
         error += NEGATIVE_ORDER_ERROR
-    return EngineChoice(name, tail, merge, error, strips, seconds)
+    return EngineChoice(name, tail, merge, error, strips)

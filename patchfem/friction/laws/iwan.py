@@ -44,16 +44,19 @@ class Iwan:
 
     - stiffness (t,): [1/m]
     - yield_displacement (t,): [m]
+    - density (3,): phi_max [m], at which all sliders slip, chi + 1 and beta
 
     All points of a contact have the same relative displacement and the same stretches.
     """
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray
+    density: tuple[float, float, float]
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: the parallel elements from `elastic_plastic`."""
-        return parallel_element(self.stiffness * load, self.yield_displacement)
+        """Return the Element under a constant load [N]: parallel elements, and the density which they represent."""
+        element = parallel_element(self.stiffness * load, self.yield_displacement)
+        return element._replace(density=self.density)
 
 
 def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:
@@ -126,7 +129,11 @@ def from_keys(friction, load: float) -> Iwan:
     The stiffness [N/m] of the table is that under this load; a load of 0 counts as 1 N.
     """
     stiffness = friction.stiffness / (load or 1.0)
-    return Iwan(*slider_cells(friction.static, stiffness, friction.chi, friction.beta))
+    chi = friction.chi
+    beta = friction.beta
+    phi_max = max_yield_displacement(friction.static, stiffness, chi, beta)
+    cells = slider_cells(friction.static, stiffness, chi, beta)
+    return Iwan(*cells, (phi_max, chi + 1, beta))
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:

@@ -5,14 +5,13 @@ In: measures, outcomes and messages of cases. Out: `CaseResults`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...inputs import measured
 from ...model.model import Model
-from ...model.similar_models import select_models
 from ..results.patch_rows import Arrays, Measures
 
 FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
@@ -159,27 +158,6 @@ def _replace_texts(texts, part_texts, new_indices) -> None:
 def _renumber(texts, new_indices) -> dict[int, str]:
     """Return texts by case with new case indices, without the cases that have none."""
     return {new_indices[case]: text for case, text in texts.items() if case in new_indices}
-
-
-def solve_in_parts(
-    models: Sequence[Model], cases_per_call: int, solve: Callable[[Sequence[Model]], CaseResults]
-) -> CaseResults:
-    """Compute the case results of models in successive calls of `solve`.
-
-    Parameters
-    ----------
-    models : sequence of Model
-        Models in the order of the results.
-    cases_per_call : int
-        Largest number of models per call.
-    solve : callable
-        Function that returns the CaseResults of some of the models.
-    """
-    results = CaseResults.blank(len(models))
-    for first in range(0, len(models), cases_per_call):
-        cases = range(first, min(first + cases_per_call, len(models)))
-        results.insert(cases, solve(select_models(models, cases)))
-    return results
 
 
 def join_case_results(

@@ -6,8 +6,7 @@ is computed by a single run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from time import perf_counter
 from types import SimpleNamespace
@@ -18,13 +17,13 @@ import numpy as np
 from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
-from ...model.similar_models import collect_columns
+from ...model.similar_models import collect_columns, select_models
 from ...points.case_kernels import TICKS
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import convergence_errors, total_error
+from ...response.errors import MAX_ORDER, convergence_errors, total_error
 from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
 from ...response.reasons import (
     CHANGE_NOT_RESOLVED_REASON,
@@ -53,7 +52,7 @@ from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
 from ..rig.motion_warnings import note_on_creep
 from . import one_by_one
-from .case_results import CaseResults, has_unreadable_measurements, solve_in_parts
+from .case_results import CaseResults, has_unreadable_measurements
 
 ENGINE = "points"  # name of the engine in the settings of a case
 # Steps per cycle of successive marches. No two of them have a step in common, whose error would not show in their
@@ -68,6 +67,8 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
+# Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
+CHANGE_ROUND_OFF = 1e-12
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
@@ -97,13 +98,13 @@ class Refined(NamedTuple):
 
     - march: results
     - errors: errors (n,) by name
-    - steps (n,): steps per cycle
+    - steps: steps per cycle
     - is_met (n,): whether all measures meet the tolerance
     """
 
     march: CaseMarch
     errors: dict[str, np.ndarray]
-    steps: np.ndarray
+    steps: int
     is_met: np.ndarray
 
 
@@ -172,17 +173,25 @@ def group_key(model: Model) -> tuple[int, str]:
 
 def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:
     """Compute the case results of a group of models."""
-    return solve_in_parts(models, MAX_CASES_PER_CALL, partial(_solve_cases, report=report))
+    results = CaseResults.blank(len(models))
+    for first in range(0, len(models), MAX_CASES_PER_CALL):
+        part = range(first, min(first + MAX_CASES_PER_CALL, len(models)))
+        results.insert(part, _solve_part(select_models(models, part), report))
+    return results
 
 
-def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResults:
-    """Compute the case results of models by one march for each number of steps."""
+def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults:
+    """Compute the case results of models by marches with more and more steps."""
     begin = perf_counter()
     cases, scales = collect_cases(models)
-    refined = refine(cases, scales)
-    results = make_results(models, cases, scales, refined)
+    results = CaseResults.blank(len(models))
+    is_alone = np.zeros(len(models), bool)
+    for indices, refined in refine(cases, scales):
+        part = cases.select(indices), _select(scales, indices), refined
+        part_results = make_results(select_models(models, indices), *part)
+        is_alone[indices] = needs_single_run(*part, part_results)
+        results.insert(indices, part_results)
     _insert_texts(models, results)
-    is_alone = needs_single_run(cases, scales, refined, results)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
     return results
@@ -240,14 +249,14 @@ def _may_create_energy(model: Model):
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
-def refine(cases: Cases, scales: Scales) -> Refined:
+def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]:
     """March cases, and those that miss their tolerance again with more steps.
 
-    The errors follow from the march before, with fewer steps.
+    Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
+    others. The errors follow from the march before, with fewer steps.
     """
     remaining = np.arange(len(cases.parameters))
     coarse = march_cases(cases, STEPS[0])
-    refined = None
     for fewer, count in pairwise(STEPS):
         fine = march_cases(cases.select(remaining), count)
         part = _select(scales, remaining)
@@ -261,13 +270,17 @@ def refine(cases: Cases, scales: Scales) -> Refined:
             is_met &= (errors[name] <= allowed) | is_absent
 
         # Only cases beyond their tolerance are marched again.
-        done = Refined(fine, errors, np.full(remaining.size, count), is_met)
-        refined = done if refined is None else _insert(refined, remaining, done)
-        remaining = remaining[~is_met]
+        is_done = is_met | (count == STEPS[-1])
+        if is_done.any():
+            march = _select(fine, is_done)
+            yield (
+                remaining[is_done],
+                Refined(march, _select(errors, is_done), count, is_met[is_done]),
+            )
+        remaining = remaining[~is_done]
         if not remaining.size:
-            break
-        coarse = _select(fine, ~is_met)
-    return refined
+            return
+        coarse = _select(fine, ~is_done)
 
 
 def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[str, np.ndarray]:
@@ -283,10 +296,17 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
     count, fewer : int
         Their steps per cycle.
     """
-    errors = {}
     with np.errstate(all="ignore"):
-        found = convergence_errors(fine, coarse, ratio=count / fewer, steps=count * TICKS)
-        for name, error in found.items():
+        errors = convergence_errors(fine, coarse, ratio=count / fewer, steps=count * TICKS)
+        # A change that is small by accident does not give an error far below those of the other measures, relative to
+        # the value of a measure or to the terms of a difference.
+        sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
+        relative = np.array([errors[name] / sizes[name] for name in errors])
+        is_change = (relative > CHANGE_ROUND_OFF) & (relative < 1)
+        typical = np.nanmedian(np.where(is_change, relative, np.nan), axis=0) / 2**MAX_ORDER
+        for name, error in errors.items():
+            least = typical * sizes[name] * (error > CHANGE_ROUND_OFF * sizes[name])
+            error = np.fmax(error, least)
             errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
     return errors
 
@@ -314,22 +334,6 @@ def _select(record, rows):
     return type(record)(
         *(_select(one, rows) if isinstance(one, dict) else one[rows] for one in record)
     )
-
-
-def _insert(record, rows, part):
-    """Replace rows of all arrays of a record or dict, nested ones too, and return the record.
-
-    `record` is changed in place, `rows` are indices or a mask, and `part` is a record of the same kind with only these
-    rows.
-    """
-    pairs = record.items() if isinstance(record, dict) else zip(record._fields, record)
-    for name, value in pairs:
-        new = part[name] if isinstance(record, dict) else getattr(part, name)
-        if isinstance(value, np.ndarray):
-            value[rows] = new
-        else:
-            _insert(value, rows, new)
-    return record
 
 
 def make_results(
@@ -396,10 +400,8 @@ def make_results(
         }
         for name, measure in find_missing(known, last_cycles, drive, True).items():
             results.fill(case, {name: measure})
-    for case, n_steps in enumerate(refined.steps.tolist()):
-        results.numerics[case] = {
-            "engine": ENGINE, "steps_per_cycle": n_steps, "window_cycles": window,
-        }  # fmt: skip
+    numerics = {"engine": ENGINE, "steps_per_cycle": refined.steps, "window_cycles": window}
+    results.numerics.update(dict.fromkeys(range(len(results)), numerics))
     return results
 
 

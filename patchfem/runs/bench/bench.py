@@ -4,7 +4,7 @@ In: a model with [slide] and its Patch with the static contact solution, or None
 Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -75,8 +75,8 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     path : tuple, optional
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
     **settings
-        Fields `choice` and `springs` of `BenchEngine`, by default chosen by the tolerance and unchanged, and fields `say`
-        and `progress` of `SlideTask`.
+        Field `choice` of `BenchEngine`, by default chosen by the tolerance, and fields `say` and `progress` of
+        `SlideTask`.
 
     Returns
     -------
@@ -99,7 +99,6 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
         first = int(np.searchsorted(time, start))
 
     engine = choose_bench_engine(model, slide, settings.pop("choice", None))
-    engine = replace(engine, springs=settings.pop("springs", None))
     stored = _choose_frames(slide.size, frames)
     histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
     jumps = reversal_force_rule(model) == "jumps"

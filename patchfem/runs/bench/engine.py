@@ -4,7 +4,6 @@ In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. 
 closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil
 from time import thread_time
@@ -32,13 +31,10 @@ class BenchEngine:
 
     - method: method of computing the friction force.
     - choice: engine of bond summation with its settings; None for other methods.
-    - springs: function that replaces the stiffnesses and yield displacements of parallel elements; None: they are used
-      unchanged.
     """
 
     method: str
     choice: "bond_engines.EngineChoice | None" = None
-    springs: "Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None" = None
 
     @property
     def name(self) -> str:
@@ -231,12 +227,11 @@ def count_bench_sizes(model) -> BenchSizes:
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
     engine = choose_bench_engine(model, slide)
-    # The comparison runs keep their samples; a cell density needs one run more.
-    has_cells = law_has_trait(model.friction.law, "cells") and engine.method == PARALLEL_ELEMENTS
+    # The comparison runs keep their samples.
     unknowns = {}
     if engine.choice is not None and engine.choice.strips:
         unknowns["bond_list_about"] = int(engine.choice.strips)
-    return BenchSizes(engine.name, unknowns, (3 if has_cells else 2) * time.size // 2)
+    return BenchSizes(engine.name, unknowns, time.size)
 
 
 def compute_dimensionless_groups(model) -> dict[str, float]:

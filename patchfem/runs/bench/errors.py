@@ -4,27 +4,23 @@ In: a BenchRun and patches on nested meshes. Out: error estimates by measure for
 discretization.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import law_has_trait
-from ...friction.cells import CELL_MERGES, join_cells
 from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
 from ...response.errors import (
     FrictionScale,
     convergence_errors,
     finer_errors,
     friction_errors,
-    merged_cell_errors,
 )
 from ...slip import shear_modes
 from ..results.patch_rows import Values
 from . import bench, shear
-from .engine import PARALLEL_ELEMENTS, uses_parallel_elements
+from .engine import uses_parallel_elements
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
@@ -39,14 +35,12 @@ class CoarseRun(NamedTuple):
     - steps: steps per cycle.
     - level: index of the mesh; 0 is the finest one.
     - choice: engine of bond summation with its settings.
-    - springs: see `BenchEngine`.
     - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
     """
 
     steps: int
     level: int
     choice: object
-    springs: Callable | None = None
     modes: int | None = None
 
 
@@ -92,14 +86,13 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
             patches[variant.level],
             variant.steps,
             choice=variant.choice,
-            springs=variant.springs,
             say=say,
         )
 
     # The runs are stored by their settings, because several estimates share one run.
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
-    errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
+    errors = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
     if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
@@ -108,6 +101,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     for settings in coarser_runs[0].runs:
         run = bench_runs[settings]
         step_runs.append(StepRun(settings.steps, run.seconds, run.values))
+    seconds = sum(run.seconds for run in bench_runs.values())
     return BenchErrors(errors, seconds, step_runs)
 
 
@@ -154,12 +148,6 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         if count:
             coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
-
-    if law_has_trait(model.friction.law, "cells") and fine_run.engine.method == PARALLEL_ELEMENTS:
-        # Groups of four cells are merged into one.
-        joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
-        runs = tuple(quarter._replace(springs=join) for join in joins)
-        out.append(CoarserRuns(runs, merged_cell_errors, quarter, "cells"))
 
     # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:

@@ -311,7 +311,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
 
     def compute() -> "shear_modes.ShearModes":
         """Compute the modes, for all runs with the same Patch."""
-        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+        weakening = _find_weakening(law)
         limit = law.static * patch.pieces.interface.weight
         sigma = patch.pressure.sigma_n
         if model.side == "lower":

@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core import NotConverged
 from ...effects import law_has_trait
-from ...friction.laws import elastic_plastic
 from ...friction.record import make_law
 from ...points import contacts, slides
 from ...slip import fields
@@ -362,19 +361,13 @@ def _make_contact(task: SlideTask):
         return shear.make_points(model, task.patch, row, task.engine.choice), None
 
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve; rigid pieces are one element of the
-    # law itself. A comparison run merges the springs of parallel elements.
-    merge_springs = task.engine.springs
+    # law itself.
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
         springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        if merge_springs is not None:
-            springs = merge_springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
 
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
     element = make_law(friction, load).element(load)
-    if merge_springs is not None:
-        springs = merge_springs(*np.split(element.numbers[2:], 2))
-        element = elastic_plastic.parallel_element(*springs)
     return contacts.make_contact([element], [row]), None

@@ -6,30 +6,17 @@ their Jenkins elements for the motion, and fields.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ...core import PatchfemError
 from ...friction import record
 from ...slip import fields as slip_fields
-from ...slip.shear_modes import JenkinsSet
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
-from . import jenkins_elements, mesh_levels, store
+from . import mesh_levels, store
+from .jenkins_elements import PatchElements, join_elements, list_elements
 from .press import Patches
-
-
-class PatchElements(NamedTuple):
-    """Parallel Jenkins elements of an interface.
-
-    - stiffness, yield_displacement (t,): [N/m] and [m].
-    - jenkins_set: the elements with their nodes; None for strips and for an unloaded patch.
-    """
-
-    stiffness: np.ndarray
-    yield_displacement: np.ndarray
-    jenkins_set: JenkinsSet | None = None
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -87,15 +74,8 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> P
     PatchElements
     """
     patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
-    static = interface.numbers.static
-    if not patch.pressure.load > 0:
-        return PatchElements(np.array([1 / patch.slip_compliance.mean()]), np.zeros(1))
     length = record.make_law(interface.numbers, interface.load).element(interface.load).length
-    if patch.strips is not None:
-        strips = jenkins_elements.strip_elements(patch, static, length)
-        return PatchElements(*map(np.concatenate, zip(*strips)))
-    jenkins_set = jenkins_elements.elements(patch, static, length)
-    return PatchElements(jenkins_set.stiffness, jenkins_set.yield_displacement, jenkins_set)
+    return join_elements(list_elements(patch, interface.numbers.static, length))
 
 
 def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:

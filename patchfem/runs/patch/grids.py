@@ -7,12 +7,13 @@ small tolerance contain those for a large one. `mesh_levels` decides how many gr
 `plan` predicts their number. Read `make_base_grids` first, then `make_column_layout`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
+from ...core import PatchfemError
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
@@ -27,8 +28,8 @@ N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
 MAX_GRID_COLUMNS = 120
-# Each of the following dicts has a value for a static patch (True) and for a patch in motion
-# (False), which gets fewer nodes, because every node slows down each time step.
+# Each of the following dicts has a value for a fine mesh (True) and for that of a patch in a rig or with wear (False), which
+# gets fewer nodes, because every node slows down each time step or jump (`PatchMesh.is_fine`).
 CELL_GROWTH = {
     True: 0.5,
     False: 0.9,
@@ -69,7 +70,7 @@ MAX_SEARCHES = 8
 # would have the same columns.
 BAND_CHANGE_TOL = 0.1
 MIN_LEVELS = 3  # Smallest number of nested meshes at which the order of convergence is known.
-# Largest predicted CPU time [s] of condensing a mesh, by whether the patch is static; more
+# Largest predicted CPU time [s] of condensing a mesh, by whether the mesh is a fine one; more
 # expensive meshes are not tried.
 MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
 SECONDS_PER_NODE = 4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^NODE_EXPONENT
@@ -134,11 +135,17 @@ def make_base_grids(patch_model) -> BaseGrids:
     BaseGrids
     """
     key = ("base grids", store.content_key(patch_model))
-    return store.get_or_compute(key, lambda: _search_contact_region(patch_model))
+
+    def search() -> BaseGrids:
+        """Search for the contact region, and grade the grids to it."""
+        layout, contact = search_layout([patch_model])
+        return BaseGrids(make_grids(patch_model, layout), contact)
+
+    return store.get_or_compute(key, search)
 
 
-def _search_contact_region(patch_model) -> BaseGrids:
-    """Search for the contact region on grids that are graded towards the previous result.
+def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None]:
+    """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
     contact. The search ends when the cells at all edges are short compared to the contact, or when the
@@ -147,29 +154,62 @@ def _search_contact_region(patch_model) -> BaseGrids:
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
     MAX_WEAR_CELL_RATIO times the interface.
+
+    Parameters
+    ----------
+    cases : list of PatchModel
+        A single patch, or the cases of a sweep, of which those without a solution are left out.
+
+    Returns
+    -------
+    layout : Layout
+        Columns of the coarsest grid; even ones without a load.
+    contact : ContactExtent or None
+        Contact region of the first solved case; None without a load or a solution.
     """
-    loaded_models = (patch_model, *make_load_variants(patch_model))
-    layout = make_search_layout(patch_model)
+    first = cases[0]
+    layout = make_search_layout(first)
     contact = None
+    for _ in range(MAX_SEARCHES):
+        pair = condense(first, *make_grids(first, layout))
+        solved = []
+        for case in cases:
+            # The single run of a case reports its error.
+            try:
+                extents = _find_contact_extents(case, pair)
+            except PatchfemError:
+                if len(cases) == 1:
+                    raise
+                continue
+            if extents:
+                solved.append((case, extents))
 
-    # Without a load there is no contact to search for.
-    for _ in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
-        pair = condense(patch_model, *make_grids(patch_model, layout))
-        x = pair.grid.x
-        patches = [solve_patch_contact(loaded_model, pair) for loaded_model in loaded_models]
-        extents = list(map(find_contact_extent, patches))
-
-        # The next layout follows from this contact; the search compares the two.
-        contact = extents[0]
+        # Without a load there is no contact to search for.
+        if not solved:
+            break
+        contact = solved[0][1][0]
         previous_layout = layout
-        layout = make_column_layout(patch_model, extents)
-        edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
-        is_resolved = _resolves_contact(patch_model, x, layout, contact.slip_zones)
-        if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and is_resolved:
+        layout = _merge_layouts([make_column_layout(*one) for one in solved])
+
+        # The next layout follows from these contacts; the search compares the two.
+        max_ratio = 1 / (EDGE_CELLS[first.mesh.is_fine] - 1)
+        is_resolved = True
+        for case, extents in solved:
+            edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
+            zones = extents[0].slip_zones
+            is_resolved &= edge_cell_ratio <= max_ratio
+            is_resolved &= _resolves_contact(case, pair.grid.x, layout, zones)
+        if is_resolved or _have_bands_converged(layout, previous_layout):
             break
-        if _have_bands_converged(layout, previous_layout):
-            break
-    return BaseGrids(make_grids(patch_model, layout), contact)
+    return layout, contact
+
+
+def _find_contact_extents(patch_model, pair) -> list[ContactExtent]:
+    """Return the contact regions of a patch under its load and at the ends of its range; [] without a load."""
+    if not patch_model.nominal_load > 0:
+        return []
+    loaded_models = (patch_model, *make_load_variants(patch_model))
+    return [find_contact_extent(solve_patch_contact(model, pair)) for model in loaded_models]
 
 
 def make_load_variants(patch_model) -> list[PatchModel]:
@@ -223,12 +263,12 @@ def make_search_layout(patch_model) -> Layout:
 def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     """Return the column layout of the coarsest mesh, graded towards given contact regions.
 
-    The regions are those of one patch under several loads, or of several patches.
+    The regions are those of one patch under several loads.
     """
     length = patch_model.pieces.length
     half = length / 2
     mesh = patch_model.mesh
-    n_edge_cells = EDGE_CELLS[mesh.is_static]
+    n_edge_cells = EDGE_CELLS[mesh.is_fine]
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
 
@@ -292,8 +332,41 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[mesh.is_static],
+        CELL_GROWTH[mesh.is_fine],
     )
+
+
+def _merge_layouts(layouts: list[Layout]) -> Layout:
+    """Merge column layouts, taking the shortest cell of all layouts at each position."""
+    if len(layouts) == 1:
+        return layouts[0]
+    bands = set()
+    for layout in layouts:
+        bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
+
+    first = layouts[0]
+    bands = sorted(bands, key=lambda band: (band[2], band))
+    merged = Layout(
+        first.start,
+        first.stop,
+        (),
+        (first.start, first.stop),
+        *2 * [min(layout.max_length for layout in layouts)],
+        min(layout.slope for layout in layouts),
+    )
+
+    low, high, _ = np.array(bands).T
+    positions = np.linspace(low, high, 5, axis=1)
+    # Bands that do not shorten any cell are dropped, because most bands are redundant.
+    cell_lengths = merged.cell_lengths(positions)
+    needed_bands = []
+    for k, band in enumerate(bands):
+        if (cell_lengths[k] > band[2] * (1 + 1e-9)).any():
+            needed_bands.append(band)
+            cell_lengths = np.minimum(
+                cell_lengths, replace(merged, bands=(band,)).cell_lengths(positions)
+            )
+    return replace(merged, bands=tuple(needed_bands))
 
 
 def _make_point_bands(places, cell: float) -> Bands:
@@ -401,7 +474,7 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
         x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
-    growth = CELL_GROWTH[patch_model.mesh.is_static]
+    growth = CELL_GROWTH[patch_model.mesh.is_fine]
     pieces = patch_model.pieces.both
     grids = []
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:

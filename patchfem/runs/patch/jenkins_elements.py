@@ -1,7 +1,7 @@
 """Parallel Jenkins elements of a patch with partial slip, cached for all runs of the patch.
 
-In: a solved `Patch`, coefficient of friction and bond length. Out: a JenkinsSet, or `StripElements`
-of each strip (`slip.shear_modes`).
+In: a solved `Patch`, coefficient of friction and bond length. Out: a JenkinsSet (`slip.shear_modes`), or `PatchElements`
+of each strip.
 """
 
 from typing import NamedTuple
@@ -13,22 +13,22 @@ from . import store
 from .press import Patch
 
 
-class StripElements(NamedTuple):
-    """Parallel Jenkins elements of one strip of a patch.
+class PatchElements(NamedTuple):
+    """Parallel Jenkins elements of a patch, of one of its strips, or of strips that slide together.
 
-    - stiffness (t,): [N/m].
-    - yield_displacement (t,): displacement at which each element yields [m].
+    - stiffness, yield_displacement (t,): [N/m] and [m].
+    - jenkins_set: the elements with their nodes; None for strips and for an unloaded patch.
     """
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray
+    jenkins_set: "shear_modes.JenkinsSet | None" = None
 
 
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
     """Return the parallel Jenkins elements of a patch whose nodes yield at their friction limits.
 
-    The limit of a node is the coefficient of friction times its normal force. Coulomb elements with
-    different coefficients have equal springs, so that they are computed once and scaled.
+    The limit of a node is the coefficient of friction times its normal force.
 
     Parameters
     ----------
@@ -39,22 +39,15 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     length : float
         Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
     """
-    load = patch.pressure.sigma_n * patch.pieces.interface.weight
-
-    def make() -> "shear_modes.JenkinsSet":
-        """Compute the Jenkins elements; Coulomb elements are scaled from a coefficient of 1."""
-        if length or not static > 0:
-            return shear_modes.jenkins_set(patch.slip_compliance, static * load, length)
-        unit_elements = store.get_or_compute(
-            ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.slip_compliance, load)
-        )
-        return shear_modes.scale_limits(unit_elements, static)
-
-    return store.get_or_compute(("elements", patch, static, length), make)
+    limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    return store.get_or_compute(
+        ("elements", patch, static, length),
+        lambda: shear_modes.jenkins_set(patch.slip_compliance, limit, length),
+    )
 
 
-def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:
-    """Return the parallel Jenkins elements of each strip of a patch.
+def list_elements(patch: Patch, static: float, length: float) -> tuple[PatchElements, ...]:
+    """Return the parallel Jenkins elements of each strip of a patch; a patch without strips is one.
 
     The strips are not coupled: each one has its fraction of the compliance of the pieces and its
     own pressure. An unloaded strip has one element, which yields at once.
@@ -62,28 +55,34 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     Parameters
     ----------
     patch : Patch
-        Solved patch that is divided into strips across its width.
+        Solved patch.
     static : float
         Coefficient of static friction [1].
     length : float
         Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
-
-    Returns
-    -------
-    tuple of StripElements
-        One for each strip, in the order of the strips of the patch.
     """
+    if patch.strips is None and patch.pressure.load > 0:
+        found = elements(patch, static, length)
+        return (PatchElements(found.stiffness, found.yield_displacement, found),)
     # The compliance of a strip is inversely proportional to its fraction of the width.
-    slip_compliance = patch.slip_compliance * len(patch.strips.offsets)
+    slip_compliance = patch.slip_compliance * len(patch.state.force)
 
-    def make_strip_elements(force) -> StripElements:
+    def make_strip_elements(force) -> PatchElements:
         """Return the Jenkins elements of a strip under nodal normal forces (m,) [N]."""
         if not (static > 0 and force.any()):
-            return StripElements(np.array([1 / slip_compliance.mean()]), np.zeros(1))
+            return PatchElements(np.array([1 / slip_compliance.mean()]), np.zeros(1))
         sliders = shear_modes.jenkins_set(slip_compliance, static * force, length)
-        return StripElements(sliders.stiffness, sliders.yield_displacement)
+        return PatchElements(sliders.stiffness, sliders.yield_displacement)
 
     return store.get_or_compute(
         ("strip elements", patch, static, length),
-        lambda: tuple(make_strip_elements(force) for force in patch.strips.force),
+        lambda: tuple(map(make_strip_elements, patch.state.force)),
     )
+
+
+def join_elements(parts: tuple[PatchElements, ...]) -> PatchElements:
+    """Return the elements of strips that slide together, from those of each strip."""
+    if len(parts) == 1:
+        return parts[0]
+    stiffness, yield_displacement, _ = zip(*parts)
+    return PatchElements(np.concatenate(stiffness), np.concatenate(yield_displacement))

@@ -11,16 +11,12 @@ from ...core import NotConverged, Outcome
 from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
-from . import profile_points, slip_zones, store
+from . import profile_points, store
 from .condensed import condense, condense_once
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
 
-# Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
-# rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
-# as much.
-SLIP_REFERENCE_TOL = 1e-3
 # Largest number of columns of a mesh that has no coarser mesh.
 MAX_COLUMNS_WITHOUT_COARSER = 8
 
@@ -130,8 +126,7 @@ def solve_on_refined_meshes(
     mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
     time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
     measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
-    Under a prescribed displacement, the meshes must resolve the friction work as well. `PatchMesh.n_finer` more meshes
-    follow.
+    `PatchMesh.n_finer` more meshes follow.
 
     Parameters
     ----------
@@ -185,11 +180,11 @@ def solve_on_refined_meshes(
             return patches
 
         # Points replace the next mesh if its condensation would take too long.
-        seconds = predict_condensing_seconds(grids)
+        is_expensive = is_too_expensive(patch_model, grids)
         is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
         if (
             not is_within
-            and seconds > MAX_CONDENSING_SECONDS[False]
+            and predict_condensing_seconds(grids) > MAX_CONDENSING_SECONDS[False]
             and not has_tried_points
             and profile_points.can_use_points(patch_model)
         ):
@@ -202,10 +197,8 @@ def solve_on_refined_meshes(
 
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
-        is_done = is_done and resolves_slip_work(patch_model, patches, tolerance)
-        if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
-            # The static measures of a bench need no finer mesh when its motion does.
-            if n_finer == 0 or (is_done and patch_model.mesh.is_static):
+        if is_done or is_expensive:
+            if n_finer == 0:
                 return patches
             n_finer -= 1
 
@@ -219,85 +212,9 @@ def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
 
 
-def max_condensing_seconds(patch_model, tolerance: float) -> float:
-    """Return the CPU time [s] that condensing the finest mesh of a patch may take.
-
-    The motion under a prescribed displacement is cheap, so that a small tolerance allows a finer
-    mesh, up to the limit of a static patch.
-    """
-    if patch_model.mesh.slip is None:
-        return MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
-    return min(
-        MAX_CONDENSING_SECONDS[True],
-        MAX_CONDENSING_SECONDS[False] * max(1.0, (SLIP_REFERENCE_TOL / tolerance) ** 0.5),
-    )
-
-
-def solve_on_static_meshes(
-    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
-) -> Patches:
-    """Solve a bench patch with partial slip on the meshes of a static run.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch of a bench.
-    tolerance : float
-        Relative error that the static measures have to meet.
-    estimate : bool
-        If False, only the third mesh is solved.
-    solved : tuple
-        Patches of an earlier pass, from fine to coarse.
-
-    Returns
-    -------
-    tuple
-        Patches from fine to coarse; () if the mesh is prescribed or shared with other cases, or if
-        the patch is solved already.
-    """
-    if (
-        not patch_model.interface.partial_slip
-        or patch_model.mesh.shared is not None
-        or not patch_model.mesh.is_automatic
-    ):
-        return ()
-    static = patch_model.with_mesh(is_static=True, slip=None)
-    return solve_on_refined_meshes(static, tolerance, estimate, solved)
-
-
-def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
-    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch, with the prescribed displacement of its mesh settings.
-    patches : sequence of Patch or None
-        From fine to coarse; None for a missing mesh.
-    tolerance : float
-        Relative error that work and peak force have to meet.
-    """
-    slip = patch_model.mesh.slip
-    if slip is None:
-        return True
-    solved = [patch for patch in patches if patch is not None]
-    return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
-
-
-def meets_tolerance(patch_model, patches, tolerance: float) -> bool:
-    """Return whether the static measures of a patch and its friction work meet the tolerance.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch, with the prescribed displacement of its mesh settings.
-    patches : sequence of Patch or None
-        From fine to coarse; the first has its static measures, and None stands for a missing mesh.
-    tolerance : float
-        Relative error that the measures have to meet.
-    """
-    is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-    return is_within and resolves_slip_work(patch_model, patches, tolerance)
+def is_too_expensive(patch_model, bodies) -> bool:
+    """Return whether condensing meshes of the pieces takes more CPU time than the finest mesh of a patch may take."""
+    return predict_condensing_seconds(bodies) > MAX_CONDENSING_SECONDS[patch_model.mesh.is_fine]
 
 
 def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
@@ -313,8 +230,8 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
         The smaller tolerance.
     """
     finer = [mesh.refine() for mesh in patches[0].pair.meshes if mesh is not None]
-    if predict_condensing_seconds(finer) > max_condensing_seconds(patch_model, tolerance):
+    if is_too_expensive(patch_model, finer):
         return False
     # Values are extrapolated where they miss the tolerance.
     patches = with_static_measures(patches, tolerance, patches[0].points)
-    return not meets_tolerance(patch_model, patches, tolerance)
+    return max_mesh_error_ratio(patches[0].measures, tolerance) > 1

@@ -141,7 +141,7 @@ class Patch:
         """Return the values (m,) of a nodal field at the end of the run; None if unknown."""
         if name in self.frames:
             return self.frames[name][-1]
-        return np.zeros(self.x.size) if self.model.mesh.is_static else None
+        return np.zeros(self.x.size) if self.model.mesh.is_fine else None
 
     @property
     def surface(self) -> Surface:

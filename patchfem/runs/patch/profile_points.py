@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact.active_set import patch_problem
-from ...contact.conjugate_gradients import solve_by_gradients
-from ...contact.edges import ContactEdge
+from ...contact.conjugate_gradients import fit_motion, solve_by_gradients
+from ...contact.edges import contact_intervals
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
     PointCompliance,
@@ -329,10 +329,11 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
 
     # The edges between the points follow from the forces on the points in contact.
     contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
-    intervals = _contact_intervals(active, contact_edges, length)
+    # A loaded point at an end of the interface is in contact as far as this end.
+    intervals = contact_intervals(half_points[[0, -1]], force[[0, -1]], contact_edges)
     are_alike = patch_model.pieces.are_alike
     edge_values = EdgeValues(
-        length=float(np.maximum(np.diff(intervals).ravel(), 0.0).sum()),
+        length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
         normal=set_stiffness(normal, active, unit, contact_edges),
         tangential=set_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
@@ -372,21 +373,6 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     )
 
 
-def _contact_intervals(active, contact_edges: list[ContactEdge], length: float) -> np.ndarray:
-    """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool, `active`.
-
-    An interval ends at a contact edge between two points, or at an end of the interface. The edges are in order of x,
-    and `length` is that of the interface [m].
-    """
-    is_active = np.concatenate([[False], active, [False]])
-    edges = iter(contact_edges)
-    ends = []
-    for point in np.flatnonzero(is_active[1:] != is_active[:-1]):
-        is_inside = 0 < point < active.size
-        ends.append(next(edges).position if is_inside else (point / active.size - 0.5) * length)
-    return np.array(ends).reshape(-1, 2)
-
-
 def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
     """Solve for the nodal forces of a refinement level under the prescribed load or approach.
 
@@ -404,28 +390,25 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     x = normal.x
     loading = patch_model.loading
     initial_force = None if start is None else np.repeat(start, 2) / 2
-    has_approach = loading.approach is not None
-    offset = loading.approach if has_approach else gap.min()
-    moment = loading.moment
-
-    problem = patch_problem(x, gap - offset, loading.load, moment, loading.rotational_stiffness)
+    offset = float(gap.min()) if loading.approach is None else loading.approach
+    problem = patch_problem(
+        x, gap - offset, loading.load, loading.moment, loading.rotational_stiffness
+    )
     force, n_iterations = solve_by_gradients(
         normal, problem, CONTACT_TOL, MAX_CONTACT_ITERATIONS, initial_force
     )
 
-    # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).
+    # Approach and rotation follow from the rigid motion of the loaded points, as far as it is free (least squares).
     active = force > 0
-    approach = float(offset)
-    rotation = patch_model.gap.angle
-    if not has_approach and active.any():
-        displacement = (gap + normal.product(force))[active]
-        approach = float(displacement.mean())
-        if moment is not None:
-            middle = x[active].mean()
-            arms = x[active] - middle
-            slope = float(arms @ displacement) / max(float(arms @ arms), 1e-300)
-            approach -= float(slope * middle)
-            rotation -= slope
+    closing = gap - offset + normal.product(force)
+    motion = np.zeros(2)
+    motion[: problem.target.size] = fit_motion(problem.motions[active], closing[active])
+    approach, slope = motion.tolist()
     return PointForces(
-        force, float(force.sum()), float(force @ x), approach, rotation, n_iterations
+        force,
+        float(force.sum()),
+        float(force @ x),
+        approach=offset + approach,
+        rotation=patch_model.gap.angle - slope,
+        n_iterations=n_iterations,
     )

@@ -207,12 +207,12 @@ def notes_on_neglected_effects(face) -> list[str]:
 
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # An unstructured mesh has no coarser one: its second mesh is finer than its first. The coarsest
-        # mesh of a static patch, and the next one in a motion, have 20 cells along the contact, which are
+        # mesh of a fine series, and the next one of another, have 20 cells along the contact, which are
         # enough for the change.
         other = patch
         if coarse[-1] is not None:
             mesh = patch_model.mesh
-            other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[-2:][0]
+            other = coarse[-1] if mesh.is_automatic and mesh.is_fine else coarse[-2:][0]
         out += store.get_or_compute(
             ("plane band", other), lambda: note_on_plane_state(patch_model, other)
         )

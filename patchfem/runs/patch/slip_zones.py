@@ -1,16 +1,11 @@
-"""Slip zones of a patch under a prescribed displacement, and the error of the friction work.
+"""Slip zones of a patch under a prescribed displacement, for the grading of its mesh.
 
-In: solved patches and the `PrescribedSlip`. Out: slip zones for the grading of the mesh, and the
-errors of friction work and friction force relative to the tolerance.
+In: a solved patch and the `PrescribedSlip`. Out: zones along the interface.
 """
 
 import numpy as np
 
 from ...contact.edges import ContactEdge
-from ...core import Measure
-from ...response.errors import convergence_errors
-from ...response.rows import error_floor
-from ...slip.shear_modes import JenkinsSet
 from .jenkins_elements import elements
 
 Zone = tuple[float, float]  # start and end [m]
@@ -70,43 +65,3 @@ def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
         else:
             ends.append(float(x[min(node, x.size - 1)]))
     return [(start, stop) for start, stop in zip(ends[::2], ends[1::2]) if stop > start]
-
-
-def friction_work_per_cycle(jenkins_set: JenkinsSet, amplitude: float) -> float:
-    """Return the friction work [J] of parallel elements in a cycle of given amplitude [m]."""
-    slip = np.maximum(amplitude - jenkins_set.yield_displacement, 0.0)
-    return float(4 * (jenkins_set.stiffness * jenkins_set.yield_displacement) @ slip)
-
-
-def peak_friction_force(jenkins_set: JenkinsSet, amplitude: float) -> float:
-    """Return the force [N] of parallel elements at an amplitude [m] on first loading."""
-    return float(jenkins_set.stiffness @ np.minimum(jenkins_set.yield_displacement, amplitude))
-
-
-def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
-    """Return the larger ratio of error to allowed error of friction work and peak force.
-
-    Parameters
-    ----------
-    patches : sequence of Patch
-        The patch on two or more nested meshes, from fine to coarse.
-    slip : PrescribedSlip
-        Prescribed displacement of the holders, with the friction law.
-    tolerance : float
-        Relative error that work and peak force have to meet.
-    """
-    values = []
-    for patch in patches:
-        jenkins_set = elements(patch, slip.static, slip.bond_length)
-        values.append(
-            {
-                "loop_area": friction_work_per_cycle(jenkins_set, slip.amplitude),
-                "friction_force_peak": peak_friction_force(jenkins_set, slip.amplitude),
-            }
-        )
-    errors = convergence_errors(*values)
-    ratios = []
-    for name, value in values[0].items():
-        measure = Measure(value, "", errors[name], float(error_floor(name)))
-        ratios.append(measure.error_ratio(tolerance))
-    return max(ratios)

@@ -6,30 +6,27 @@ that needs the shortest ones there. It is refined until all cases meet the toler
 prescribed elements or with a mesh file have equal meshes in all cases anyway.
 """
 
-from dataclasses import astuple, replace
+from dataclasses import astuple
 from itertools import chain
 
 import numpy as np
 
 from ...core import PatchfemError
 from ...mesh import pieces as piece_meshes
-from ...mesh.grading import Layout
 from ...model.patch import PatchModel
 from . import grids, mesh_levels
-from .condensed import CondensedPair, condense, condense_once
-from .press import solve_patch_contact
+from .condensed import CondensedPair, condense_once
+from .measures import max_mesh_error_ratio
 from .store import Key
 
 # Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
 MAX_LAYOUT_CASES = 48
-# Largest number of contact searches; each search uses columns graded to the contacts of the
-# previous one.
-MAX_LAYOUT_SEARCHES = 4
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 400
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
 # are of second order in their length.
 SINGLE_CASE_TOL = 1e-3
+N_FINER_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
 MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
 
 
@@ -47,7 +44,7 @@ def geometry_key(patch_model) -> Key:
     return (
         patch_model.pieces,
         mesh.element_size,
-        mesh.is_static,
+        mesh.is_fine,
         mesh.edge_motion,
         file,
         modification_time,
@@ -81,10 +78,9 @@ def choose_shared_meshes(
     if not patch_model.mesh.is_automatic:
         return tuple(mesh_levels.make_given_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
-    load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
-    layout = _make_common_layout([*cases, *load_variants])
-    if layout is None:
+    layout, contact = grids.search_layout(cases)
+    if contact is None:
         return None
     # If the contact edges move or the patch slips partially, the initial contact does not determine
     # the measures. Cases between the given ones have longer cells at their own contact edges.
@@ -142,71 +138,6 @@ def _list_numbers(value) -> list[float]:
     return list(chain.from_iterable(map(_list_numbers, value)))
 
 
-def _make_common_layout(cases: list[PatchModel]) -> Layout | None:
-    """Return column layouts of the coarsest grids merged for all patches of equal geometry, or None on failure."""
-    first = cases[0]
-    max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
-    layout = grids.make_search_layout(first)
-    for _ in range(MAX_LAYOUT_SEARCHES):
-        pair = condense(first, *grids.make_grids(first, layout))
-        layouts = []
-        largest_ratio = 0.0
-        for case in cases:
-            extent = _find_contact_extent(case, pair)
-            if extent is not None:
-                layouts.append(grids.make_column_layout(case, [extent]))
-                largest_ratio = max(largest_ratio, extent.cell / extent.width)
-        if not layouts:
-            return None
-        layout = _merge_layouts(layouts)
-        if largest_ratio <= max_cell_ratio:
-            break
-    return layout
-
-
-def _find_contact_extent(patch_model, pair):
-    """Return the contact region of a patch, which is solved first if needed; None on failure.
-
-    In that case the single run reports the error.
-    """
-    try:
-        patch = solve_patch_contact(patch_model, pair)
-        return grids.find_contact_extent(patch)
-    except PatchfemError:
-        return None
-
-
-def _merge_layouts(layouts: list[Layout]) -> Layout:
-    """Merge column layouts, taking the shortest cell of all layouts at each position."""
-    bands = set()
-    for layout in layouts:
-        bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
-
-    first = layouts[0]
-    bands = sorted(bands, key=lambda band: (band[2], band))
-    merged = Layout(
-        first.start,
-        first.stop,
-        (),
-        (first.start, first.stop),
-        *2 * [min(layout.max_length for layout in layouts)],
-        min(layout.slope for layout in layouts),
-    )
-
-    low, high, _ = np.array(bands).T
-    positions = np.linspace(low, high, 5, axis=1)
-    # Bands that do not shorten any cell are dropped, because most bands are redundant.
-    cell_lengths = merged.cell_lengths(positions)
-    needed_bands = []
-    for k, band in enumerate(bands):
-        if (cell_lengths[k] > band[2] * (1 + 1e-9)).any():
-            needed_bands.append(band)
-            cell_lengths = np.minimum(
-                cell_lengths, replace(merged, bands=(band,)).cell_lengths(positions)
-            )
-    return replace(merged, bands=tuple(needed_bands))
-
-
 def _refine_until_tolerance_is_met(
     cases: list[PatchModel], bodies, tolerance: float
 ) -> list[CondensedPair]:
@@ -226,18 +157,22 @@ def _refine_until_tolerance_is_met(
     list of CondensedPair
         From fine to coarse.
     """
+    # Partial slip needs shorter cells than the static measures, which decide on the other meshes.
+    n_finer = N_FINER_FOR_SLIP if any(case.mesh.slip is not None for case in cases) else 0
     pairs = []
     while True:
         pairs.insert(0, condense_once(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
         if len(pairs) < grids.MIN_LEVELS:
             continue
-        seconds = grids.predict_condensing_seconds(bodies)
-        max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
-        is_too_expensive = bodies[0].x.size > MAX_INTERFACE_NODES or seconds > max_seconds
-        # The refinement goes on as soon as one case misses the tolerance.
-        if is_too_expensive or all(_meets_tolerance(case, pairs, tolerance) for case in cases):
+        is_too_large = bodies[0].x.size > MAX_INTERFACE_NODES
+        if is_too_large or mesh_levels.is_too_expensive(cases[0], bodies):
             return pairs
+        # The refinement goes on as soon as one case misses the tolerance.
+        if all(_meets_tolerance(case, pairs, tolerance) for case in cases):
+            if n_finer == 0:
+                return pairs
+            n_finer -= 1
 
 
 def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) -> bool:
@@ -249,4 +184,4 @@ def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) 
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
     except PatchfemError:  # The error is reported when this case is run alone.
         return True
-    return mesh_levels.meets_tolerance(patch_model, patches, tolerance)
+    return max_mesh_error_ratio(patches[0].measures, tolerance) <= 1

@@ -263,9 +263,8 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
     # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if patch.has_smooth_skin:
         pressure = state.pressure
-        ends = edges.find_pressure_edges(
-            x, pressure[strip], edges.MIN_RELATIVE_PRESSURE, pressure.max()
-        )
+        threshold = edges.MIN_RELATIVE_PRESSURE * pressure.max()
+        ends = edges.find_pressure_edges(x, pressure[strip], threshold)
     else:
         ends = edges.find_edges(
             pressed,

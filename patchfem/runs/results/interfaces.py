@@ -21,7 +21,6 @@ class Face(NamedTuple):
     - model: model of the run whose patch and friction law are those of this interface.
     - patches: the solved Patch and those on coarser meshes; None for a missing one.
     - fields: frames of the interface by name (see `Result`); None before its run.
-    - static: the patch on the meshes of its static measures, from fine to coarse; () if these are the same meshes.
     - unworn: the patch before wear, from fine to coarse; () without wear.
     """
 
@@ -30,7 +29,6 @@ class Face(NamedTuple):
     model: object
     patches: Sequence
     fields: dict | None = None
-    static: Sequence = ()
     unworn: Sequence = ()
 
     @property

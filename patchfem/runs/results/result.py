@@ -73,6 +73,17 @@ class Finding(NamedTuple):
         return self.words if self.advice is None else f"{self.words}; {self.advice.text}"
 
 
+class TimeShortage(NamedTuple):
+    """Refinement that accuracy.max_seconds ended before the main measures met the tolerance.
+
+    - axis: axis that was not refined further, such as "mesh" or "steps".
+    - seconds: expected CPU time [s] of a run that meets the tolerance.
+    """
+
+    axis: str
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class RunInputs:
     """Inputs of a run: plan, pressed interfaces, callbacks and whether to estimate errors.
@@ -84,6 +95,7 @@ class RunInputs:
     - say, progress: callbacks for a line of text and for the completed fraction, or None.
     - estimate: whether to estimate the errors from coarser runs.
     - stiffer: rig and patch with a stiffer joint, if a joint was subtracted from the modes; else None.
+    - limit: `refine.TimeLimit` of the run.
     """
 
     plan: object
@@ -91,6 +103,7 @@ class RunInputs:
     seconds: Values
     warnings: list[str]
     notes: list[str]
+    limit: object
     say: Callable[[str], None] | None = None
     progress: Callable[[float], None] | None = None
     estimate: bool = True
@@ -209,6 +222,7 @@ class Result:
     - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
     - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
     - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
+    - shortage: TimeShortage if accuracy.max_seconds ended the refinement, else None.
     """
 
     plan: object
@@ -227,6 +241,7 @@ class Result:
     findings: tuple[Finding, ...] = ()
     faces: tuple = ()
     yielding_faces: dict = field(default_factory=dict)
+    shortage: TimeShortage | None = None
 
     def __repr__(self) -> str:
         measures = _format_count(len(self.measures), "measure")

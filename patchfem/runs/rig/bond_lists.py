@@ -173,29 +173,6 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters) -> bool:
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
-def estimate_bond_list_length(model: Model, numerics: Numerics) -> int:
-    """Return the expected number of strips of a bond list at the end of a run.
-
-    Parameters
-    ----------
-    model : Model
-        Model with bonds.
-    numerics : Numerics
-        Cycles and steps per cycle of the run.
-
-    Returns
-    -------
-    int
-        As many as there are steps if every step adds a strip that is neither joined nor dropped.
-    """
-    steps = numerics.cycles * numerics.steps
-    if is_stuck_by_printed_law(model) and not model.partial_slip:
-        return int(steps)
-    choice = choose_bond_summation(model, numerics)
-    longest = 2 * steps * max(1.0, choice.strips) if choice.tail else 8 * steps
-    return int(min(choice.strips, longest))
-
-
 def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     """Raise Missing if a bond list is summed and the time step does not resolve the vibration of the block on its bonds.
 

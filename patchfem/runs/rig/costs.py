@@ -8,7 +8,7 @@ over which a law forgets, and from the events of friction elements.
 """
 
 from functools import lru_cache
-from math import inf, log2, pi, sqrt
+from math import inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,16 +16,18 @@ import numpy as np
 from ... import cost_model
 from ...core import Missing
 from ...effects import law_has_trait
+from ...hybrid import cases
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import find_max_acceleration, find_max_frequency_ratio
+from ...structure.drive_sizes import (
+    find_max_frequency_ratio,
+)
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
-MAX_EXACT_SECONDS = (
-    600.0  # Largest CPU time [s] of a motion from event to event; a longer one is refused.
-)
+# Ratio of predicted to possible steps of `hybrid` above which a run is refused at once; the engine itself ends one below.
+MAX_STEPS_EXCESS = 10.0
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -33,10 +35,6 @@ STEPS_PER_EVENT = 3.0
 MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
-# an error of 2e-4 of the motion of a slipping joint.
-MAX_MERGES = 4
-MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
 # Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
     "steps_per_cycle",
@@ -44,10 +42,6 @@ MARCH_SETTINGS = (
     "merge",
     "shear_modes",
 )
-# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
-# where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
-# 1.26 were measured.
-STIFF_TIME_EXPONENT = 9.0
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -75,24 +69,6 @@ def steps_per_cycle(model: Model) -> int:
     return model.accuracy.steps_per_cycle or min(
         max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
     )
-
-
-def count_cell_merges(model: Model) -> int:
-    """Return how many times neighbouring slider cells are merged in pairs for the first run.
-
-    The error is proportional to the square of the cell width. If it exceeds the tolerance, the run
-    is repeated with more cells (`Numerics.finer`).
-    """
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if (
-        not laws
-        or model.partial_slip
-        or model.rig.friction.has_partial_slip
-        or not all(law_has_trait(law, "cells") for law in laws)
-    ):
-        return 0
-    n_merges = MAX_MERGES + log2(model.accuracy.tolerance / MERGE_TOLERANCE) / 2
-    return int(min(max(n_merges, 0), MAX_MERGES))
 
 
 def find_interface_load(model: Model, interface) -> float:
@@ -185,32 +161,12 @@ def _estimate_decay_rate(model: Model, interface, mobility: float) -> float:
     limit = keys.static * find_interface_load(model, interface)
     rate = ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * mobility
     if keys.reference_speed:
-        slope = limit / keys.reference_speed * mobility
-        rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
+        rate = max(rate, limit / keys.reference_speed * mobility)
     elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
         length = keys.bond_length or limit / keys.stiffness
-        speed = 4 * rig.displacement_scale / rig.drive.signal.period
+        speed = 2 / pi * rig.slide_speed_scale
         rate = max(rate, speed / min(length, keys.slip_growth or inf))
     return rate
-
-
-def _estimate_stiff_fraction(model: Model, limit: float) -> float:
-    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
-
-    It is 1 if there are several modes or if the drive force is below the friction limit, and smaller otherwise.
-
-    Parameters
-    ----------
-    model : Model
-        Drive and modes; friction must depend on speed.
-    limit : float
-        Largest friction force [N].
-    """
-    modes = model.rig.modes
-    if modes.omega.size > 1 or not modes.slide[0] or not limit:
-        return 1.0
-    push = find_max_acceleration(model.rig.drive.signal) * abs(modes.base[0] / modes.slide[0])
-    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - modes.mass * push / limit))))
 
 
 def estimate_hybrid_seconds(model: Model) -> float:
@@ -257,16 +213,16 @@ def prefers_time_steps(model: Model) -> bool:
 
 
 def refuse_long_hybrid_run(model: Model) -> None:
-    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
-    seconds = estimate_hybrid_seconds(model)
-    if seconds > MAX_EXACT_SECONDS:
+    """Raise Missing if a run of the engine `hybrid` needs many more steps than the engine takes."""
+    steps = estimate_hybrid_steps(model)
+    cycles = model.rig.drive.cycles
+    if steps * cycles > MAX_STEPS_EXCESS * (cases.MAX_STEPS + cases.MAX_CYCLE_STEPS * cycles):
         march = ""
-        if estimate_march_seconds(model) < seconds:
+        if estimate_march_seconds(model) < estimate_hybrid_seconds(model):
             march = ', or use accuracy.method = "march"'
         raise Missing(
-            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by events, "
-            f"the fastest free vibration and the friction law) would need a computing time of about {seconds:.0f} s, "
-            f"more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness of modes and "
-            f"elements{march}",
+            f"the motion from event to event would need about {steps:.2g} steps per cycle, set by events, the fastest free "
+            f"vibration and the friction law, far more than the limit of {cases.MAX_STEPS:.0g} steps of a run; lower "
+            f"drive.cycles or the stiffness of modes and elements{march}",
             "",
         )

@@ -39,24 +39,13 @@ class RunEvaluator:
         Contact model of the engine.
     stick_tolerance : float
         Largest slip per cycle [m] at which the interface counts as stuck.
-    steps : int, optional
-        Samples per cycle; default: the steps per cycle of `numerics`.
     """
 
-    def __init__(
-        self,
-        model,
-        numerics,
-        patch,
-        contact=None,
-        stick_tolerance: float = 0.0,
-        steps: int | None = None,
-    ):
+    def __init__(self, model, numerics, patch, contact=None, stick_tolerance: float = 0.0):
         self.model = model
         self.numerics = numerics
         self.patch = patch
         self.contact = contact
-        self.steps = steps or numerics.steps
         self.has_friction = model.friction is not None
         # With a law that creeps, the interface slips under every force, however small.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")

@@ -39,7 +39,7 @@ from ...structure.drive_sizes import (
     is_sinusoidal,
 )
 from ...structure.histories import find_accelerations
-from . import strips
+from . import engines, strips
 from .evaluation import (
     RunEvaluator,
     compute_sampled_work,
@@ -167,9 +167,7 @@ class LumpedEvaluator(RunEvaluator):
     """Runs of the engine `hybrid` and their evaluation."""
 
     def __init__(self, model, numerics, patch, joints: Joints):
-        super().__init__(
-            model, numerics, patch, joints.contact, joints.stick_tolerance, LATE_SAMPLES_PER_CYCLE
-        )
+        super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
         self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
@@ -227,7 +225,9 @@ class LumpedEvaluator(RunEvaluator):
         elif outcome is not None:
             message = describe_escape(self.model.rig, travel)
         elif motion.status != Status.DONE:
-            raise NotConverged(motion.message)
+            is_marched = not engines.MARCH.find_unsupported_feature(self.model)
+            march = ', or use accuracy.method = "march"' if is_marched else ""
+            raise NotConverged(motion.message + march)
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period
@@ -498,7 +498,7 @@ class LumpedEvaluator(RunEvaluator):
             if change > 0 and name not in ERROR_MEASURES:
                 row = find_definition(name)
                 error = convergence_error(change, order=row.order)
-                errors[name] = error + row.sample_error / self.steps
+                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
         return errors
 
 

@@ -44,44 +44,42 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
-    if not solution.snapshots:
-        n_samples = len(window.time)
-        first = max(0, n_samples - 1 - n_samples // numerics.window)
-        sample_indices = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
-        tau = np.outer(window.force[sample_indices] / patch.pressure.load, sigma)
-        if f is not None and law_has_trait(f.law, "averaged"):
-            force = window.force[sample_indices]
-            tau = averaged_law.distribute_slip_force(
-                model, patch, force, np.zeros(sample_indices.size)
-            )
-        slip = np.repeat(window.slip[sample_indices][:, None], sigma.size, axis=1)
-        return make_interface_frames(
-            patch, window.time[sample_indices], tau, slip, window.slide[sample_indices]
-        )
-
+    # A motion without snapshots is that of a single point.
     snapshots = solution.snapshots
-    reduction = getattr(solution.contact, "reduction", None)
-    is_march = isinstance(snapshots[0], time_march.Snapshot)
-    rule = SlipRule()
-    has_node_bonds = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
-    has_points = is_march and snapshots[0].forces.size > 1
+    n_samples = len(window.time)
+    first = max(0, n_samples - 1 - n_samples // numerics.window)
+    samples = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
 
-    has_bonds = has_points and law_has_trait(f.law, "bonds")
-    has_shear = model.partial_slip
-    if (has_shear and model.grooves is not None) or (has_bonds and (has_shear or has_node_bonds)):
+    def list_frames(name: str) -> np.ndarray:
+        """Return time [s], slide [m], force [N] or slip [m] in each frame (f,)."""
+        if snapshots:
+            return np.array([getattr(snapshot, name) for snapshot in snapshots])
+        return getattr(window, name)[samples]
+
+    # The points of a march may have bonds of their own.
+    has_shear = bool(snapshots) and model.partial_slip
+    is_march = bool(snapshots) and isinstance(snapshots[0], time_march.Snapshot)
+    has_node_bonds = False
+    if is_march and snapshots[0].forces.size > 1 and law_has_trait(f.law, "bonds"):
+        is_below = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
+        has_node_bonds = has_shear or is_below
+
+    rule = SlipRule()
+    if has_node_bonds or (has_shear and model.grooves is not None):
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
-    elif model.partial_slip:
+    elif has_shear:
+        reduction = getattr(solution.contact, "reduction", None)
         length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = fields.element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
-        tau = np.array([snapshot.force / patch.pressure.load * sigma for snapshot in snapshots])
-        local = np.array([np.full(sigma.size, snapshot.slip) for snapshot in snapshots])
-
-    time = np.array([snapshot.time for snapshot in snapshots])
-    slide = np.array([snapshot.slide for snapshot in snapshots])
-    return make_interface_frames(patch, time, tau, local, slide, rule)
+        force = list_frames("force")
+        tau = np.outer(force / patch.pressure.load, sigma)
+        if f is not None and law_has_trait(f.law, "averaged"):
+            tau = averaged_law.distribute_slip_force(model, patch, force, np.zeros(force.size))
+        local = np.repeat(list_frames("slip")[:, None], sigma.size, axis=1)
+    return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"), rule)
 
 
 def _collect_varying_load_fields(patch, solution) -> Arrays:

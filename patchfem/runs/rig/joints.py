@@ -116,7 +116,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         Indices of the interfaces whose patches have a coarser mesh.
     """
     friction = model.rig.friction
-    speed = model.rig.speed_scale
+    speed = model.rig.slide_speed_scale
     if not friction.interfaces:
         return []
     if patch is not None:
@@ -164,14 +164,11 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
 
     static = model.friction.static
     length = record.make_law(model.friction, load.mean).element(load.mean).length
-    if patch.strips is None:
-        found = jenkins_elements.elements(patch, static, length)
-        return [(load, (found.stiffness, found.yield_displacement, found))]
-    parts = jenkins_elements.strip_elements(patch, static, length)
+    parts = jenkins_elements.list_elements(patch, static, length)
     if slide_apart:
         return [(load, part) for part in parts]
     # Strips of a patch that does not yaw have the same displacement.
-    return [(load, tuple(map(np.concatenate, zip(*parts))))]
+    return [(load, jenkins_elements.join_elements(parts))]
 
 
 # ---- engine `hybrid`

@@ -55,7 +55,7 @@ def add_level_errors(
         solved = {
             key: (*run.levels, *[none] * len(levels))[number] for key, run in solutions.items()
         }
-        sources, _ = estimate_errors(None, level.values, coarser_runs, solved)
+        sources = estimate_errors(None, level.values, coarser_runs, solved)
         errors = dict(level.errors)
         for name, causes in split_errors(level.values, sources).items():
             errors[name] = errors.get(name, 0.0) + sum(causes.parts.values())
@@ -205,9 +205,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     # Each level goes on from the end of the one before; a run that ends early is the last one.
     n_levels = len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
-        report = None
-        if progress is not None:
-            report = partial(_report_fraction, progress, k, n_levels)
+        report = None if progress is None else partial(_report_fraction, progress, k, n_levels)
         is_last = k + 1 == n_levels
         run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)

@@ -106,6 +106,8 @@ class MarchEvaluator(RunEvaluator):
             run = replace(run, message=describe_escape(rig, travel))
         if not slide_apart:
             return run
+
+        # Strips are averaged to a single interface, whose force is known at the samples.
         run = strips.average_over_strips(run, self.patch)
         force = run.window.force
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)

@@ -99,7 +99,7 @@ def mode_frequencies(rig, chain: Chain) -> list[dict[str, str | float | None]]:
 
 
 def count_unknowns(model: Model) -> dict[str, int]:
-    """Count the unknowns of a rig: modes, and for time steps the entries of a list of bonds or the shear modes."""
+    """Count the unknowns of a rig: modes, and for time steps the shear modes."""
     counts = {"modes": len(model.rig.structure.frequencies)}
     numerics = choose_numerics(model)
     f = model.friction
@@ -107,8 +107,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
         return counts
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     if has_bonds and bond_lists.has_bond_list(model, numerics):
-        length = bond_lists.estimate_bond_list_length(model, numerics)
-        return counts | {"bond_list_about": length}
+        return counts
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if model.partial_slip and is_changed:
         counts["shear_modes"] = numerics.shear_modes or shear_modes.N_SHEAR_MODES

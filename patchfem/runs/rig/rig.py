@@ -5,7 +5,7 @@ finer settings until its measures meet the tolerance; `run_rig` completes it.
 """
 
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, floor, log, log2
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ...response.decay_curve import DecayCurve
 from ...response.errors import absolute_change, add_errors, add_run_error_estimates
 from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
-from ...response.rows import AMPLITUDE, set_final_floors
+from ...response.rows import set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from .. import refine
@@ -39,13 +39,13 @@ EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 # Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
 MIN_RELATIVE_ERROR = 1e-9
-# Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
-# tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
-MAX_REFINED_WORK = 1e8
-# The same for measures that are not main ones. It takes some 0.1 s of CPU time.
+# Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
+# takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
 MAX_OTHER_WORK = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0
+# Expected ratio of the CPU times of runs with twice the steps, or a hundredth of the step error.
+FINER_RUN_RATIO = 2.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -108,7 +108,8 @@ def run_rig(inputs: RunInputs) -> Result:
     Raises
     ------
     Missing
-        If the run would take too much CPU time.
+        If the run would need far too many steps, or if its time steps do not resolve the vibration of the block on its
+        bonds.
     PatchfemError
         If the drive excites no mode.
     """
@@ -125,7 +126,7 @@ def run_rig(inputs: RunInputs) -> Result:
         costs.refuse_long_hybrid_run(model)
     elif numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
-    run = run_refined(inputs, numerics)
+    run, shortage = run_refined(inputs, numerics)
 
     # The reasons of missing values depend on the outcome, so that they come after it.
     if run.solution.levels and run.has_friction:
@@ -137,7 +138,7 @@ def run_rig(inputs: RunInputs) -> Result:
     if run.has_friction and find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
-    return _make_result(run)
+    return replace(_make_result(run), shortage=shortage)
 
 
 def _make_result(run: CoupledRun) -> Result:
@@ -184,7 +185,7 @@ def _make_result(run: CoupledRun) -> Result:
     )
 
 
-def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
+def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[CoupledRun]:
     """Repeat a run with finer settings until the errors of its measures meet the tolerance.
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
@@ -205,7 +206,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     model = inputs.plan.model
     engine = ENGINES[numerics.engine]
     size = model.rig.displacement_scale
-    runner = Runner(inputs, numerics)
+    runner = Runner(inputs)
     first = runner.solve(numerics)
     inputs.seconds.update({"march": first.seconds} | (first.prepare or {}))
 
@@ -216,7 +217,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         first = runner.solve(numerics)
     if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
-        return CoupledRun(inputs, numerics, first, measures)
+        return refine.Refined(CoupledRun(inputs, numerics, first, measures))
 
     space_runs = [
         *engine.list_space_runs(model, numerics, inputs.patch, inputs.coarse[0], first),
@@ -245,10 +246,10 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
-    run = refine.refine(solve, numerics, _judge)
+    run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
     inputs.seconds["error"] = sum(one.seconds for one in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
-    return replace(run, measures=run.measures | peak)
+    return refine.Refined(replace(run, measures=run.measures | peak), shortage)
 
 
 def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> ComparisonRuns:
@@ -285,10 +286,11 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     """Decide whether a run is repeated with smaller steps, after runs with given excesses.
 
     It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
-    depend on the steps. In a run that takes some time (MAX_OTHER_WORK), main measures alone count, and in one that takes
-    too much time (MAX_REFINED_WORK) the displacement.
+    depend on the steps. Measures that are not main ones count in a run that takes little time (MAX_OTHER_WORK).
     """
-    if _is_finest(run):
+    numerics = run.numerics
+    max_passes = _count_finer_passes(run)
+    if not max_passes:
         return refine.Verdict(0.0)
     counters = run.solution.book
     pressed = [face.patches[0] for face in run.inputs.faces]
@@ -297,7 +299,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         *(patch.x.size for patch in pressed),
         *(counters.get(name, 0.0) for name in ("points", "strips")),
     )
-    work = run.numerics.steps * run.numerics.cycles * nodes
+    work = numerics.steps * numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_WORK
 
@@ -305,29 +307,36 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     measures = set_final_floors(complete_measures(run).measures, tolerance)
     if work > MAX_OTHER_WORK:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
-    if work > MAX_REFINED_WORK:
-        measures = {AMPLITUDE: measures[AMPLITUDE]}
     # The engine `hybrid` estimates the error of its steps itself.
-    axis = "own" if run.numerics.local else "steps"
+    axis = "own" if numerics.local else "steps"
     excess = refine.find_worst_measure(measures, tolerance, [axis]).excess
     has_stalled = len(excesses) > 1 and excess >= excesses[-2]
-    return refine.Verdict(excess, None if not excess or has_stalled else run.numerics.finer())
+    if not excess or has_stalled:
+        return refine.Verdict(excess)
+    return refine.Verdict(
+        excess,
+        numerics.finer(),
+        axis,
+        seconds=run.solution.seconds,
+        cost_ratio=FINER_RUN_RATIO,
+        max_passes=max_passes,
+    )
 
 
-def _is_finest(run: CoupledRun) -> bool:
-    """Return whether no run with smaller steps is possible."""
+def _count_finer_passes(run: CoupledRun) -> int:
+    """Return how many times a run can be repeated with smaller steps than before."""
     numerics = run.numerics
     if numerics.local:
-        return 0.01 * numerics.local < MIN_STEP_ERROR
-    steps = numerics.steps * 2
-    return (
+        return max(0, floor(log(numerics.local / MIN_STEP_ERROR, 100) + 1e-9))
+    if (
         not ENGINES[numerics.engine].has_steps
         or "steps_per_cycle" in numerics.pinned
-        or steps > MAX_MARCH_STEPS
-        or steps * numerics.cycles > MAX_RUN_STEPS
         or bond_lists.is_bond_list_too_long(run.model, numerics, run.solution.book)
         or run.solution.outcome in EARLY_OUTCOMES
-    )
+    ):
+        return 0
+    max_steps = min(MAX_MARCH_STEPS, MAX_RUN_STEPS / numerics.cycles)
+    return max(0, floor(log2(max_steps / numerics.steps)))
 
 
 def _add_level_errors(

@@ -13,9 +13,6 @@ from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
 
-# Expected ratio of the steps of a run and its coarse runs to those of the run.
-COARSE_RUNS_RATIO = 2.0
-
 
 def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Compute the motion of a rig with the engine of its settings; the output is that of the gauge.
@@ -50,8 +47,6 @@ class Runner:
     ----------
     inputs : RunInputs
         Plan, Patch with its coarser mesh, and callbacks of the run.
-    numerics : Numerics
-        Settings of the first run.
 
     Attributes
     ----------
@@ -59,14 +54,11 @@ class Runner:
         Solution of each coarse run by its Numerics.
     """
 
-    def __init__(self, inputs: RunInputs, numerics: Numerics):
+    def __init__(self, inputs: RunInputs):
         self.inputs = inputs
         self.model = inputs.plan.model
         self.solutions: dict[Numerics, Solution] = {}
-        # Steps per cycle of all runs: expected and completed ones; and the largest reported fraction.
-        self._expected_steps = numerics.steps * (COARSE_RUNS_RATIO if inputs.estimate else 1.0)
-        self._steps_done = 0.0
-        self._shown = 0.0
+        self._done = 0.0  # reported fraction of all runs
 
     def solve(self, numerics: Numerics) -> Solution:
         """Solve the rig with the given settings, and with all fields."""
@@ -89,7 +81,7 @@ class Runner:
         return self._solve(model, replace(numerics, whole=needs_whole), patch)
 
     def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
-        """Solve a rig, and count its steps.
+        """Solve a rig, and report the completed fraction of all runs.
 
         Parameters
         ----------
@@ -104,14 +96,22 @@ class Runner:
         say : callable, optional
             Function that takes a line of text on the progress.
         """
-        report = self._make_callback(numerics.steps)
+        # Each run is a half of what is left, because the number of coarse runs is not known.
+        left = 1 - self._done
+        share = left / 2 if self.inputs.estimate else left
+
+        def report(fraction: float) -> None:
+            """Report the completed fraction of all runs from that of this run."""
+            if self.inputs.progress is not None:
+                self.inputs.progress(1 - left + share * fraction)
+
         solution = solve_rig(model, numerics, patch, frames, say, report)
-        self._steps_done += numerics.steps
+        self._done += share
         return solution
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
-        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)[0]
+        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
 
     def list_step_runs(
         self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns
@@ -133,19 +133,3 @@ class Runner:
         if time_runs and time_runs[0].source == "steps":
             pairs += [(run, self.solutions[run]) for run in time_runs[0].runs]
         return [StepRun(settings.steps, run.seconds, run.values) for settings, run in pairs]
-
-    def _make_callback(self, steps: float):
-        """Return the progress callback of a run with given steps per cycle; None without one for all runs.
-
-        The completed fraction of all runs is weighted by their steps and never decreases.
-        """
-        if self.inputs.progress is None:
-            return None
-
-        def report(fraction: float) -> None:
-            """Convert the completed fraction of one run to that of all runs, and report it."""
-            expected = max(self._expected_steps, self._steps_done + steps)
-            self._shown = max(self._shown, (self._steps_done + fraction * steps) / expected)
-            self.inputs.progress(self._shown)
-
-        return report

@@ -52,33 +52,21 @@ class CycleSlip(NamedTuple):
 
 
 class _Cycle(NamedTuple):
-    """Histories of a whole interface at the k samples of one cycle.
+    """Motion of p points at the k samples of one cycle: the whole interface, its strips or its nodes.
 
-    - slide, slip: relative displacement and slip [m].
-    - force, load: friction force and normal load [N].
+    - slide (k,): relative displacement of the holders [m].
+    - slip (k, p): slip [m].
+    - friction, normal (k, p): horizontal and vertical forces [N], or tractions [Pa].
+    - reference (p,): force or traction to which the wear of a point is related; a point with 0 is open and does not wear.
     - is_closed: whether the first sample follows the last one.
     """
 
     slide: np.ndarray
     slip: np.ndarray
-    force: np.ndarray
-    load: np.ndarray
+    friction: np.ndarray
+    normal: np.ndarray
+    reference: np.ndarray
     is_closed: bool = False
-
-
-class _NodeFrames(NamedTuple):
-    """Motion of the m interface nodes in f frames of one cycle.
-
-    - slide (f,), load (f,): displacement of the holder [m] and vertical force [N].
-    - slip, shear_stress (f, m): slip [m] and traction parallel to the interface [Pa].
-    - is_closed: whether the first frame follows the last one.
-    """
-
-    slide: np.ndarray
-    load: np.ndarray
-    slip: np.ndarray
-    shear_stress: np.ndarray
-    is_closed: bool
 
 
 class _Motion(NamedTuple):
@@ -87,14 +75,14 @@ class _Motion(NamedTuple):
     - window: histories of its last cycles.
     - slide (k,): relative displacement [m] during the whole run.
     - values: measures by name.
-    - frames: _NodeFrames of the last cycle, or None if no frames were asked for.
+    - nodes: _Cycle of the nodes, or None if no frames were asked for.
     - outcome: outcome of a motion without periodic cycle, else None.
     """
 
     window: object
     slide: np.ndarray
     values: Values
-    frames: _NodeFrames | None
+    nodes: _Cycle | None
     outcome: Outcome | None = None
 
 
@@ -185,16 +173,15 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     """
     follow = _follow_slide if model.rig is None else _follow_rig
     motion = follow(model, patch, 0 if slips_uniformly(model) else frames)
-    load = patch.pressure.load
-    cycle = _select_last_cycle(model, motion.window, load)
+    cycle = _select_last_cycle(model, motion.window, patch.pressure.load)
 
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
-    if motion.frames is not None:
-        path, error = _integrate_node_slip(model, patch, motion.frames)
+    if motion.nodes is not None:
+        path, error = _integrate_node_slip(model, patch, motion.nodes)
     elif strips_slide_independently(model):
-        path, error = _integrate_strip_slip(model, patch, motion.window)
+        path, error = _integrate_strip_slip(model, patch, motion.window, cycle)
     else:
-        path, error = _integrate_uniform_slip(model, cycle, load)
+        path, error = _integrate_uniform_slip(model, cycle)
         path = np.full(nodal_areas(model.patch, patch.pieces.interface).shape, path)
     if model.rig is not None:
         error += _slip_amplitude_change(motion.values, cycle)
@@ -205,7 +192,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
 def compute_point_slip_path(model, window, values: Values) -> tuple[float, float]:
     """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
 
-    The path is weighted with the load. The error comes from differences between cycles.
+    The path is weighted with the load, relative to its mean. The error comes from differences between cycles.
 
     Parameters
     ----------
@@ -216,9 +203,8 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
     values : dict
         Measures by name.
     """
-    load = None if model.rig is None else model.point.load
-    cycle = _select_last_cycle(model, window, load)
-    path, error = _integrate_uniform_slip(model, cycle, cycle.load[0])
+    cycle = _select_last_cycle(model, window, model.point.load)
+    path, error = _integrate_uniform_slip(model, cycle)
     if model.rig is not None:
         error += _slip_amplitude_change(values, cycle)
     return path, error
@@ -246,8 +232,10 @@ def _follow_slide(model, patch, frames: int) -> _Motion:
         if model.grooves is not None:
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
 
-    load = np.full(slide.size, patch.pressure.load)
-    return _Motion(run, run.slide, run.values, _NodeFrames(slide, load, local, tau, False))
+    sigma = patch.pressure.sigma_n
+    normal = np.repeat(sigma[None], slide.size, axis=0)
+    nodes = _Cycle(slide, local, tau, normal, sigma)
+    return _Motion(run, run.slide, run.values, nodes)
 
 
 def _follow_rig(model, patch, frames: int) -> _Motion:
@@ -264,23 +252,26 @@ def _follow_rig(model, patch, frames: int) -> _Motion:
     outcome, _ = judge_outcome(
         solution, {AMPLITUDE: amplitude}, model.accuracy.tolerance, model.rig.drive.signal
     )
-    node_frames = None
+    nodes = None
     if frames:
         frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
         in_cycle = {name: values[1:] for name, values in frame_fields.items()}
-        # Over grooves the load varies with the lift.
-        loads = np.full(response.time.size, patch.pressure.load)
+        # Over grooves the load varies with the lift, and each node carries its part of it.
+        load = patch.pressure.load
+        loads = np.full(response.time.size, load)
         if model.grooves is not None:
             loads = response.extra.get("normal_load", loads)
-        node_frames = _NodeFrames(
+        sigma = patch.pressure.sigma_n
+        nodes = _Cycle(
             slide=in_cycle["holder_slide"],
-            load=np.interp(in_cycle["time"], response.time, loads),
             slip=in_cycle["slip"],
-            shear_stress=in_cycle["shear_stress"],
+            friction=in_cycle["shear_stress"],
+            normal=np.outer(np.interp(in_cycle["time"], response.time, loads) / load, sigma),
+            reference=sigma,
             is_closed=True,
         )
     outcome = outcome if outcome in UNBOUNDED_OUTCOMES else None
-    return _Motion(solution.window, response.slide, solution.values, node_frames, outcome)
+    return _Motion(solution.window, response.slide, solution.values, nodes, outcome)
 
 
 def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
@@ -295,11 +286,11 @@ def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
     return abs(window_amplitude / amplitude - 1)
 
 
-def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
-    """Return the histories of the last cycle of a bench or a rig.
+def _select_last_cycle(model, window, load: float) -> _Cycle:
+    """Return the motion of a bench or a rig as a whole in its last cycle.
 
-    `window` has the histories of the last cycles. `load` is the constant load [N] of a rig. Over grooves the window has
-    the vertical force.
+    `window` has the histories of the last cycles. `load` [N] is the load of the patch or point, or its mean. Over grooves
+    the window of a rig has the vertical force.
     """
     if model.rig is None:
         rows = slice(window.first, None)
@@ -307,7 +298,8 @@ def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
     else:
         rows = _is_in_last_cycle(model, window)
         loads = window.extra.get("normal_load", np.full(window.time.size, load))
-    return _Cycle(window.slide[rows], window.slip[rows], window.force[rows], loads[rows])
+    slip, force, loads = (row[rows, None] for row in (window.slip, window.force, loads))
+    return _Cycle(window.slide[rows], slip, force, loads, np.array([load]))
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
@@ -316,96 +308,72 @@ def _is_in_last_cycle(model, window) -> np.ndarray:
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
-def _make_point_slip(
-    model, motion: _Cycle | _NodeFrames, slip, friction, pressure, normal
-) -> _PointSlip:
-    """Return the slip of points with the traction that wears them.
+def _make_point_slip(model, cycle: _Cycle) -> _PointSlip:
+    """Return the slip of the points of a cycle with the traction that wears them.
 
     On flat faces it is the normal traction V, or with form 'energy' |F| of the friction traction F, which opposes the
     slip also in a step with a reversal. On a flank of slope t = dz/dq with the path ds, it is R ds/dq = V + F t of the
     normal traction R on the flank. With form 'energy' it is |f| ds/dq = |F - V t| of the friction f along the flank.
-
-    Parameters
-    ----------
-    model : Model
-        Model with [wear].
-    motion : _Cycle or _NodeFrames
-        Motion of the whole interface.
-    slip : (k, p) ndarray
-        Slip of the points [m].
-    friction, normal : (k, p) ndarray
-        Horizontal and vertical tractions [Pa], or forces [N].
-    pressure : (p,) ndarray
-        Traction or force to which they are related. An open point, with 0, does not wear.
+    `model` has [wear], and grooves or not.
     """
-    slope = 0.0 if model.grooves is None else model.grooves.slope(motion.slide)[:, None]
+    slope = 0.0 if model.grooves is None else model.grooves.slope(cycle.slide)[:, None]
     if model.wear.uses_friction_work:
-        traction = np.abs(friction - slope * normal)
+        traction = np.abs(cycle.friction - slope * cycle.normal)
     else:
-        traction = np.maximum(normal + slope * friction, 0.0)
-    weight = np.divide(traction, pressure, out=np.zeros(slip.shape), where=pressure > 0)
-    return _PointSlip(slip, weight, motion.is_closed)
+        traction = np.maximum(cycle.normal + slope * cycle.friction, 0.0)
+    weight = np.divide(
+        traction, cycle.reference, out=np.zeros(cycle.slip.shape), where=cycle.reference > 0
+    )
+    return _PointSlip(cycle.slip, weight, cycle.is_closed)
 
 
-def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, float]:
+def _integrate_uniform_slip(model, cycle: _Cycle) -> tuple[float, float]:
     """Return the path [m] of points that slip alike, and its relative error.
 
-    The samples of the histories contain every reversal. Only the slope of grooves varies between them. `model` has
-    friction and grooves, `cycle` the histories of the last cycle, and `load` [N] is the normal load to which the
-    tractions are related.
+    The samples of the histories contain every reversal. Only the slope of grooves and a load that oscillates vary between
+    them. `model` has friction, grooves and load, and `cycle` is that of the whole interface.
     """
-    slip, force, loads = (row[:, None] for row in (cycle.slip, cycle.force, cycle.load))
-    points = _make_point_slip(model, cycle, slip, force, np.array([load]), loads)
+    points = _make_point_slip(model, cycle)
     path = float(points.path[0])
-    if model.grooves is None or not path > 0:
+    if not path > 0 or (model.grooves is None and not model.load_varies):
         return path, 0.0
-    coarse = float(points.integrate_path(np.arange(0, len(slip), 2))[0])
+    coarse = float(points.integrate_path(np.arange(0, len(cycle.slip), 2))[0])
     return path, abs(path - coarse) / path
 
 
-def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
+def _integrate_strip_slip(model, patch, window, cycle: _Cycle) -> tuple[np.ndarray, float]:
     """Return the paths (s, m) [m] of the strips of a rig with yaw, and their relative error.
 
     The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact. `patch`
-    is in strips, and `window` has the histories of the last cycles with those of the strips.
+    is in strips, `window` has the histories of the last cycles with those of the strips, and `cycle` is that of the
+    whole interface.
     """
     loads = patch.strips.force.sum(axis=1)
     is_last = _is_in_last_cycle(model, window)
     slips = window.extra.get("slips", window.extra["slides"])[is_last]
     forces = window.extra["forces"][is_last]
-    cycle = _select_last_cycle(model, window, patch.pressure.load)
-    points = _make_point_slip(model, cycle, slips, forces, loads, loads)
+    strips = _Cycle(cycle.slide, slips, forces, loads[None], loads)
+    points = _make_point_slip(model, strips)
     path = points.path[_find_nearest_contact(patch.strips.offsets, loads > 0)]
     path = np.repeat(path[:, None], patch.x.size, axis=1)
     return path, points.estimate_reversal_error(loads)
 
 
-def _integrate_node_slip(model, patch, frames: _NodeFrames) -> tuple[np.ndarray, float]:
-    """Return the paths (m,) [m] of the nodes from frames of a cycle, and their relative error.
+def _integrate_node_slip(model, patch, nodes: _Cycle) -> tuple[np.ndarray, float]:
+    """Return the paths (m,) [m] of the nodes of a patch in a cycle, and their relative error.
 
-    Each node carries its part of the vertical force, V sigma/N. Over grooves a node slips along the flank by s - e, the
-    path s of the holder less the elastic part e, and the tractions are those per length of the flank. An open node has
-    the path of the nearest node in contact.
-
-    Parameters
-    ----------
-    model : Model
-        Model with [wear].
-    patch : Patch
-        Patch at the present wear, whose pressure distributes the load.
-    frames : _NodeFrames
-        Slip and shear stress of the nodes along the cycle.
+    Over grooves a node slips along the flank by s - e, the path s of the holder less the elastic part e, and the
+    tractions are those per length of the flank. An open node has the path of the nearest node in contact.
     """
     sigma = patch.pressure.sigma_n
-    normal = np.outer(frames.load / patch.pressure.load, sigma)
-    points = _make_point_slip(model, frames, frames.slip, frames.shear_stress, sigma, normal)
+    points = _make_point_slip(model, nodes)
     grooves = model.grooves
     if grooves is not None:
         # ds/dq, the path along the flank by the relative displacement.
-        path_ratio = np.sqrt(1 + grooves.slope(frames.slide)[:, None] ** 2)
-        steps = integrate_steps(frames.slide, lambda q: np.hypot(1, grooves.slope(q)))
+        path_ratio = np.sqrt(1 + grooves.slope(nodes.slide)[:, None] ** 2)
+        steps = integrate_steps(nodes.slide, lambda q: np.hypot(1, grooves.slope(q)))
         along_flank = np.append(0.0, np.cumsum(steps))[:, None]
-        elastic = frames.slide[:, None] - frames.slip
+        elastic = nodes.slide[:, None] - nodes.slip
         points = _PointSlip(
             along_flank - elastic * path_ratio, points.weight / path_ratio, points.is_closed
         )

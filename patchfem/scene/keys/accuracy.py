@@ -19,8 +19,8 @@ class Accuracy(Table):
     ) = 1e-3
     max_seconds: optional(
         number(gt=0),
-        "CPU time [s] in which a run may be repeated with finer meshes, or a bench with more steps, until its main measures "
-        "meet the tolerance; default: 60",
+        "CPU time [s] in which a run may be repeated with finer meshes or smaller time steps until its main measures meet "
+        "the tolerance; default: 60",
     )
     method: key(
         Literal["auto", "exact", "march", "harmonic"],

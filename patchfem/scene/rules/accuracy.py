@@ -88,7 +88,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
         if draft.tables.accuracy.max_seconds is not None and not _is_repeated(draft, kind):
             draft.add_remark(
                 "accuracy.max_seconds",
-                "is not used, because this run is never repeated with a finer mesh or more steps",
+                "is not used, because this run is never repeated with a finer mesh or smaller steps",
             )
 
 
@@ -120,6 +120,10 @@ def list_repeated_axes(
 def _is_repeated(draft: SceneDraft, kind: str) -> bool:
     """Return whether a run of the draft, of this kind of scene, that misses its tolerance may be repeated."""
     tables = draft.tables
+    # The steps of a rig are refined unless they are fixed. Other engines than the march solve a linear rig exactly.
+    methods = {"rig": ("auto", "march"), "linear": ("march",)}.get(kind, ())
+    if (tables.accuracy.method or "auto") in methods and not tables.accuracy.steps_per_cycle:
+        return True
     patches = [patch for _, patch in iterate_patches(draft)]
     axes = list_repeated_axes(
         kind,

@@ -25,10 +25,11 @@ TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is wor
 
 
 def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
-    """Find tops that wear touched first, of any width, or on all of the surface.
+    """Find the worn tops of a surface: single ones of any width, and tops that wear lowered slightly on all of it.
 
-    Filled valleys are the control: an error of interpolation raises valleys and lowers tops of either surface alike, and a
-    drift is too slow for both.
+    Single tops count as worn if there are clearly more of them than of filled valleys. These are the control, because wear
+    fills no valley, but an error of interpolation between the samples lowers tops and raises valleys alike, and a drift of
+    the instrument is too slow for both.
 
     Parameters
     ----------
@@ -42,10 +43,12 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     Returns
     -------
     array
-        Mask of the same shape.
+        Mask of the same shape: which heights belong to worn tops.
     """
     height = remove_long_waves(height)
     is_high = height > np.median(height)
+
+    # Single tops and valleys whose depth is beyond the largest one that noise alone reaches. The opening removes spikes.
     limit = compute_threshold(len(WINDOW_SIDES[height.ndim]) * height.size)
     square = np.ones((TOP_SIDE,) * height.ndim)
     worn = ndimage.binary_opening((relative > limit) & is_high, square)
@@ -53,6 +56,7 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     if ndimage.label(worn)[1] < max(MIN_TOPS, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
         worn[:] = False
 
+    # Slight wear of all tops shows in the medians of classes of heights.
     known = np.flatnonzero(relative)
     is_lowered = _find_lowered_tops(relative.flat[known], height.flat[known], max_gain_change)
     worn.flat[known[is_lowered]] = True

@@ -112,7 +112,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     middle = (span[0] + span[1]) // 2
     count = relative.size
 
-    # Each end is sought in the direction from outside to the middle.
+    # Each end is sought in the direction from outside to the middle: positions, relative depths and which heights are tops
+    # in this direction, the first worn sample, the sample after the middle, and the tops that are not worn.
     tops = find_tops(depths)
     unworn = tops.places[tops.depths < MAX_UNWORN_TOP]
     sides = (
@@ -129,13 +130,19 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     ends = []
     for x, values, is_high, worn, stop, places in sides:
         end = _find_change_point(x[:stop], values[:stop], worn, depths)
+
+        # The track has begun where the depth is beyond that of unworn heights, and not yet at the last few unworn tops
+        # before this place.
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
         beyond = np.sort(places[places < deep])[-MIN_UNWORN_TOPS:]
         farthest = int(beyond[0]) if beyond.size else 0
-        # Where only tops are worn, the end lies between the outermost worn one and those beyond it that are not worn.
+
+        # Where only tops are worn, the end lies between the outermost worn one and those beyond it that are not worn. As
+        # much of the track as lies before it shows whether its valleys are unworn.
         inside = slice(deep, 2 * deep - farthest)
         if not _has_unworn_valleys(values[inside], is_high[inside]):
             farthest = deep
+
         value = min(end.value, float(x[deep]))
         low = min(end.low, float(x[farthest]))
         ends.append(End(value, low, max(end.high, float(x[deep]))))
@@ -227,15 +234,20 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
     (levels, forms, m) array
         Deviance of the best flank of each form.
     """
+    # Distances (m, n) from the beginning of each flank to the middle, 0 outside.
     distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
     is_inside = distance > 0
     deviance = np.empty((len(depths), len(FLANK_POWERS), places.size))
     for form, powers in enumerate(FLANK_POWERS):
+        # Least squares for all places and levels at once: a form is a sum of powers of the distance. Places with too few
+        # samples inside have a singular normal matrix, which the small multiple of the unit matrix makes regular.
         base = is_inside[..., None] * distance[..., None] ** np.array(powers)
         normal = np.einsum("mni,mnj->mij", base, base)
         normal += 1e-12 * np.eye(len(powers)) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
+
+        # A large residual counts as MAX_SQUARED_RESIDUAL, so that single outliers do not decide.
         residual = depths.T - fitted
         deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_RESIDUAL).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.

@@ -8,11 +8,11 @@ import io
 import numpy as np
 
 from ...core import PatchfemError
-from ...inputs.damage import refuse_damage
+from ...inputs.damage import refuse_damage, shorten
 from ...inputs.matlab import read_real_arrays
 from .content import DAMAGED, Content
 from .table import Table
-from .units import HEADER_EXAMPLE, shorten
+from .units import HEADER_EXAMPLE
 
 MIN_MATRIX_ROWS = (
     8  # smallest number of rows of a matrix in a .mat file that may be a table of columns

@@ -12,10 +12,11 @@ from math import prod
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ...inputs.damage import shorten
 from ...inputs.packed import count_zip_bytes, refuse_large_content
 from .content import Content
 from .table import Table, refuse_many_heights
-from .units import HEADER_EXAMPLE, shorten
+from .units import HEADER_EXAMPLE
 
 
 def read_instrument(content: Content) -> Table:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
+from ...inputs.damage import shorten
 from ..areal import Areal
 from ..profile import Profile
 from .units import (
@@ -13,7 +14,6 @@ from .units import (
     HEADER_EXAMPLE,
     UNIT_LIST,
     parse_length_unit,
-    shorten,
 )
 
 MAX_HEIGHTS = 50_000_000  # largest number of heights

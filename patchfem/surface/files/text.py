@@ -17,6 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs.damage import shorten
 from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
 from .header import (
@@ -29,7 +30,7 @@ from .header import (
     split_cells,
 )
 from .table import Table
-from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
+from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 MAX_STEP_UNEVENNESS = 1e-6

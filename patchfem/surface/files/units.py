@@ -41,11 +41,3 @@ def parse_length_unit(word: str) -> float | None:
     """Return the factor to metres of a word such as um, µm, [mm] or Mikrometer, or None for others."""
     word = normalize_unit(word.strip("[]() "))
     return UNITS.get(word) or UNIT_WORDS.get(word.lower())
-
-
-def shorten(text, length: int = 40) -> str:
-    """Make a text from a file or a library printable and at most `length` characters long."""
-    text = " ".join(str(text).split())
-    if not text.isprintable():
-        text = text.encode("unicode_escape").decode()
-    return text if len(text) <= length else f"{text[: length - 3]}..."

@@ -58,7 +58,9 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
         )
     from scipy.optimize import least_squares
 
-    # The sine of the slope of a circle is linear along x, so a large radius is well conditioned.
+    # A circle is given by its level, the sine of its slope in the middle and its curvature, relative to half the length.
+    # This sine is linear along x, so that a large radius is well conditioned. The fit starts at the parabola
+    # c0 + c1 x + c2 x^2, whose curvature is 2 c2.
     size = surface.length / 2
     x = (surface.x - (surface.x[0] + surface.x[-1]) / 2) / size
     start = np.polyfit(x[known], surface.z[known] / size, 2)[::-1] * [1, 1, 2]

@@ -65,10 +65,11 @@ def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
     "text, wanted",
     [
         ("frequency=150", "unit"),
-        ("frequency=151 Hz", "this column are 143 Hz"),
-        ("frequency", "write column=value"),
+        ("frequency=151 Hz", "its values are 143 Hz$"),
+        ("frequency", "column=value,value is needed"),
         ("displacement=1 mil", "no column displacement"),
         ("input=4 Hz", "--hold input=4 Hz"),
+        ("flag=U,", "column=value,value is needed"),
     ],
 )
 def test_refuses_selection_without_rows(tmp_path, text, wanted):

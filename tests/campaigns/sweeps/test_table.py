@@ -61,7 +61,7 @@ def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
         ("outcome,loop_area\nsteady,1\n", ["the first line must be a header such as"]),
         (
             "contact.load,outcome,loop_area\n1 N,steady\n",
-            ["cases.csv:2: three cells are needed"],
+            ["cases.csv:2: the number of cells must be 3 ("],
         ),
         (
             "contact.load [lb]\n1\n2\n",
@@ -84,7 +84,7 @@ def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
         ),
         (
             "contact.load [N]\n1,2\n",
-            ["cases.csv:2: one cells are needed"],
+            ["cases.csv:2: the number of cells must be 1 ("],
         ),
         ("contact.load [N]\n", ["a header such as"]),
     ],

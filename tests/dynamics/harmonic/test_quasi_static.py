@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from modal_bases import make_modal_basis
+from modal_bases import make_shaken_modes
 
 from patchfem.core import PatchfemError
 from patchfem.dynamics import LawGroup
@@ -12,13 +12,7 @@ from patchfem.dynamics.harmonic import quasi_static
 from patchfem.dynamics.harmonic.laws import FlowLaw, Jenkins
 from patchfem.friction.laws import tanh
 
-
-def make_modes(omega, zeta, slide, output):
-    """Return a modal basis with modal mass 0.5."""
-    return make_modal_basis(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
-
-
-ONE = make_modes([700.0], [0.002], [1.0], [1.0])
+ONE = make_shaken_modes([700.0], [0.002], [1.0], [1.0])
 STIFF, LIMIT = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
 
 
@@ -63,7 +57,7 @@ def test_exact_amplitude_without_equilibrium_gives_nan():
 def test_exact_two_modes_satisfy_secant_eigenproblem():
     """The motion of two modes satisfies the eigenvalue problem with the secant stiffness within
     1e-9, and tends to the free mode at large amplitudes."""
-    modes = make_modes([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
+    modes = make_shaken_modes([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
     group = LawGroup(modes, Jenkins(STIFF, LIMIT))
     amplitudes = [3e-4, 3.0]
     motion, large_motion = quasi_static.find_static_motions(

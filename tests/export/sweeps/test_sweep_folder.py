@@ -1,6 +1,5 @@
 """The folder of a sweep: it survives damaged files, and computes only what is missing."""
 
-import csv
 import json
 import shutil
 
@@ -10,7 +9,7 @@ import xarray as xr
 from command_line import run_cli
 from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
-from sweep_tables import make_table
+from sweep_tables import make_table, read_rows
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
@@ -43,12 +42,6 @@ def assert_same_tables(folder, other) -> None:
     """Assert that the files of two sweeps are identical byte for byte."""
     for name in TABLES:
         assert (folder / name).read_bytes() == (other / name).read_bytes(), name
-
-
-def read_rows(folder) -> list[dict]:
-    """Return the rows of sweep.csv."""
-    with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_exact_chunks_are_small_netcdf_files(swept):

@@ -1,13 +1,17 @@
 """Answer and page of a sweep: sentences, quantities and charts agree with sweep.csv."""
 
 import csv
+import shutil
 
+import h5py
 import numpy as np
 import pytest
+import xarray as xr
 from command_line import run_cli
 from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
 
+import patchfem as pf
 from patchfem.export import store
 
 KINDS = {
@@ -47,6 +51,21 @@ def folders(tmp_path_factory):
     return found
 
 
+def read_menu(path) -> dict[str, list]:
+    """Return the traces of each choice of the menu of measures on a page."""
+    (figure,) = [
+        figure
+        for figure in read_figures(path.read_text("utf-8"))
+        if "updatemenus" in figure["layout"]
+        and figure["data"][0].get("mode", "").endswith("markers")
+    ]
+    choices = {}
+    for button in figure["layout"]["updatemenus"][0]["buttons"]:
+        shown = zip(figure["data"], button["args"][0]["visible"], strict=True)
+        choices[button["label"]] = [trace for trace, is_shown in shown if is_shown]
+    return choices
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_verdict_is_short(folders, kind):
     """The headline has at most 30 words, the verdict at most four sentences, and both are those of sweep.json."""
@@ -62,23 +81,11 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
     """The values that the menu of the page draws are those of sweep.csv for every measure, in single precision."""
     with open(folders[kind] / "sweep.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    text = (folders[kind] / "report.html").read_text("utf-8")
-    figures = read_figures(text)
-    (figure,) = [
-        figure
-        for figure in figures
-        if "updatemenus" in figure["layout"]
-        and figure["data"][0].get("mode", "").endswith("markers")
-    ]
-    buttons = figure["layout"]["updatemenus"][0]["buttons"]
     answer = store.read(folders[kind])
     n_checked = 0
-    for button in buttons:
-        name = button["label"].replace(" ", "_")
-        shown = zip(figure["data"], button["args"][0]["visible"], strict=True)
-        drawn = np.concatenate(
-            [np.asarray(trace["y"], float) for trace, is_shown in shown if is_shown]
-        )
+    for label, traces in read_menu(folders[kind] / "report.html").items():
+        name = label.replace(" ", "_")
+        drawn = np.concatenate([np.asarray(trace["y"], float) for trace in traces])
         cells = np.array([float(row[name] or "nan") for row in rows])
         values = answer.data[name].values.ravel()
         np.testing.assert_array_equal(np.sort(values), np.sort(cells))
@@ -107,3 +114,48 @@ def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     assert "How far the key may go" in text and "contact fraction" in text
     values = answer.data["pressure_peak"].values
     assert f"{values[-1] / 1e6:.4g} MPa" in answer.verdict[0]
+
+
+def test_exact_page_of_two_sweeps_shows_measures_of_each(folders, tmp_path):
+    """A measure is drawn for the sweeps that have values of it; one that sweeps a key of this name once ended in a fault."""
+    shutil.copytree(folders["random"], tmp_path / "random")
+    path = tmp_path / "random/sweep.nc"
+    with h5py.File(path, "r+") as file:
+        file["loop_area"][...] = np.nan
+    page = tmp_path / "both.html"
+    assert run_cli("report", tmp_path / "random", folders["one key"], "-o", page).code == 0
+
+    drawn = {name: [trace["name"] for trace in traces] for name, traces in read_menu(page).items()}
+    assert drawn["relative displacement amplitude"] == ["random", "one_key"]
+    assert drawn["normal load"] == drawn["loop area"] == ["one_key"]
+    with (
+        xr.open_dataset(path) as data,
+        pytest.raises(pf.PatchfemError, match="no measure 'loop_area'"),
+    ):
+        pf.plot.sweep(data, "loop_area")
+
+
+def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):
+    """A sweep of a single case says that this case settled; once the sentence began with "All 1 cases"."""
+    scene = folders["one key"].parent / "rig.toml"
+    out = tmp_path / "out"
+    assert run_cli("sweep", scene, "--over", "friction.static=0.35", "-o", out).code == 0
+    assert store.read(out).verdict == (
+        "Only one case has a result, so that no change is known.",
+        "The only case settled and meets the tolerance.",
+    )
+
+
+def test_exact_plot_of_a_selected_value_is_its_line(folders):
+    """The plot of a sweep of two keys at a value of one key has the values there; it once ended in a fault."""
+    with xr.open_dataset(folders["two keys"] / "sweep.nc") as data:
+        line = data.isel(drive_acceleration=1)
+        drawn = pf.plot.sweep(line, "loop_area").get_lines()[0]
+        expected = (
+            line.friction_static.values,
+            line.loop_area.values / line.loop_area.values.max(),
+        )
+        np.testing.assert_allclose(drawn.get_xdata(), expected[0])
+        np.testing.assert_allclose(drawn.get_ydata() / drawn.get_ydata().max(), expected[1])
+        with pytest.raises(pf.PatchfemError, match="a single case"):
+            pf.plot.sweep(line.isel(friction_static=0), "loop_area")

@@ -5,7 +5,7 @@ Lengths are in bond lengths eps_0, forces in mu_s N.
 
 import numpy as np
 import pytest
-from friction_forms import reversal_force, virgin_force
+from friction_forms import virgin_force
 from friction_paths import (
     LowerPressure,
     PathHistory,
@@ -17,7 +17,6 @@ from friction_paths import (
     triangle_path,
     upper_pressure,
 )
-from scipy.special import gammainc
 
 from patchfem.friction import Bonds
 
@@ -134,25 +133,6 @@ def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, exp
             assert force == pytest.approx(
                 virgin_force(path, 1.0, order, initial)[1:], abs=tolerance
             )
-
-
-@pytest.mark.parametrize("order, reading", [(0, "report"), (1, "stretch")])
-def test_exact_reversal_force_after_long_sliding(order, reading):
-    """The force after a reversal from steady sliding agrees with the closed form."""
-    back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
-    path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
-    law = Bonds(1.0, 1.0, order, reading, initial=float(reading == "stretch"))
-    force = march_bonds(law, path, UNIT_PRESSURE, tail=0.0).traction[-5:, 0]
-    assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=3e-8)
-
-
-@pytest.mark.parametrize("order, tolerance", [(-0.9, 1e-4), (0.5, 5e-8)])
-def test_exact_fractional_order_bonds_grown_at_rest(order, tolerance):
-    """The force of bonds that reached their full length at rest is the incomplete gamma function P(p + 1, R/eps_0)."""
-    law = Bonds(1.0, 1.0, order, "report", initial=0.0, **YOUNG | {"rest_growth": 1.0})
-    path = np.append(np.linspace(0, 0.2, 11), 0.2)
-    force = march_bonds(law, path, UNIT_PRESSURE, np.append(np.full(10, 0.4), 1e4), 0.0)
-    assert force.traction[-1, 0] == pytest.approx(gammainc(order + 1, 0.2), abs=tolerance)
 
 
 @pytest.mark.parametrize("order, options", [(0, (0.0, 0.0)), (1, (1e-9, 0.01))])

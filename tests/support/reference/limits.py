@@ -48,8 +48,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
-    "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion from event to event, with "
-    "method `exact` or by engine `hybrid` [s]",
+    "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
+    "100 in each cycle",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
     "points.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "

@@ -13,6 +13,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from torture.driver import CAMPAIGNS, run_trial
+from torture.trial import TrialFailure
 
 
 def main() -> int:
@@ -30,7 +31,7 @@ def main() -> int:
             for index in range(count) if options.only is None else [options.only]:
                 try:
                     run_trial(name, options.seed, index, Path(folder))
-                except Exception:
+                except (Exception, TrialFailure):
                     faults += 1
                     traceback.print_exc(limit=-3)
                     print(f"{name} {index}: --campaign {name} --seed {options.seed} --only {index}")

@@ -6,6 +6,7 @@ import re
 import signal
 from contextlib import contextmanager
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 from command_line import CommandResult, run_cli
@@ -19,8 +20,8 @@ RAW = re.compile(
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 
 
-class TrialFailure(Exception):
-    """Raised if the program does something that it must never do."""
+class TrialFailure(BaseException):
+    """Raised if the program does something that it must never do; the program itself must not catch it."""
 
 
 class Trial:
@@ -64,13 +65,18 @@ class Trial:
 
 @contextmanager
 def limit_time(seconds: float):
-    """Raise TrialFailure if the block takes longer than some seconds of elapsed time."""
+    """Raise TrialFailure if the block takes longer than some seconds of CPU time, or waits as long without any."""
+    begin = last = process_time()
 
     def stop(*_):
-        raise TrialFailure(f"no end after {seconds:.0f} s")
+        nonlocal last
+        now = process_time()
+        if now - begin > 0.9 * seconds or now - last < 0.01 * seconds:
+            raise TrialFailure(f"no end after {seconds:.0f} s")
+        last = now
 
     before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
     try:
         yield
     finally:

@@ -10,30 +10,15 @@ import numpy as np
 import pytest
 import surfaces as write
 from scipy.io import savemat
+from surfaces import assert_scan_equal, read_content
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, read_surface
-from patchfem.surface.areal import Areal
 
 Z = write.draw_scan()
 HOLES = np.where(np.arange(24).reshape(4, 6) % 5 == 2, np.nan, Z)
 STEPS = (0.5e-6, 0.75e-6)
 UM = ("um", "um")
-
-
-def read_bytes(tmp_path, data: bytes, name, units=None):
-    """Write the bytes to a file and return the surface that it contains."""
-    (tmp_path / name).write_bytes(data)
-    return read_surface(tmp_path / name, units)
-
-
-def assert_scan_equal(found, z, tolerance=0.0, steps=STEPS) -> None:
-    """Assert that a surface is a scan with the given heights and steps, within a tolerance."""
-    assert isinstance(found, Areal) and found.z.shape == z.shape
-    assert found.z == pytest.approx(z, abs=tolerance, rel=0, nan_ok=True)
-    assert found.x == pytest.approx(np.arange(z.shape[1]) * steps[0], rel=1e-15, abs=1e-22)
-    assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-15, abs=1e-22)
-    assert not found.z.flags.writeable
 
 
 TRACE = np.column_stack([np.arange(24) * 0.5, Z.ravel() * 1e6])
@@ -72,7 +57,7 @@ SCANS = {
 @pytest.mark.parametrize("data, name, units, z, tolerance", SCANS.values(), ids=SCANS)
 def test_exact_scan_in_each_format_agrees(tmp_path, data, name, units, z, tolerance):
     """A scan in each variant of the formats gives the written heights within its resolution."""
-    assert_scan_equal(read_bytes(tmp_path, data, name, units), z, tolerance)
+    assert_scan_equal(read_content(tmp_path, data, name, units), STEPS, z, 0.0, tolerance)
 
 
 @pytest.mark.parametrize("kind, increment, tolerance", [("D", 1.0, 0.0), ("I", 2e-10, 1.01e-10)])
@@ -80,8 +65,8 @@ def test_exact_x3p_of_reader_library_agrees(tmp_path, kind, increment, tolerance
     """An X3P file gives the heights, steps and missing points that were written, in metres."""
     pytest.importorskip("SurfaceTopography")
     for z in (Z, HOLES):
-        found = read_bytes(tmp_path, write.heights_to_x3p(z, kind, increment), "a.x3p", UM)
-        assert_scan_equal(found, z, tolerance)
+        found = read_content(tmp_path, write.heights_to_x3p(z, kind, increment), "a.x3p", UM)
+        assert_scan_equal(found, STEPS, z, 0.0, tolerance)
         assert (
             "read as X3P" in found.notes[0] and "units that you gave are ignored" in found.notes[1]
         )
@@ -143,7 +128,7 @@ REFUSED = {  # bytes, file name, given units, and the expected message
 def test_refuses_faulty_file(tmp_path, data, name, units, message):
     """A faulty file is refused with a message that states the fault."""
     with pytest.raises(PatchfemError, match=message):
-        read_bytes(tmp_path, data, name, units)
+        read_content(tmp_path, data, name, units)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +136,7 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
 )
 def test_exact_npy_columns_give_trace(tmp_path, table):
     """The two columns of a .npy file give a trace, for all orders and types of its array."""
-    found = read_bytes(tmp_path, write.make_npy(table), "scan.npy", UM)
+    found = read_content(tmp_path, write.make_npy(table), "scan.npy", UM)
     assert isinstance(found, Profile) and found.x == pytest.approx(TRACE[:, 0] * 1e-6)
     assert found.z == pytest.approx(Z.ravel(), rel=1e-6 if table.dtype == "f4" else 1e-14)
 
@@ -159,18 +144,18 @@ def test_exact_npy_columns_give_trace(tmp_path, table):
 def test_exact_dektak_export_agrees(tmp_path):
     """A Dektak export gives the heights and the exact step of 50 um over 320 points, although it prints rounded x."""
     z = np.random.default_rng(1).normal(size=320)
-    found = read_bytes(tmp_path, write.make_dektak(z), "scan.csv")
+    found = read_content(tmp_path, write.make_dektak(z), "scan.csv")
     assert found.x == pytest.approx(np.arange(320) * 0.15625e-6, rel=1e-14)
     assert found.z == pytest.approx(np.round(z, 5) * 1e-6, rel=1e-14)
     assert np.array_equal(
-        read_bytes(tmp_path, write.make_dektak(z, results=False), "scan.csv").z, found.z
+        read_content(tmp_path, write.make_dektak(z, results=False), "scan.csv").z, found.z
     )
-    utf16_trace = read_bytes(
+    utf16_trace = read_content(
         tmp_path, write.make_dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
     )
     assert np.array_equal(utf16_trace.z, found.z)
     in_angstrom = write.make_dektak(z).replace(b"Raw Micrometer", b"Raw A")
-    assert read_bytes(tmp_path, in_angstrom, "scan.csv").z == pytest.approx(found.z * 1e-4)
+    assert read_content(tmp_path, in_angstrom, "scan.csv").z == pytest.approx(found.z * 1e-4)
 
 
 class StandIn:
@@ -214,14 +199,14 @@ def test_exact_scan_of_reader_library(tmp_path, monkeypatch, packed):
     data = b"\x00\x01\x02" * 99
     name = "scan.opdx.gz" if packed else "scan.opdx"
     use_library(monkeypatch, lambda file: StandIn("um" if packed or file else ""))
-    found = read_bytes(tmp_path, gzip.compress(data) if packed else data, name)
+    found = read_content(tmp_path, gzip.compress(data) if packed else data, name)
     assert found.z == pytest.approx(np.array([[7e-9, 0.0, 0.0], [1e-6, 1e-6, 2e-6]]), rel=1e-14)
     assert found.x == pytest.approx([0, 1e-6, 2e-6]) and found.y == pytest.approx([0, 1e-6])
     assert found.notes == (f"{tmp_path / name}: read as StandIn by SurfaceTopography 1.2",)
     use_library(monkeypatch, lambda file: StandIn(None))
     with pytest.raises(PatchfemError, match="the unit of x is not given"):
-        read_bytes(tmp_path, data, "scan.opdx")
-    assert read_bytes(tmp_path, data, "scan.opdx", ("mm", "m")).x[1] == 1e-3
+        read_content(tmp_path, data, "scan.opdx")
+    assert read_content(tmp_path, data, "scan.opdx", ("mm", "m")).x[1] == 1e-3
 
 
 class LargeStandIn(StandIn):
@@ -237,7 +222,7 @@ def test_refuses_scan_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
     with pytest.raises(
         PatchfemError, match=r"scan.opdx: 200000000 heights, more than 5e\+07; export a part"
     ):
-        read_bytes(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
+        read_content(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
 
     path = tmp_path / "a.x3p"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -250,7 +235,7 @@ def test_refuses_scan_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
         (2000).to_bytes(4, "little"), (2**31).to_bytes(4, "little")
     )
     with pytest.raises(PatchfemError, match=r"b.x3p: more than 1024 MiB after it is unpacked; exp"):
-        read_bytes(tmp_path, data, "b.x3p")
+        read_content(tmp_path, data, "b.x3p")
 
 
 def test_exact_mat_files_of_scipy_agree(tmp_path):

@@ -6,10 +6,10 @@ refused with a remedy is read after the remedy is applied.
 
 import numpy as np
 import pytest
+from surfaces import assert_scan_equal, read_content
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Profile, read_surface
-from patchfem.surface.areal import Areal
+from patchfem.surface import Profile
 from patchfem.surface.files.content import fetch
 from patchfem.surface.files.instruments import read_instrument
 from patchfem.surface.files.table import make_surface
@@ -17,19 +17,6 @@ from patchfem.surface.files.table import make_surface
 Z = np.arange(1.0, 13.0).reshape(3, 4)
 ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"
 LONG_ROWS = np.random.default_rng(3).normal(size=(4, 300))
-
-
-def read_text(tmp_path, text, units=None, name="scan.txt", encoding="utf-8"):
-    """Write the text to a file and return the surface that it contains."""
-    (tmp_path / name).write_text(text, encoding=encoding)
-    return read_surface(tmp_path / name, units)
-
-
-def assert_scan_equal(found, steps, z) -> None:
-    """Assert that a surface is a scan with the given steps and heights."""
-    assert isinstance(found, Areal) and found.z == pytest.approx(z, rel=1e-14, nan_ok=True)
-    assert found.x == pytest.approx(np.arange(z.shape[1]) * steps[0], rel=1e-14)
-    assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -43,12 +30,12 @@ def assert_scan_equal(found, steps, z) -> None:
 def test_exact_gwyddion_text(tmp_path, rows, encoding):
     """A Gwyddion text gives the same scan for all encodings, separators and decimal signs of its heights."""
     text = f"# Channel: Topo\n# Width: 4.000 µm\n# Height: 6.000 µm\n# Value units: nm\n{rows}"
-    found = read_text(tmp_path, text, encoding=encoding)
+    found = read_content(tmp_path, text, encoding=encoding)
     assert_scan_equal(found, (1e-6, 2e-6), Z * 1e-9)
     assert found.notes == ()
     with_comma = text.replace("\n1", "\n1,5", 1)
     assert_scan_equal(
-        read_text(tmp_path, with_comma, encoding=encoding),
+        read_content(tmp_path, with_comma, encoding=encoding),
         (1e-6, 2e-6),
         np.where(Z == 1, 1.5, Z) * 1e-9,
     )
@@ -61,9 +48,9 @@ def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
     rows = ["\t".join(repr(float(height)) for height in row) for row in z]
     for placeholder in ("nan", "Bad", "***", ""):
         text = header + "\n".join(rows).replace("nan", placeholder) + "\n"
-        assert_scan_equal(read_text(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
+        assert_scan_equal(read_content(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
     assert_scan_equal(
-        read_text(tmp_path, header + "\n".join(rows).replace("\t", ";").replace(".", ",")),
+        read_content(tmp_path, header + "\n".join(rows).replace("\t", ";").replace(".", ",")),
         (1e-6, 2e-6),
         z * 1e-6,
     )
@@ -72,7 +59,7 @@ def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
 def test_exact_sizes_agree_with_surface_topography(tmp_path):
     """A matrix below its sizes gives the same scan as SurfaceTopography within 1e-12."""
     pytest.importorskip("SurfaceTopography")
-    ours = read_text(tmp_path, "# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n" + ROWS)
+    ours = read_content(tmp_path, "# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n" + ROWS)
     theirs = make_surface(read_instrument(fetch(tmp_path / "scan.txt")))
     for name in ("x", "y", "z"):
         assert getattr(ours, name) == pytest.approx(getattr(theirs, name), rel=1e-12)
@@ -108,21 +95,21 @@ TRACES = {
 @pytest.mark.parametrize("text, units", TRACES.values(), ids=TRACES)
 def test_exact_traces_with_units_in_any_place(tmp_path, text, units, encoding):
     """A trace has the same numbers wherever the header gives its units, in UTF-8 and UTF-16."""
-    found = read_text(tmp_path, text, units, encoding=encoding)
+    found = read_content(tmp_path, text, units=units, encoding=encoding)
     assert isinstance(found, Profile) and found.x == pytest.approx(X * 1e-3, rel=1e-15)
     assert found.z == pytest.approx(H * 1e-6, rel=1e-15)
 
 
 def test_exact_given_units_override_header_with_note(tmp_path):
     """Units that are given override those of the header, and a note states each difference."""
-    found = read_text(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
+    found = read_content(tmp_path, f"x [um]\tz [um]\n{PAIRS}", units=("mm", "um"))
     assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
     path = tmp_path / "scan.txt"
     assert found.notes == (
         f"{path}:1: the header gives x in um, but mm is used, as given by --units",
     )
-    scan = read_text(
-        tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um")
+    scan = read_content(
+        tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", units=("mm", "um")
     )
     assert_scan_equal(scan, (1e-3, 1e-3), Z * 1e-6)
     assert scan.notes == (
@@ -130,7 +117,7 @@ def test_exact_given_units_override_header_with_note(tmp_path):
         f"{path}: the header gives y in um, but mm is used, as given by --units",
         f"{path}: the header gives z in V, but um is used, as given by --units",
     )
-    unknown_columns = read_text(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
+    unknown_columns = read_content(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", units=("mm", "um"))
     assert unknown_columns.notes == (
         f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",
     )
@@ -256,7 +243,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
 def test_refuses_faulty_text_with_valid_remedy(tmp_path, faulty, message, corrected, units):
     """A faulty text is refused with a remedy, and is read after the remedy is applied."""
     with pytest.raises(PatchfemError) as caught:
-        read_text(tmp_path, faulty)
+        read_content(tmp_path, faulty)
     assert message in str(caught.value) and str(tmp_path / "scan.txt") in str(caught.value)
-    found = read_text(tmp_path, corrected, units)
+    found = read_content(tmp_path, corrected, units=units)
     assert np.isfinite(found.z).sum() >= 3
