@@ -521,7 +521,6 @@ REMEDIES = {  # advice by name, for two effects that cannot be combined
     "out": "leave out this entry",
     "linear": "use 'linear'",
     "march": "use 'march'",
-    "march or stiff": "use 'march', or law 'elastic-plastic' with a short bond_length",
     "stiff": "use law 'elastic-plastic' with a short bond_length, which approximates Coulomb friction",
 }
 

@@ -21,7 +21,6 @@ SHEAR_NODE_BYTES = 24.0  # per shear mode and interface node [bytes]
 SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
 MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
-HARMONIC_PAIR_BYTES = 94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
 HYBRID_SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
@@ -102,7 +101,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
 
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
-    """Return the contributions of modes, drive, histories and harmonic balance of a rig; a list of bonds is limited.
+    """Return the contributions of modes, drive and histories of a rig; a list of bonds is limited.
 
     `has_steps` tells whether the scene sets the steps per cycle.
     """
@@ -118,9 +117,7 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
         MemoryPart(DRIVE_ROW_BYTES * n_rows, f"{n_rows} rows of the drive", shorter),
     ]
     if engines.ENGINES[plan.engine].finds_periodic_motion:
-        harmonics = model.accuracy.harmonics or 0
-        size = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, n_interfaces)) ** 2
-        return [*parts, MemoryPart(size, f"{harmonics} harmonics", "lower accuracy.harmonics")]
+        return parts
 
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = numerics.choose_numerics(model)

@@ -16,8 +16,6 @@ UNBOUNDED_SETTINGS = (
     "drive.acceleration=30 g",
     "--set",
     "accuracy.method=harmonic",
-    "--set",
-    "accuracy.harmonics=5",
 )
 
 

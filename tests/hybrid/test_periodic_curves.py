@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from harmonic_cases import make_elements, make_five_modes, march_exactly
 from hybrid_cases import make_modes
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
@@ -221,6 +222,37 @@ def test_exact_multipliers_of_bonds_agree_with_dop853():
     exact = exact[np.argsort(-np.abs(exact))]
     found = motion.multipliers[np.argsort(-np.abs(motion.multipliers))]
     assert np.abs(found[:2]) == pytest.approx(np.abs(exact[:2]), abs=1e-4)
+
+
+def test_exact_multipliers_of_many_elements_agree_with_perturbed_march():
+    """For five modes and eight elements, all of which slip in a cycle, the multipliers agree with those of differences of a
+    march over a period within 6e-3; the stretches of the elements at its start leave no trace."""
+    modes = make_five_modes()
+    k, w = make_elements(8)
+    drive = SineDrive(1.5, 0.8)
+    motion = find_periodic_motion(make_case(modes, [masing.from_elements(k, w)], drive))
+
+    def march_period(state):
+        """Return modes, rates and stretches of the elements after a period of 800 steps."""
+        rows = march_exactly(modes, drive, k, w, state[:10], state[10:], 800)[0]
+        stretch = state[10:]
+        for change in np.diff(rows[:, :5] @ modes.slide):
+            stretch = np.clip(stretch + change, -w, w)
+        return np.concatenate([rows[-1], stretch])
+
+    # The modes of the motion, with the stretches that repeat
+    start = np.append(motion.run.case.y[:10], np.zeros(8))
+    for _ in range(3):
+        start[10:] = march_period(start)[10:]
+    assert march_period(start) == pytest.approx(start, abs=1e-4)
+    columns = [
+        (march_period(start + step) - march_period(start - step)) / 2e-5
+        for step in 1e-5 * np.eye(start.size)
+    ]
+    exact = np.sort(np.abs(np.linalg.eigvals(np.array(columns).T)))[::-1]
+    found = np.sort(np.abs(motion.multipliers))[::-1]
+    assert found[:10] == pytest.approx(exact[:10], abs=6e-3)
+    assert exact[9] > 0.2 and exact[10] < 1e-6
 
 
 @pytest.mark.parametrize("speed", [0.1, 3e-3])

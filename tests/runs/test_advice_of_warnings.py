@@ -17,7 +17,7 @@ import patchfem
 from patchfem import run
 from patchfem.scene import choose_law, compose_scene
 
-# Random scenes with few steps, harmonics, elements or strips or a tight tolerance, whose warnings advise to set or to leave
+# Random scenes with few steps, elements or strips or a tight tolerance, whose warnings advise to set or to leave
 # out a key (drawn by `support/remedies.py` of version 1.11).
 WARNED = json.loads((Path(__file__).parent / "found/warned_scenes.json").read_text("utf-8"))
 ADVICE = re.compile(

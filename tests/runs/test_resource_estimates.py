@@ -40,7 +40,6 @@ def plan_text(text, *sets):
     [
         (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
         (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
-        (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
         (RIG, [MARCH, "drive.cycles=3e7"], "lower drive.cycles"),
         (POINT + COULOMB + STRUCTURE, ["drive.cycles=2e7"], "lower drive.cycles"),
         (

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from scene_runs import find_sentences
-from scene_texts import COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SWEEP
+from scene_texts import COULOMB, FORCED, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
 from patchfem.response.rows import AMPLITUDE
@@ -122,3 +122,27 @@ def test_exact_measures_of_bonds_agree_with_march():
         "equivalent_damping",
     ):
         assert steady[name].value == pytest.approx(march[name].value, rel=2e-3), name
+
+
+TANH = 'law = "tanh"\nreference_speed = "5 mm/s"\n'
+BOTH_SMOOTH = re.sub('law = "elastic-plastic"\n', TANH, re.sub("bond_length = .*\n", "", PAIR))
+COMBINED = {
+    "two interfaces": BOTH_SMOOTH + FORCED.replace("cycles = 25", "cycles = 300"),
+    "rigid law and spring": POINT
+    + COULOMB
+    + MODE
+    + '[structure.stiffening]\ncubic = "1.4e10 N/m^3"\n'
+    + SINE.format(100, 300).replace('"5 g"', '"20 g"'),
+}
+
+
+@pytest.mark.parametrize("name", COMBINED)
+def test_exact_motions_of_combined_laws_agree_with_march(name):
+    """Interfaces whose laws have no piecewise solution, and Coulomb friction beside a nonlinear spring, have the amplitude
+    of a march within the sum of the errors."""
+    found = [
+        pf.run(COMBINED[name], **{"accuracy.method": method}).measures[AMPLITUDE]
+        for method in ("harmonic", "march")
+    ]
+    assert abs(found[0].value - found[1].value) <= found[0].error + found[1].error
+    assert found[0].error < 1e-6 * found[0].value

@@ -2,6 +2,7 @@
 
 import numpy as np
 from modal_bases import make_modal_basis
+from scipy.linalg import expm
 
 from patchfem.dynamics.harmonic.laws import FlowLaw
 from patchfem.friction import Bonds, LuGre, points_element
@@ -43,3 +44,49 @@ def make_elements(count=100, total=6.0, limit=1.2):
     k = np.full(count, total / count)
     w = np.linspace(0.2, 1.8, count)
     return k, w * limit / (k @ w)
+
+
+def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
+    """Propagate the modes exactly under a force that is linear in each step, found by fixed-point iteration.
+
+    Returns rows (z, v) and forces.
+    """
+    n = modes.omega.size
+    m = modes.mass
+    w = drive.omega
+    a = np.zeros((2 * n + 4, 2 * n + 4))
+    a[:n, n : 2 * n] = np.eye(n)
+    a[n : 2 * n, :n] = -np.diag(modes.omega**2)
+    a[n : 2 * n, n : 2 * n] = -modes.damping_matrix
+    a[n : 2 * n, 2 * n] = -modes.base * drive.acceleration
+    a[n : 2 * n, 2 * n + 2] = -modes.slide / m
+    a[2 * n, 2 * n + 1] = w
+    a[2 * n + 1, 2 * n] = -w
+    a[2 * n + 2, 2 * n + 3] = 1.0
+    dt = drive.period / steps
+    e = expm(a * dt)[: 2 * n]
+    y = np.array(state, float)
+    force = stiffness @ stretch
+    rows = [y]
+    forces = [force]
+    # Displacement at the interface per change of the force over a step.
+    gain = modes.slide @ e[:n, 2 * n + 3] / dt
+    for i in range(steps * cycles):
+        s = np.array([np.sin(w * i * dt), np.cos(w * i * dt)])
+        q = modes.slide @ y[:n]
+        free = e[:, : 2 * n] @ y + e[:, 2 * n : 2 * n + 2] @ s + e[:, 2 * n + 2] * force
+        end = force
+        for _ in range(50):
+            new = np.clip(
+                stretch + modes.slide @ free[:n] + gain * (end - force) - q, -limit, limit
+            )
+            previous = end
+            end = stiffness @ new
+            if abs(end - previous) < 1e-14:
+                break
+        y = free + e[:, 2 * n + 3] * (end - force) / dt
+        stretch = new
+        force = end
+        rows.append(y)
+        forces.append(force)
+    return np.array(rows), np.array(forces)

@@ -292,13 +292,10 @@ def make_law(element: Element | None) -> Law:
         return FlowLaw(element)
     if form == "rigid":
         raise PatchfemError(
-            'accuracy.method: "harmonic" '
-            "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "
-            'solution from event to event, or friction.law = "elastic-plastic" with a short '
-            "friction.bond_length"
+            "harmonic balance cannot treat rigid friction, because the force of rigid friction jumps; use the exact "
+            'solution from event to event, or friction.law = "elastic-plastic" with a short friction.bond_length'
         )
     raise PatchfemError(
-        'accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
-        "friction.order = 1, a constant bond length and pieces that are rigid "
-        'in shear; use accuracy.method = "march"'
+        'harmonic balance can treat bonds only with friction.reading = "stretch", friction.order = 1, a constant bond '
+        "length and pieces that are rigid in shear; run the scene in time instead"
     )

@@ -348,6 +348,11 @@ def has_many_elements(law: LawNumbers) -> bool:
     return law.law == "masing" and law.numbers[4] > 1
 
 
+def has_power_law(law: LawNumbers) -> bool:
+    """Return whether the curve of first loading of a law is Segalman's, which is smooth."""
+    return law.law == "masing" and law.numbers[1] >= 0
+
+
 def from_keys(friction, load, speed):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 

@@ -315,7 +315,6 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
         used = "hybrid"
     reasons = {
         "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
-        "harmonics": "if the steady motion is found by the exact solution from event to event",
     }
     sentences = []
     for key in list_fixed_settings(model.accuracy):

@@ -17,7 +17,7 @@ from ....formatting import format_length, format_quantity
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.continuation import CurvePath, PathPoint, PathSettings
-from ....hybrid.laws import is_rigid
+from ....hybrid.laws import is_rigid, masing
 from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
 from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
@@ -83,6 +83,11 @@ class ShootingFinder:
         compiled.load("hybrid.engine_kernels", say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
+        # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
+        laws = [law for law, _ in self.joints.laws]
+        is_smooth = any(masing.has_power_law(law) for law in laws)
+        is_smooth &= all(law.law == "masing" for law in laws)
+        self.follows_curve = self.may_fold or (is_smooth and self._max_growth_rate < 0)
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
 
     def make_case(self, drive) -> cases.Case:
@@ -397,12 +402,12 @@ class ShootingFinder:
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, by continuation if it may have folds.
+        """Compute the response curve over frequency, by continuation if it may have folds or if the law is Iwan's.
 
         Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
         the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
         """
-        if self.may_fold:
+        if self.follows_curve:
             return self._follow_curve(drive)
 
         def sample(frequency, before):
@@ -439,13 +444,18 @@ class ShootingFinder:
         """Return a point of a response curve that has been followed."""
         signal = self.model.rig.drive.signal
         motion = point.equations.details
+        regime = "stable" if motion.is_stable else "unstable"
+        if not self.may_fold:
+            regime = self._name_regime(motion, is_stuck=False) + ", unstable" * (
+                not motion.is_stable
+            )
         values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
         values = {name: value for name, value in values.items() if np.isfinite(value)}
         return CurvePoint(
             drive=SineDrive(signal.acceleration, float(point.w[-1]), signal.moving),
             values=values,
             errors=estimate_point_errors(values, find_relative_error(motion)),
-            regime="stable" if motion.is_stable else "unstable",
+            regime=regime,
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=motion.is_stable,
             guess=point,
@@ -457,8 +467,8 @@ class ShootingFinder:
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
-        """Return the distance between two points of a response curve: its scaled arc length, or [rad/s] without folds."""
-        if self.may_fold:
+        """Return the distance between two points of a response curve: its scaled arc length, or [rad/s] if it is sampled."""
+        if self.follows_curve:
             return measure_distance(first.guess, second.guess, self._sweep_width())
         return abs(second.drive.omega - first.drive.omega)
 
@@ -474,7 +484,7 @@ class ShootingFinder:
         fraction : float
             Fraction of the distance between the points, from the first one.
         """
-        if self.may_fold:
+        if self.follows_curve:
             point = self._equations.find_between(
                 first.guess, second.guess, fraction, self._sweep_width()
             )
