@@ -10,8 +10,11 @@ import numpy as np
 
 from .. import compiled
 from .cases import Case, make_arrays
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
+from .laws import LAWS, masing
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State
 from .runs import Motion, run_case
+
+MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
@@ -20,6 +23,9 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after the first one that did not help, and twice as many after the next
 MAX_RELAXED = 200  # largest number of these cycles
+MAX_FORCE_RATIO = (
+    1.1  # largest force at a reversal point after a correction, relative to the friction limit
+)
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
 MAX_KINKED_CHANGE = 1e-6
@@ -205,21 +211,39 @@ class Shooting:
 
             # A correction that did not help is given up for some periods of the motion itself. They are many for an
             # interface that hardly slips, where the steps of a stuck one lead far away.
-            if change > best:
+            helps = change <= best
+            if helps:
+                # The derivatives of a correction that was nearly exact serve for the next one.
+                if best < np.inf and change > MAX_REMAINDER * best:
+                    self.map = None
+                best = change
+                advanced = self.state
+                self.correct(before)
+                if not self.is_possible():
+                    self.state = advanced
+                    helps = False
+            if not helps:
                 self.relax(n_relaxed)
                 n_relaxed = min(2 * n_relaxed, MAX_RELAXED)
                 self.map = None
                 best = np.inf
-                continue
-
-            # The derivatives of a correction that was nearly exact serve for the next one.
-            if best < np.inf and change > MAX_REMAINDER * best:
-                self.map = None
-            best = change
-            self.correct(before)
         if best < np.inf and change > MAX_REMAINDER * best:
             self.map = None
         return before, change
+
+    def is_possible(self) -> bool:
+        """Return whether no law of reversal points remembers forces beyond its friction limit.
+
+        With such forces a loop far away from the motion would repeat itself.
+        """
+        faces = self.case.rig.faces
+        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+            memory = self.state.memory[i]
+            forces = memory[Memory.STACK + 1 : Memory.STACK + 2 * int(memory[Memory.COUNT]) : 2]
+            limit = faces[i, Face.NUMBERS + masing.LIMIT]
+            if np.abs(forces).max(initial=0.0) > MAX_FORCE_RATIO * limit:
+                return False
+        return True
 
     def check(self, before: State, tolerance: float) -> tuple[np.ndarray, float]:
         """Follow a motion that was found for some periods.

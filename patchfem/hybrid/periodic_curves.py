@@ -21,8 +21,9 @@ from .continuation import (
     correct_point,
     follow_curve,
 )
-from .laws import LAWS, masing
+from .laws import masing
 from .periodic import (
+    MASING,
     MAX_CHANGE,
     MAX_KINKED_CHANGE,
     MAX_STABLE_MULTIPLIER,
@@ -35,8 +36,6 @@ from .periodic import (
 )
 from .records import Face, Memory, Probe, Setting, State
 from .runs import run_case
-
-MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 
 N_FIRST = 2  # periods in which the laws take the memory of the loop of a motion from another map
 

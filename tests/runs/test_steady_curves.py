@@ -146,3 +146,34 @@ def test_exact_motions_of_combined_laws_agree_with_march(name):
     ]
     assert abs(found[0].value - found[1].value) <= found[0].error + found[1].error
     assert found[0].error < 1e-6 * found[0].value
+
+
+IWAN_MODES = (
+    '[normal]\nload = "100 N"\n[structure]\nmoving_mass = "0.5 kg"\n'
+    + "".join(
+        f'[[structure.mode]]\nname = "m{k}"\nfrequency = "{frequency} Hz"\ndamping = 0.0086\nslide = {slide}\n'
+        + f"output = {slide}\nbase = {slide}\n"
+        for k, (frequency, slide) in enumerate(
+            ((117, 0.7), (222.3, 0.4), (327.6, 0.35), (432.9, 0.25), (538.2, 0.2))
+        )
+    )
+    + '[friction]\nstatic = 0.339\nlaw = "iwan"\nchi = -0.478\nbeta = 0.932\nstiffness = "36.7 kN/m"\n'
+)
+
+
+def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
+    """The curve has the amplitudes of a march at its ends and at its peak, all of it is stable, and the motion from which
+    it starts is near the origin: corrections to forces beyond the friction limit, which would hold it far away, are
+    refused."""
+    text = IWAN_MODES + SWEEP.replace('"3 g"', '"14 g"').replace('"120 Hz"', '"80 Hz"')
+    model = pf.plan(pf.load(text, **STEADY)).model
+    finder = shooting.ShootingFinder(model, choose_numerics(model), None)
+    points = finder.trace_curve(model.rig.drive.signal).points
+    assert all(point.stable for point in points)
+    peak = max(points, key=lambda point: point.values[AMPLITUDE])
+    for point in (points[0], peak, points[-1]):
+        state = point.guess.equations.details.run.final
+        assert np.abs(state.y[:5]).max() <= 1.1 * point.values[AMPLITUDE]
+        sine = SINE.format(point.drive.omega / (2 * np.pi), 200).replace('"5 g"', '"14 g"')
+        found = pf.run(IWAN_MODES + sine, **{"accuracy.method": "march"}).measures[AMPLITUDE]
+        assert abs(found.value - point.values[AMPLITUDE]) <= found.error + point.errors[AMPLITUDE]

@@ -22,6 +22,7 @@ from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
 HELPERS = ("find_branch",)
+LIMIT = 2  # the slip force among the numbers
 POINTS = 5  # first of the n + 1 displacements among the numbers
 TURNS_FREELY = (
     -1.0
