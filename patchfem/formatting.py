@@ -88,7 +88,10 @@ def needs_log_scale(values) -> bool:
 
 
 def round_to_error(
-    value: float | None, error: float | None = None, floor: float = 0.0
+    value: float | None,
+    error: float | None = None,
+    floor: float = 0.0,
+    max_digits: int = MAX_SIGNIFICANT_DIGITS,
 ) -> tuple[str, str]:
     """Format a value and its error so that both end at the second digit of the error.
 
@@ -100,6 +103,8 @@ def round_to_error(
         Numerical error (half-width); None if it is unknown.
     floor : float
         Absolute floor of the measure; a smaller value is displayed as 0.
+    max_digits : int
+        Largest number of significant digits of the value.
 
     Returns
     -------
@@ -120,12 +125,12 @@ def round_to_error(
     # The last displayed digit is the second significant one of the error, unless the value would have too many digits
     value_power = math.floor(log10(abs(value)))
     last_power = _find_second_digit_power(error)
-    if last_power < value_power - MAX_SIGNIFICANT_DIGITS + 1:  # all displayed digits are exact
+    if last_power < value_power - max_digits + 1:  # all displayed digits are exact
         first_exact_power = max(
-            value_power - MAX_SIGNIFICANT_DIGITS + 1,
+            value_power - max_digits + 1,
             math.ceil(log10(error)) if error else ZERO_ERROR_POWER,
         )
-        return format_number(round(value, -first_exact_power), MAX_SIGNIFICANT_DIGITS), ""
+        return format_number(round(value, -first_exact_power), max_digits), ""
     if _is_written_without_exponent(value_power) or _is_written_without_exponent(last_power + 1):
         return _format_to_digit(value, error, last_power)
 

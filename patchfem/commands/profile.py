@@ -70,8 +70,8 @@ def profile(
     json_: Json = False,
     verbose: Verbose = False,
 ):
-    """Print the roughness parameters of each FILE, with intervals estimated from this one file. For several files,
-    print also the mean of each parameter.
+    """Print the roughness parameters of each FILE, with 90 % intervals estimated from this one file (those of compare are
+    95 % intervals). For several files, print also the mean of each parameter.
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """

@@ -81,7 +81,7 @@ def backbone(
     ) = "",
     over: text_option(
         "key and its values, each of which gives a curve on the same page, such as "
-        '"contact.load=3.2 kN,4 kN,4.8 kN"'
+        '"contact.load=6.4 kN,8 kN,9.6 kN"'
     ) = "",
     method: text_option(
         "method that computes the motion, such as balance; possible values: balance, quasi-static; default: both"

@@ -121,7 +121,12 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_smallest_amplitude"] = _take(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
         out["largest_damping"] = _take(curve, "damping", largest)
-        out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
+        # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
+        # curve nothing encloses the peak.
+        error = None
+        if 0 < largest < curve.amplitude.size - 1:
+            error = np.diff(curve.amplitude[largest - 1 : largest + 2]).max() / 2
+        out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m", error)
 
     # a missing frequency is shown with its reason, other missing values are left out
     out |= {
@@ -129,8 +134,8 @@ def _make_quantities(backbone: Backbone) -> Quantities:
         "stuck_frequency": Quantity(
             frequencies.stuck, "Hz", frequencies.stuck_error, reason=frequencies.reason
         ),
-        "exponent_micro": Quantity(backbone.exponents.micro),
-        "exponent_gross": Quantity(backbone.exponents.gross),
+        "exponent_micro": Quantity(backbone.exponents.micro, error=backbone.exponents.micro_error),
+        "exponent_gross": Quantity(backbone.exponents.gross, error=backbone.exponents.gross_error),
         "flutter_amplitude": Quantity(backbone.flutter, "m"),
     }
     return {name: one for name, one in out.items() if one.value is not None or one.reason}

@@ -19,7 +19,7 @@ from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
 from ..campaigns.rows.fit import FittedRows
 from ..disk.atomic_write import write_text
-from ..formatting import format_number
+from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved
 from ..scene.scene import Scene, add_sets, move_scene
 from .answer import (
@@ -416,18 +416,38 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
     curve = {"curve_coefficient": (coefficients, WEAR_UNIT), "curve_depth": (depths, "m")}
 
+    # what the interval of the coefficient contains
+    warnings = []
+    parts = []
+    if measured.low < measured.high:
+        parts.append(f"that of the measured {name}, {text},")
+    else:
+        warnings.append(
+            f"{measured.name} was given without an interval, so that of the coefficient does not contain the error of the "
+            f'measurement; give both ends, such as "{measured.name}=2.5 um..3.5 um"'
+        )
+    error = fit.model.error
+    if error is not None:
+        parts.append(f"the numerical error of the computed depth, {format_length(error, 2)}")
+    else:
+        warnings.append(
+            "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
+        )
+    residual = f"The interval contains {' and '.join(parts)}." if parts else ""
+
     details = {
         "measured": Path(measured.source).name,
         "quantity": measured.name,
         "runs": fit.runs,
-        "model": fit.model,
+        "model": fit.model.value,
+        "model_error": error,
         "data": ends,
-        "warnings": [],
+        "warnings": warnings,
     }
     return Parts(
-        f"The interval is that of the measured {name}, {text}.",
+        residual or f"The computed depth is {format_length(fit.model.value)}.",
         details,
-        {"fitted_depth": Quantity(fit.model, "m")},
+        {"fitted_depth": Quantity(fit.model.value, "m", error)},
         make_columns("point", points) | make_columns("curve_coefficient", curve),
     )
 

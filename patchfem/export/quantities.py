@@ -7,6 +7,7 @@ verbs. KEY lists the quantities that come first: in the tiles of a page, on the 
 from collections import ChainMap
 
 from ..formatting import (
+    MAX_SIGNIFICANT_DIGITS,
     UNIT_LADDERS,
     choose_unit,
     format_number,
@@ -19,6 +20,9 @@ from . import surface_definitions
 from .answer import Definition, Quantities, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+# Smallest half-width of an interval relative to its ends that the digits show
+MIN_SHOWN_WIDTH = 1e-9
+INTERVAL_DIGITS = 11  # largest number of digits of an end, which has two digits of the half-width
 MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
@@ -78,7 +82,7 @@ QUANTITIES: dict[str, Definition] = {
         "N", "force at the output that holds the phase resonance at the largest amplitude"
     ),
     "compared_amplitude": Definition(
-        "m", "amplitude at the output at which the change of the key has the largest effect"
+        "m", "common amplitude of the curves at which the change of the key has the largest effect"
     ),
     "frequency_change": Definition(
         "Hz", "frequency for the last value of the key minus that for the first value"
@@ -93,7 +97,8 @@ QUANTITIES: dict[str, Definition] = {
         "1", "largest damping ratio among the amplitudes of the recommended curve"
     ),
     "amplitude_of_largest_damping": Definition(
-        "m", "amplitude at the output with the largest damping ratio"
+        "m",
+        "amplitude of the curve with the largest damping ratio; the error is half the distance to its neighbours",
     ),
     "free_frequency": Definition(
         "Hz", "frequency of the mode without its contact; a bonded spring is included"
@@ -102,10 +107,12 @@ QUANTITIES: dict[str, Definition] = {
         "Hz", "frequency of the mode while the contact sticks with its own stiffness"
     ),
     "exponent_micro": Definition(
-        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+        "1",
+        "exponent of the energy loss per cycle over the amplitude, from the smallest to the largest amplitude in micro-slip",
     ),
     "exponent_gross": Definition(
-        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+        "1",
+        "exponent of the energy loss per cycle over the amplitude, between the two largest ones in gross slip; 1 in theory",
     ),
     # fit; of keys of a scene, see FITTED_KEY
     "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
@@ -263,9 +270,12 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
         limit = f"at least {ends[0]:.3g}" if ends[1] is None else f"at most {ends[1]:.3g}"
         return f"{format_number(value, 3)} {unit} ({limit})".replace("  ", " ")
 
-    # both ends and the value have two digits of the width of the interval
+    # both ends and the value have two digits of the width of the interval, and thus the same last digit
     half_width = (ends[1] - ends[0]) / 2
-    text, low, high = (round_to_error(number, half_width)[0] for number in (value, *ends))
+    is_shown = half_width > MIN_SHOWN_WIDTH * max(map(abs, ends))
+    digits = INTERVAL_DIGITS if is_shown else MAX_SIGNIFICANT_DIGITS
+    numbers = (value, *ends)
+    text, low, high = (round_to_error(n, half_width, max_digits=digits)[0] for n in numbers)
     return f"{text} {unit} ({low} to {high})".replace("  ", " ")
 
 

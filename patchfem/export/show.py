@@ -8,6 +8,9 @@ from . import quantities, store
 from .answer import Answer, Quantities
 from .columns import make_tables
 
+# Largest number of rows of a table on the screen, by kind of answer; a kind without a number shows no table.
+MAX_TABLE_ROWS = {"cost": float("inf"), "backbone": 10}
+
 
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """Return the lines of an answer for the standard output, without warnings and notes.
@@ -16,9 +19,10 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """
     lines = [answer.title] if answer.title else []
     lines += answer.verdict
-    # the runs of `cost` are its answer
-    for table in make_tables(answer) if answer.kind == "cost" else ():
-        lines += _align([table["headings"], *table["rows"]])
+    # The runs of `cost` are its answer, and so are the cases of a backbone over a few values of a key.
+    for table in make_tables(answer) if answer.kind in MAX_TABLE_ROWS else ():
+        if len(table["rows"]) <= MAX_TABLE_ROWS[answer.kind]:
+            lines += _align([table["headings"], *table["rows"]])
     shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
     return lines + format_quantities(shown)
 

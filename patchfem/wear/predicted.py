@@ -166,6 +166,8 @@ class PredictedWear:
     - is_mirrored: whether x of the patch runs against x of the trace; None where both fit.
     - depths: both depths along the patch.
     - proportional: coefficient [m2/N] for which the last depth of the run fits in proportion.
+    - n_blocks: number of independent blocks of the difference between both depths in the worn part.
+    - datum_error: standard deviation [m] of an error that is common to all measured depths.
     """
 
     history: WearHistory
@@ -174,6 +176,8 @@ class PredictedWear:
     is_mirrored: bool | None
     depths: FittedDepths
     proportional: float
+    n_blocks: float
+    datum_error: float
 
     @property
     def is_extrapolated(self) -> bool:
@@ -190,6 +194,11 @@ class PredictedWear:
         """Root mean square [m] of the difference between both depths over the patch."""
         difference = self.depths.measured - self.depths.computed
         return float(np.sqrt(np.mean(difference[self.on_patch] ** 2)))
+
+    @property
+    def mean_computed(self) -> float:
+        """Mean of the computed depth over the patch [m]."""
+        return float(self.depths.computed[self.on_patch].mean())
 
 
 def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
@@ -409,6 +418,8 @@ def _make_result(
         is_mirrored=None if is_unknown else best.is_mirrored,
         depths=FittedDepths(x[order], bins.depth[order], computed[order], bins.noise[order]),
         proportional=proportional * history.coefficient,
+        n_blocks=n_blocks,
+        datum_error=bins.datum_error,
     )
 
 

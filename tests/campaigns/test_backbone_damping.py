@@ -67,6 +67,26 @@ def test_exact_viscous_damping_adds_to_friction_damping(law):
     assert negative.damping == pytest.approx(expected, abs=1e-7)
 
 
+def test_amplitude_of_largest_damping_contains_the_peak_of_a_finer_grid():
+    """The error of this amplitude reaches the peak between the grid points; without a peak there is none.
+
+    The loss 4 F (s - h) of a Jenkins element over s^2 is largest at s = 2 h, twice the amplitude of slip.
+    """
+    model = make_rig("elastic-plastic", 0.0)
+    measures = []
+    for amplitudes in (np.geomspace(1e-6, 1e-3, n) for n in (6, 31)):
+        backbone = compute_backbone(model, "", amplitudes, ("balance",))
+        measures.append(backbones.make_answer(backbone, model.source).quantities)
+    coarse, fine = (one["amplitude_of_largest_damping"] for one in measures)
+    assert 0 < abs(coarse.value - fine.value) <= coarse.error
+    assert fine.error < coarse.error / 3
+    assert 0 < measures[1]["exponent_gross"].error < 0.01
+
+    falling = compute_backbone(model, "", np.geomspace(3e-4, 1e-3, 3), ("balance",))
+    end = backbones.make_answer(falling, model.source).quantities["amplitude_of_largest_damping"]
+    assert end.value == 3e-4 and end.error is None
+
+
 @pytest.mark.share(0)
 @pytest.mark.parametrize("law", LAWS)
 def test_damping_is_zero_at_limit_cycle_of_a_run(law, tmp_path):

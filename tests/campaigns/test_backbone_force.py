@@ -190,6 +190,16 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
     with pytest.raises(SystemExit) as ended:
         main(["backbone", "joint.toml", *over, "-o", "out", "--plot", "curves.png"])
     assert not ended.value.code
+    # the screen has the table of the page: a row for each preload under the headings
+    rows = [line.split("  ") for line in capsys.readouterr().out.splitlines()]
+    cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
+    first = next(k for k, row in enumerate(cells) if row and row[0] == "80 N")
+    assert cells[first - 1][:2] == ["value", "frequency with a sticking contact"]
+    assert [row[0] for row in cells[first : first + 3]] == ["80 N", "100 N", "120 N"]
+    for row, load in zip(cells[first : first + 3], (80, 100, 120)):
+        assert float(row[1].split()[0]) == pytest.approx(
+            solve_one_harmonic(load, 1e-6)[0], abs=0.06
+        )
     with open("out/backbone.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     balance = [row for row in rows if row["method"] == "balance"]

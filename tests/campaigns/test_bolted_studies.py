@@ -4,6 +4,7 @@ The joint that is subtracted from the modes is that of the scene as written, so 
 same structure.
 """
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.__main__ import main
 from patchfem.core import PatchfemError
 from patchfem.scene import loads, remember_written
 
@@ -143,6 +145,59 @@ def test_always_errors_of_assumed_slides_include_the_stiffness_of_the_joint(meth
         assert (np.abs(coarse[name] - fine[name]) <= error).all(), name
     # In gross slip the frequency is nearly the free one, whatever the stiffness of the joint.
     assert coarse[f"{method}_frequency_error"][-1] < 2e-3
+
+
+@pytest.mark.parametrize("modes", ["", "212 Hz:0.002:0.0169"])
+def test_scene_written_by_a_backbone_over_load_has_the_load_of_the_modal_test(
+    tmp_path: Path, monkeypatch, modes: str
+):
+    """The resolved scene of a backbone over loads is that as written, and has the curve of its own load."""
+    monkeypatch.chdir(tmp_path)
+    structure = MODE if not modes else f'[structure]\nmoving_mass = "{MASS} kg"\n'
+    Path("joint.toml").write_text(POINT + structure + (DRIVE if not modes else ""))
+    options = ["--amplitudes", "300 um", "--method", "balance", "--no-page"]
+    options += ["--modes", modes] if modes else []
+    with pytest.raises(SystemExit) as end:
+        main(["backbone", "joint.toml", "--over", "normal.load=3.2 kN,4 kN", *options, "-o", "out"])
+    assert end.value.code == 0
+    details = json.loads(Path("out/backbone.json").read_text())
+    written = loads(Path("out/scene.resolved.toml").read_text())
+    assert written.normal.load == 4e3
+
+    # The scene without --modes is the complete rig, with the same joint subtracted.
+    again = pf.backbone(Path("out/scene.resolved.toml"), amplitudes="300 um", method="balance")
+    frequency = details["cases"][1]["curves"]["balance"]["frequency"]
+    assert again["balance_frequency"].values == pytest.approx(frequency, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "joint, key, values, end",
+    [
+        ("written", "contact.load", ["3.2 kN", "4 kN"], "the modal test."),
+        ("written", "normal.load", ["3.2 kN", "4 kN"], "the modal test."),
+        ("written", "normal.load", ["3.2 kN", "4.8 kN"], "; no curve has this value."),
+        ("case", "normal.load", ["3.2 kN", "4 kN"], None),
+        ("written", "structure.moving_mass", ["1.3 kg", "1.5 kg"], None),
+    ],
+)
+def test_backbone_over_load_states_the_load_of_the_modal_test(joint, key, values, end):
+    """A note names the load of the scene, and says if no curve has it; none does where no other joint is subtracted."""
+    text = (ROUGH if key == "contact.load" else POINT) + MODE + DRIVE
+    text = text.replace('"stuck"', f'"stuck"\nmeasured_joint = "{joint}"')
+    curves = pf.backbone(text, amplitudes="10 um", method="balance", over={key: values})
+    notes = [note for note in curves.attrs["notes"] if "count as measured" in note]
+    assert len(notes) == (end is not None)
+    for note in notes:
+        assert f"{key} = 4 kN, the value in the scene" in note and note.endswith(end)
+
+
+def test_backbone_over_a_key_that_its_scene_lacks_has_the_scene_of_the_first_value():
+    """Free modes do not need the scene as written, so a scene may have its load by the values of `over` only."""
+    text = (POINT + MODE + DRIVE).replace('load = "4 kN"\n', "").replace('"stuck"', '"free"')
+    curves = pf.backbone(
+        text, amplitudes="10 um", method="balance", over={"normal.load": ["3.2 kN", "4 kN"]}
+    )
+    assert curves["balance_frequency"].shape == (2, 1)
 
 
 @pytest.mark.slow

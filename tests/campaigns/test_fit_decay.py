@@ -90,6 +90,28 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     assert any(f"the amplitude falls by up to {loss:.2g} %" in note for note in result["notes"])
 
 
+def test_common_factor_of_stated_errors_has_no_effect_on_the_intervals(tmp_path):
+    """Stated errors that are ten times larger give the same value and interval, and a note states the smaller residual."""
+    path = write_decay(tmp_path / "decay.csv", IWAN, 1e-2)
+    head, *rows = path.read_text().splitlines()
+    wide = tmp_path / "wide.csv"
+    cells = np.array([row.split(",") for row in rows], float) * [1, 1, 10, 1, 10]
+    np.savetxt(wide, cells, delimiter=",", header=head, comments="")
+    scene = IWAN.replace("chi = -0.35", "chi = -0.6")
+    narrow, wide = (
+        pf.fit(scene, to=file, free={"friction.chi": (-0.9, -0.05)}, starts=1)
+        for file in (path, wide)
+    )
+    fitted, same = (fit["values"]["friction.chi"] for fit in (narrow, wide))
+    for name in ("value", "low", "high"):
+        assert same[name] == pytest.approx(fitted[name], rel=1e-3)
+    ratios = []
+    for fit in (narrow, wide):
+        (note,) = (note for note in fit["notes"] if "the stated errors are weights" in note)
+        ratios.append(float(note.partition("rms is ")[2].split()[0]))
+    assert ratios[1] == pytest.approx(ratios[0] / 10, rel=0.05)
+
+
 def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):
     """The command fits a curve from a file and refuses tables that are no single valid curve."""
     monkeypatch.chdir(tmp_path)
@@ -188,3 +210,34 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
             path,
             parse_ranges([f"{key}={low}..{high}" for key, (low, high) in free.items()]),
         )
+
+
+def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
+    """Errors that the table does not give are two standard deviations of the residual of the reported fit.
+
+    The quasi-static curve, which starts the search, differs in gross slip from that of the balance by far more than the
+    0.05 % by which the measured frequency scatters.
+    """
+    scene = POINT + make_friction_table("elastic-plastic") + KILOGRAM + DRIVE
+    amplitudes = np.geomspace(1e-6, 1e-4, 8)
+    truth = pf.backbone(scene, amplitudes=amplitudes, method="balance")
+    signs = np.array([1, -1, -1, 1, -1, 1, 1, -1])
+    rows = np.column_stack(
+        [
+            amplitudes,
+            truth.balance_frequency * (1 + 5e-4 * signs),
+            truth.balance_damping * (1 + 1e-2 * signs[::-1]),
+        ]
+    )
+    path = tmp_path / "curve.csv"
+    header = "amplitude [m],frequency [Hz],damping"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    free = {"friction.static": (0.1, 1.0)}
+    result = pf.fit(scene, to=path, free=free, starts=1, out=tmp_path / "out")
+    with xr.open_dataset(tmp_path / "out/result.nc") as data:
+        for name in ("frequency", "damping"):
+            relative_error = data[f"{name}_error"].values / data[name].values
+            # one parameter takes up half a degree of freedom of each of the two quantities
+            scatter = result["rms"][name] * np.sqrt(8 / 7.5)
+            assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.1), name
+    assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.3)

@@ -38,10 +38,19 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
     )
     assert answer.code == 0, answer.err
-    fitted = json.loads(answer.out)["values"]["wear.coefficient"]
-    assert fitted["value"] == pytest.approx(3e-15, rel=1e-3) and fitted["low"] == fitted[
-        "high"
-    ] == pytest.approx(fitted["value"])
+    content = json.loads(answer.out)
+    fitted = content["values"]["wear.coefficient"]
+    assert fitted["value"] == pytest.approx(3e-15, rel=1e-3)
+    assert "without an interval" in content["warnings"][0]
+
+    # A depth without an interval leaves the numerical error of the run, to which the rounding of the fit is added.
+    measure = measures["worn_volume" if name == "worn_depth_mean" else name]
+    relative_error = measure.error / measure.value
+    assert relative_error > 0
+    for end in ("low", "high"):
+        deviation = abs(fitted[end] / fitted["value"] - 1)
+        assert relative_error * (1 - 1e-2) <= deviation <= 1.5 * relative_error + 1e-3
+    assert fitted["low"] <= 3e-15 <= fitted["high"]
     refitted = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
     assert refitted["worn_volume"].value == pytest.approx(measures["worn_volume"].value, rel=1e-3)
 
@@ -61,9 +70,25 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
         )
     )
     answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
-    fitted = json.loads(answer.out)["values"]["wear.coefficient"]
+    content = json.loads(answer.out)
+    fitted = content["values"]["wear.coefficient"]
     assert fitted["low"] / fitted["value"] == pytest.approx(0.75, rel=2e-3)
     assert fitted["high"] / fitted["value"] == pytest.approx(1.5, rel=2e-3)
+    # the error of the computed depth adds to both sides
+    error = content["model_error"] / 20e-9
+    assert 0 < error < 2e-3 and not content["warnings"]
+    assert fitted["low"] / fitted["value"] < 0.75 < 1.5 < fitted["high"] / fitted["value"]
+
+
+def test_warns_of_an_unknown_numerical_error(scene):
+    """On a mesh so coarse that its error cannot be estimated, the fit says that its interval lacks this error."""
+    coarse = ("--set", "contact.element_size=2 mm")
+    answer = run_cli("fit", scene, *coarse, "--to", "worn_depth_mean=15 nm..30 nm", *FREE, "--json")
+    content = json.loads(answer.out)
+    assert content["model_error"] is None
+    assert content["warnings"] == [
+        "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
+    ]
 
 
 def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):

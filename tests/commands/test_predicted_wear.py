@@ -1,6 +1,7 @@
 """`patchfem compare --predicted`: wear coefficient from traces and a run with wear, and roughness by region."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -78,14 +79,6 @@ def artificial_pair(tmp_path_factory) -> tuple:
     return folder, traces, truth, middle - starts[1]
 
 
-@pytest.fixture(scope="module")
-def crowned_run(tmp_path_factory) -> Path:
-    """Return the folder of a run in which the contact of a crown grows by wear."""
-    folder = tmp_path_factory.mktemp("crowned") / "wear"
-    pf.run(RUN, **COARSE).save(folder)
-    return folder
-
-
 def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp_path):
     """The intervals of the wear coefficient and of the patch centre cover the true values."""
     folder, traces, truth, centre = artificial_pair
@@ -102,7 +95,7 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
         assert predicted[name]["low"] <= true <= predicted[name]["high"]
     assert predicted["coefficient"]["high"] < 1.1 * predicted["coefficient"]["low"]
     assert predicted["coefficient"]["unit"] == "m2 N-1"
-    assert data["sentences"][-1] == predicted["sentence"]
+    assert data["sentences"][-1] == predicted["sentence"] and predicted["warnings"] == []
     assert predicted["sentence"] in answer.out and "wear_coefficient" in answer.out
     table = np.loadtxt(out / "predicted.csv", delimiter=",", skiprows=1)
     rms = np.sqrt(np.mean(table[np.abs(table[:, 0]) <= truth["length"] / 2, 5] ** 2))
@@ -115,11 +108,12 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
     assert "Computed and measured wear" in page
 
 
-def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
+def test_exact_wear_coefficient_follows_run_history(tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
     The depth is not proportional to the coefficient there.
     """
+    crowned_run = pf.run(RUN, **COARSE).save(tmp_path / "wear")
     with xarray.open_dataset(crowned_run / "result.nc") as result:
         frame = 8
         place = result.x.values
@@ -137,8 +131,42 @@ def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     predicted = pf.compare(*files, predicted=crowned_run)["predicted"]
     assert predicted["coefficient"]["value"] / 1e-14 == pytest.approx(ratio, rel=2e-3)
     assert predicted["proportional_coefficient"] / 1e-14 > 1.05 * ratio
-    assert predicted["difference_rms"] < 5e-9
+    assert predicted["difference_rms"] < 5e-9 and predicted["warnings"] == []
     assert any("not proportional" in note for note in predicted["notes"])
     deep_trace = write_trace(tmp_path / "deep.csv", x, before - 1e3 * worn)
     with pytest.raises(pf.PatchfemError, match="check the units of z"):
         pf.compare(files[0], deep_trace, shift=0.0, predicted=crowned_run)
+
+
+@pytest.mark.parametrize("share, scatter", [(0.5, 0.0), (0.5, 0.3), (1.0, 0.3)])
+def test_tells_a_wrong_share_from_scatter(crowned_run, tmp_path, share, scatter):
+    """A depth of half the share has another shape, and scatter by 30 % over short waves has not.
+
+    The interval does not contain the coefficient of the wrong share.
+    """
+    with xarray.open_dataset(crowned_run / "result.nc") as result:
+        place = result.x.values
+        depth = result.wear_worn_depth.values[-1]
+    x = np.arange(0.0, 5e-3, 1e-6)
+    random = np.random.default_rng(2)
+    waves = np.interp(x, x[::20], random.normal(size=x[::20].size))
+    before = draw_surface(x)
+    worn = share * PIECE_SHARE * np.interp(x - 2.2e-3, place, depth, left=0.0, right=0.0)
+    worn = worn * (1 + scatter * waves) + 1e-9 * random.normal(size=x.size)
+    files = (
+        write_trace(tmp_path / "before.csv", x, before),
+        write_trace(tmp_path / "after.csv", x, before - worn),
+    )
+    content = pf.compare(*files, predicted=crowned_run)
+    predicted = content["predicted"]
+    mean = re.search(r"mean computed depth over the patch, ([\d.]+) nm", predicted["sentence"])
+    percent = 100e9 * predicted["difference_rms"] / float(mean[1])
+    assert percent > 10
+    is_covered = predicted["coefficient"]["low"] <= 1e-14 <= predicted["coefficient"]["high"]
+    if share == 1:
+        assert is_covered and predicted["warnings"] == []
+        return
+    (warning,) = predicted["warnings"]
+    assert not is_covered and content["sentences"][-1] == warning
+    assert f"by {percent:.2g} % of the mean computed depth (rms)" in warning
+    assert "wear.upper_share" in warning

@@ -118,3 +118,37 @@ def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     closing = closed_forms.westergaard_full_pressure(1.0, np.hypot(*(heights / waves)), modulus)
     assert split["closing_pressure"] == pytest.approx(closing, rel=0.02)
     assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
+
+
+def test_help_states_the_probability_of_the_intervals():
+    """The help says that the intervals are 90 % intervals and those of compare 95 % intervals."""
+    text = " ".join(run_cli("profile", "--help").out.split())
+    assert "with 90 % intervals" in text and "those of compare are 95 % intervals" in text
+
+
+@pytest.mark.parametrize("radius", [20e3, 50e3])
+def test_wear_of_traces_over_a_cylinder_is_measured_without_the_circle(tmp_path, radius):
+    """As the guide says, a cylinder widens the interval of the area or hides the wear, and --form circle mends it."""
+    random = np.random.default_rng(0)
+    x = np.arange(3900.0)  # [um], as the radius
+    rough = 0.05 * np.convolve(random.normal(size=4100), np.hanning(15), "same")
+    wear = 1.2 * np.clip(1 - ((x + 37 - 2000) / 400) ** 2, 0, None)  # 640 um^2
+    files = []
+    flat = []
+    for name, start, worn in (("before", 0, 0.0), ("after", 37, wear)):
+        circle = np.sqrt(radius**2 - (x + start - 2000) ** 2) - radius
+        noise = random.normal(0, 0.005, x.size)
+        rows = np.column_stack([x, circle + rough[start : start + x.size] - worn + noise])
+        files.append(tmp_path / f"{name}.csv")
+        np.savetxt(files[-1], rows, "%.6f", ",", header="x [um],z [um]", comments="")
+        assert not run_cli("profile", files[-1], "--form", "circle", "-o", tmp_path / name).code
+        flat.append(tmp_path / name / "primary.csv")
+
+    widths = []
+    for pair in (files, flat):
+        area = pf.compare(*pair)["worn_area"]
+        widths.append(np.inf if area["value"] is None else area["high"] - area["low"])
+    assert area["low"] < 640e-12 < area["high"] and area["value"] == pytest.approx(
+        640e-12, rel=0.01
+    )
+    assert widths[1] < 0.7 * widths[0]

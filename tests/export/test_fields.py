@@ -174,14 +174,9 @@ def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-@pytest.fixture(scope="module")
-def crowned_run():
-    """Return the result of a crowned pair."""
-    return pf.run(CROWNED_BENCH)
-
-
-def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
+def test_exact_grids_of_result_agree_with_patch_and_file(tmp_path):
     """Result.to_pyvista has the numbers of result.patch and of the file, in SI units."""
+    crowned_run = pf.run(CROWNED_BENCH)
     all_frames = crowned_run.to_pyvista(frame=None)
     crowned_run.save(tmp_path / "run")
     for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / NAME)):

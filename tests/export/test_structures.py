@@ -76,9 +76,11 @@ def element_force(stiffness, limit, slide):
     return np.array(forces)
 
 
-@pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
-def test_exact_exported_elements_agree_with_bench(tmp_path, law):
-    """Under a triangular slide the force of the exported elements agrees with the bench of the law within 1e-9."""
+@pytest.mark.parametrize(("law", "tolerance"), [("elastic-plastic", 1e-9), ("iwan", 2e-6)])
+def test_exact_exported_elements_agree_with_bench(tmp_path, law, tolerance):
+    """Under a triangular slide the force of the exported elements agrees with the bench of the law, relative to its limit.
+
+    The bench has the density of Iwan's law, which the elements replace with an error below 2e-6."""
     _, path = export_structure(tmp_path, POINT + make_friction_table(law) + STRUCTURE)
     exported = loadmat(path)
     exported |= {name: exported[name].ravel() for name in ("stiffness", "limit")}
@@ -92,7 +94,7 @@ def test_exact_exported_elements_agree_with_bench(tmp_path, law):
     force = element_force(
         exported["stiffness"], exported["limit"], response.slide - response.slide[0]
     )
-    np.testing.assert_allclose(force, response.force, atol=1e-9 * exported["limit"].sum())
+    np.testing.assert_allclose(force, response.force, atol=tolerance * exported["limit"].sum())
     np.testing.assert_allclose(exported["limit"].sum(), 0.3 * 26 * 4.4482216152605, rtol=1e-6)
     assert exported["direction"].shape == (exported["limit"].size, 1)
 

@@ -111,35 +111,33 @@ def _find_largest(scene) -> memory.MemoryPart:
     return next(part for part in memory.list_parts(plan(scene)) if part.remedy)
 
 
-def test_exact_free_memory_of_control_group(tmp_path):
-    """The free memory is that of the system, at most the limit of the control group less what others use of it."""
-    page = os.sysconf("SC_PAGE_SIZE")
-    (tmp_path / "self").mkdir()
-    files = {"meminfo": "MemTotal: 90 kB\nMemAvailable: 20 kB", "self/statm": "70 3 1", "memory.max": "9000",
-             "memory.current": "5000", "memory.stat": "anon 1\ninactive_file 600"}  # fmt: skip
-    for name, text in files.items():
-        (tmp_path / name).write_text(text)
-    assert memory.free_bytes(tmp_path, tmp_path) == 9000 - 5000 + 600 + 3 * page
-    (tmp_path / "memory.max").write_text("max")
-    assert memory.free_bytes(tmp_path, tmp_path) == 20 * 1024 + 3 * page
-    assert memory.free_bytes(tmp_path / "none", tmp_path) == float("inf")
-
-
-def test_exact_free_memory_of_nested_control_groups(tmp_path):
-    """The smallest limit of the control groups along the path of the process counts, also that of a parent."""
+def test_exact_free_memory_of_control_groups(tmp_path):
+    """The free memory is that of the system, at most the limit of a control group along the path of the process less what
+    others use of it."""
     groups = {
         "": ("max", 9000),
         "user.slice": ("8000", 7000),
         "user.slice/job": ("max", 500),
         "other": ("1", 0),
     }
+    files = {
+        "self/cgroup": "9:name=systemd:/other\n0::/user.slice/job\n",
+        "self/statm": "70 3 1",
+        "meminfo": "MemTotal: 90 kB\nMemAvailable: 20 kB",
+    }
     for name, (limit, used) in groups.items():
-        folder = tmp_path / "cgroup" / name
-        folder.mkdir(parents=True)
         for file, text in (("max", limit), ("current", str(used)), ("stat", "inactive_file 10")):
-            (folder / f"memory.{file}").write_text(text)
-    (tmp_path / "self").mkdir()
-    (tmp_path / "self/cgroup").write_text("9:name=systemd:/other\n0::/user.slice/job\n")
-    assert memory.free_bytes(tmp_path, tmp_path / "cgroup") == 8000 - 7000 + 10
-    (tmp_path / "cgroup/user.slice/job/memory.max").write_text("900")
-    assert memory.free_bytes(tmp_path, tmp_path / "cgroup") == 900 - 500 + 10
+            files[f"cgroup/{name}/memory.{file}"] = text
+    for name, text in files.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    own = 3 * os.sysconf("SC_PAGE_SIZE")
+    folder = tmp_path / "cgroup"
+    assert memory.free_bytes(tmp_path, folder) == 8000 - 7000 + 10 + own
+    (folder / "user.slice/job/memory.max").write_text("900")
+    assert memory.free_bytes(tmp_path, folder) == 900 - 500 + 10 + own
+    for name in ("user.slice", "user.slice/job"):
+        (folder / name / "memory.max").write_text("max")
+    assert memory.free_bytes(tmp_path, folder) == 20 * 1024 + own
+    assert memory.free_bytes(tmp_path / "none", folder) == float("inf")

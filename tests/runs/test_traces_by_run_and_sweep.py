@@ -39,17 +39,11 @@ def rough_scene(tmp_path_factory):
     return folder / "scene.toml"
 
 
-@pytest.fixture(scope="module")
-def run_result(rough_scene):
-    """Return the result of the rough scene."""
-    return pf.run(rough_scene)
-
-
-def test_exact_sweep_of_rough_profile_agrees_with_run(rough_scene, run_result):
+def test_exact_sweep_of_rough_profile_agrees_with_run(rough_scene):
     """The measures and errors of a sweep agree with those of the run. On a mesh shared by all cases
     the peak was less than half of that of the run."""
     sweep = pf.sweep(rough_scene, {"contact.load": ["20 N", "30 N"]})
-    for name, measure in run_result.measures.items():
+    for name, measure in pf.run(rough_scene).measures.items():
         assert float(sweep[name][0]) == pytest.approx(measure.value, rel=1e-9, abs=measure.floor), (
             name
         )

@@ -127,12 +127,15 @@ def find_cell_blocks(m):
     return [block for block in blocks if len(block[1])]
 
 
+def make_meshio(m) -> meshio.Mesh:
+    """Return the points and cells of a mesh as meshio takes them."""
+    cells = [(kind, cells) for kind, cells, _ in find_cell_blocks(m)]
+    return meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), cells)
+
+
 def write_msh22(m, path, binary=True):
     """Write a mesh in Gmsh format 2.2 with meshio."""
-    mesh = meshio.Mesh(
-        np.column_stack([m.points, np.zeros(len(m.points))]),
-        [(k, c) for k, c, _ in find_cell_blocks(m)],
-    )
+    mesh = make_meshio(m)
     tags = [np.asarray(t, np.int32) for _, _, t in find_cell_blocks(m)]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
@@ -165,10 +168,7 @@ def write_msh41(m, path):
 
 def write_vtu(m, path):
     """Write a mesh as a VTK file whose cell array `tag` holds the tags."""
-    mesh = meshio.Mesh(
-        np.column_stack([m.points, np.zeros(len(m.points))]),
-        [(k, c) for k, c, _ in find_cell_blocks(m)],
-    )
+    mesh = make_meshio(m)
     mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in find_cell_blocks(m)]}
     meshio.write(path, mesh, file_format="vtu")
 
@@ -200,11 +200,11 @@ def write_inp(m, path, lines=True, capitals=True):
 
 def write_med(m, path):
     """Write a mesh as a MED file in which every family of cells belongs to one group."""
-    cell_blocks = find_cell_blocks(m)
-    names = sorted({int(tag) for _, _, tags in cell_blocks for tag in tags})
-    mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in cell_blocks])
-    mesh.cell_data = {"cell_tags": [-np.asarray(tags, int) for _, _, tags in cell_blocks]}
-    mesh.cell_tags = {-tag: [NAMES[tag]] for tag in names}
+    mesh = make_meshio(m)
+    mesh.points = m.points
+    tags = [np.asarray(tags, int) for _, _, tags in find_cell_blocks(m)]
+    mesh.cell_data = {"cell_tags": [-tag for tag in tags]}
+    mesh.cell_tags = {-int(tag): [NAMES[int(tag)]] for tag in np.unique(np.concatenate(tags))}
     meshio.write(path, mesh)
 
 

@@ -184,7 +184,7 @@ def describe_file(path: Path, name: str) -> dict:
         recorded_scenes.flatten(name, json.loads(path.read_text("utf-8")), out)
     elif path.suffix in (".html", ".svg"):
         out = describe_page(path.read_text("utf-8"), name)
-    elif path.suffix in (".nc", ".vtkhdf", ".h5"):
+    elif path.suffix in (".nc", ".vtkhdf"):
         arrays = recorded_scenes.read_arrays(path, name)
         out = {key: value for key, value in arrays.items() if "@" not in key}
     elif path.suffix == ".csv":
@@ -198,11 +198,10 @@ def describe_file(path: Path, name: str) -> dict:
         out = {f"{name}/points": mesh.points, f"{name}/cells": mesh.cells[0].data}
         out |= {f"{name}/{key}": value for key, value in mesh.point_data.items()}
         out |= {f"{name}/{key}": value[0] for key, value in mesh.cell_data.items()}
-    elif path.suffix in (".npz", ".mat"):
-        import scipy.io
+    elif path.suffix == ".mat":
+        from scipy.io import loadmat
 
-        loaded = dict(np.load(path)) if path.suffix == ".npz" else scipy.io.loadmat(path)
-        out = {f"{name}/{key}": value for key, value in loaded.items() if key[0] != "_"}
+        out = {f"{name}/{key}": value for key, value in loadmat(path).items() if key[0] != "_"}
     else:
         out = {name: "a file"}
     return {key: describe_value(value) for key, value in out.items()}
@@ -291,7 +290,7 @@ def clean(results: dict, folder: Path) -> dict:
         if UNSTABLE_KEYS.search(key):
             continue
         key, value = (
-            re.sub(r"(?<![.\w])(?=\d*[a-f])[0-9a-f]{12,}\b", "HASH", text)
+            re.sub(r"(?<![.\w])((?=\d*[a-f])[0-9a-f]{12,}|\d{16}(?!\.))\b", "HASH", text)
             if isinstance(text, str)
             else text
             for text in (key, value)

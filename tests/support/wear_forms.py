@@ -9,14 +9,6 @@ import numpy as np
 from patchfem.closed_forms.contact import require_positive
 
 
-def worn_volume(coefficient, load, path):
-    """Return the worn volume [m3] of both bodies, kappa N s, with the load N [N] (Archard, J. Appl.
-
-    Phys. 24 (1953) 981).
-    """
-    return coefficient * load * path
-
-
 def worn_crown_half_width(coefficient, line_load, path, radius):
     """Return the half-width [m] of a crown worn far beyond its elastic contact, (3/2 R kappa P s)^(1/3).
 

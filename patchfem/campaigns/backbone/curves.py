@@ -346,14 +346,21 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
     )
 
+    # The error of a slope is the sum of the relative errors of the losses at its ends over the width.
+    loss_error = (2 * np.pi * curve.damping_error + ROUND_OFF_ERROR) * energy
     slopes = []
+    errors = []
     for points, first in zip(map(np.flatnonzero, ranges), (0, -2)):
         slope = None
+        error = None
         if points.size > 1:
             ends = points[[first, -1]]
-            slope = np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0]
+            width = np.diff(np.log(amplitude[ends]))[0]
+            slope = np.diff(np.log(loss[ends]))[0] / width
+            error = (loss_error[ends] / loss[ends]).sum() / width
         slopes.append(slope)
-    return LossExponents(*slopes)
+        errors.append(error)
+    return LossExponents(*slopes, *errors)
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:

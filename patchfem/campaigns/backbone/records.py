@@ -129,12 +129,14 @@ class LossExponents(NamedTuple):
 
     An exponent is None if it is not determined.
 
-    - micro: exponent in micro-slip.
-    - gross: exponent in gross slip.
+    - micro, micro_error: exponent in micro-slip, and its numerical error.
+    - gross, gross_error: exponent in gross slip, and its numerical error.
     """
 
     micro: float | None = None
     gross: float | None = None
+    micro_error: float | None = None
+    gross_error: float | None = None
 
 
 class Backbone(NamedTuple):

@@ -1,12 +1,17 @@
 """Request for backbones: a mode, its amplitudes or forces, methods, and the values of a key."""
 
+import tomllib
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
+import numpy as np
+
 from ...core import PatchfemError
+from ...formatting import format_quantity
 from ...model.model import Model
+from ...model.rig import JOINT_SCENES
 from ...model.source import Source
-from ...scene.assignments import Axis, read_assignments, read_positive_values
+from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
 from ...scene.scene import SceneError
 from .curves import Levels, choose_methods, compute_backbones
 from .given_modes import prepare_model
@@ -43,7 +48,7 @@ class BackboneCases(NamedTuple):
 
     - axis: the key with its values, or None for a single backbone.
     - backbones: a backbone for each value.
-    - source: source of the first one.
+    - source: source of the scene without the values of the key; of the first backbone if that scene is not valid.
     """
 
     axis: Axis | None
@@ -119,4 +124,62 @@ def compute_cases(
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
-    return BackboneCases(axis, backbones, models[0].source)
+    base = models[0]
+    if axis is not None:
+        base = _build_base_model(build, request.modes) or base
+        note = _note_written_value(base, axis, backbones)
+        backbones = [case._replace(notes=(*case.notes, *note)) for case in backbones]
+    return BackboneCases(axis, backbones, base.source)
+
+
+def _build_base_model(build: Callable[..., Model], modes: str | Iterable) -> Model | None:
+    """Return the model of the scene without the values of `over`, or None if it needs one of them to be valid.
+
+    A scene with the first value would state it as the condition of the modal test, and another joint would be
+    subtracted from bolted modes. `build` and `modes` are as in `compute_cases`.
+    """
+    try:
+        return prepare_model(build, modes, ()).model
+    except PatchfemError:
+        return None
+
+
+def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> list[str]:
+    """Return a list of notes on the value of the key at which bolted modes count as measured.
+
+    Parameters
+    ----------
+    base : Model
+        Model of the scene without the values of the key.
+    axis : Axis
+        Key with its values.
+    backbones : list of Backbone
+        One for each value. If all have the same frequency with a sticking joint, the key does not change this joint.
+    """
+    bolted = base.rig.structure.bolted
+    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+        return []
+    stuck = [backbone.frequencies.stuck for backbone in backbones]
+    if axis.key.startswith("structure.") or None in stuck or np.allclose(stuck, stuck[0], 1e-9, 0):
+        return []
+
+    # A key with a number in it is an item of a list, which has no single place in the scene.
+    value = tomllib.loads(base.source.resolved)
+    for name in axis.key.split("."):
+        value = value.get(name) if isinstance(value, dict) else None
+    if not isinstance(value, str | float | int):
+        return []
+    written = read_values(axis.key, str(value))
+    text = written.texts[0]
+    is_listed = text in axis.values
+    if written.unit:
+        number = written.values[0]
+        text = format_quantity(number, written.unit, 4)
+        is_listed = np.isclose(axis.values, number, rtol=1e-9, atol=0).any()
+    note = (
+        f"the modes count as measured with {axis.key} = {text}, the value in the scene, which has to be that of the modal "
+        "test"
+    )
+    if not is_listed:
+        note += "; no curve has this value"
+    return [note]

@@ -106,6 +106,18 @@ class MeasuredCurve(NamedTuple):
             parts.append(f"{size} % of each {name} (no column {name}_error)")
         return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 
+    def describe_given_errors(self, rms: float) -> str:
+        """Return a sentence on the effect of errors that the table gives; "" if it lacks one of both columns.
+
+        `rms` is the root mean square of the residual in standard deviations.
+        """
+        if self.assumed.any():
+            return ""
+        return (
+            "the stated errors are weights, of which only the ratios count: the intervals follow from the scatter around "
+            f"the fit, whose rms is {format_number(rms, 2)} times the stated standard deviations (half the errors of 95 %)"
+        )
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedCurve:
@@ -271,6 +283,65 @@ class CurveModel(FreeKeys):
             problem = replace(problem, start=start)
         return problem.solve(starts, kind)
 
+    def weight_by_scatter(
+        self, measured: MeasuredCurve, method: str, fit: Fit
+    ) -> tuple[MeasuredCurve, Fit]:
+        """Fit again with the scatter in place of the errors that the table does not give, until it is known.
+
+        This is iteratively reweighted least squares.
+
+        Parameters
+        ----------
+        measured : MeasuredCurve
+            Measured curve with its errors so far.
+        method : str
+            Method of the curve of the model. The scatter around its fit includes what this method neglects.
+        fit : Fit
+            Fit by this method.
+
+        Returns
+        -------
+        measured : MeasuredCurve
+            With the scatter as error.
+        fit : Fit
+            Without intervals.
+        """
+        for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
+            before = measured.error
+            curve = self.compute(fit.values, method)
+            measured = measured.scale_assumed_errors(curve, len(self.ranges))
+            if np.abs(np.log(measured.error / before)).max() < SAME_ERROR_TOL:
+                break
+            again = self.solve(measured, method, start=fit.values)
+            fit = again.count_earlier_search(fit)
+        return measured, fit
+
+    def refine(self, measured: MeasuredCurve, method: str, first: Fit) -> tuple[MeasuredCurve, Fit]:
+        """Continue a search by a method, with the scatter around its own fit as the errors that are not given.
+
+        Parameters
+        ----------
+        measured : MeasuredCurve
+            Measured curve, with the scatter around `first` as assumed errors.
+        method : str
+            Method of the curve of the model.
+        first : Fit
+            Fit at which the search begins.
+
+        Returns
+        -------
+        measured : MeasuredCurve
+            With the scatter as error.
+        fit : Fit
+            With intervals.
+        """
+        if measured.assumed.any():
+            again = self.solve(measured, method, start=first.values)
+            first = again.count_earlier_search(first)
+            measured, first = self.weight_by_scatter(measured, method, first)
+        fit = self.solve(measured, method, kind="series", start=first.values)
+        return measured, fit.count_earlier_search(first)
+
 
 def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndarray:
     """Compute frequency [Hz] and damping ratio of a rig at some amplitudes.
@@ -358,24 +429,15 @@ def fit_curve(
             "the rows with the largest damping, or change the ranges of --free"
         )
 
-    # Assumed errors follow the deviations of the fit (iteratively reweighted least squares).
-    for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
-        before = measured.error
-        measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
-        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR_TOL:
-            break
-        again = curves.solve(measured, method, start=first.values)
-        first = again.count_earlier_search(first)
-
     # The search by the reference method begins at this result. The other method takes its place where it has no curve.
+    measured, first = curves.weight_by_scatter(measured, method, first)
     reference = METHODS[0]
     try:
-        fit = curves.solve(measured, reference, kind="series", start=first.values)
+        measured, fit = curves.refine(measured, reference, first)
     except NotConverged as reason:
         reasons[reference] = reason
         reference = method
-        fit = curves.solve(measured, reference, kind="series", start=first.values)
-    fit = fit.count_earlier_search(first)
+        measured, fit = curves.refine(measured, reference, first)
 
     # The curve of the fit, the effect of modes that the model neglects, and the band beyond the measured amplitudes
     fitted = curves.compute(fit.values, reference)
@@ -384,6 +446,7 @@ def fit_curve(
     notes = [
         *(f"the fit is by {reference} alone: {name}: {reasons[name]}" for name in reasons),
         measured.describe_assumed_errors(),
+        measured.describe_given_errors(fit.rms),
         _note_different_methods(reference, measured),
     ]
     return FittedCurve(

@@ -2,7 +2,8 @@
 
 The worn depth depends only on the product of coefficient and cycles, so one run with the largest
 coefficient gives the depth for all smaller ones. The coefficient is interpolated from this curve, and
-then checked and corrected by further runs.
+then checked and corrected by further runs. A last run with error estimates gives the numerical error of
+the depth, by which the interval is widened.
 """
 
 import json
@@ -14,16 +15,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ...core import Missing, NotConverged, PatchfemError
+from ...core import Measure, Missing, NotConverged, PatchfemError
 from ...model.model import Model
 from ...runs.patch import mesh_levels
 from ...runs.patch.press import nodal_areas
+from ...runs.run import run
 from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 
+MAX_DEPTH = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
-QUANTITIES = ("worn_depth_mean", "worn_depth_max")
+QUANTITIES = ("worn_depth_mean", MAX_DEPTH)
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
@@ -55,11 +58,11 @@ class FittedCoefficient:
     Attributes
     ----------
     value, low, high : float
-        Coefficient and its interval [m2/N].
+        Coefficient [m2/N] and its interval, which contains those of the measured and of the computed depth.
     measured : MeasuredDepth
         Wear depth to which the coefficient is fitted.
-    model : float
-        Wear depth that is computed with the fitted coefficient [m].
+    model : Measure
+        Wear depth that is computed with the fitted coefficient [m]. If its error is unknown, the interval lacks it.
     bounds : Range
         Bounds of the search.
     runs : int
@@ -72,7 +75,7 @@ class FittedCoefficient:
     low: float
     high: float
     measured: MeasuredDepth
-    model: float
+    model: Measure
     bounds: Range
     runs: int
     curve: np.ndarray
@@ -232,18 +235,65 @@ def fit_wear(
         )
 
     # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth into that
-    # of the coefficient
-    low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
+    # of the coefficient. The error of the computed depth adds to both sides, by the slope of the curve.
+    middle = float(inverse(target.value))
+    low, high = inverse(np.minimum([target.low, target.high], max_depth)) / middle
+    area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
+    model_error = _estimate_depth_error(model, value, target, area, progress)
+    error = (model_error or 0.0) * float(inverse.derivative()(target.value)) / middle
     return FittedCoefficient(
-        value=float(value),
-        low=float(value * low),
-        high=float(value * high),
+        value=value,
+        low=float(value * max(low - error, 0.0)),
+        high=float(value * (high + error)),
         measured=target,
-        model=computed_depth,
+        model=Measure(computed_depth, "m", model_error),
         bounds=bounds,
-        runs=n_runs,
+        runs=n_runs + 1,
         curve=np.array([bounds.high * curve.fraction, curve.depth]),
     )
+
+
+def _estimate_depth_error(
+    model: Model, coefficient: float, target: MeasuredDepth, area: float, progress
+) -> float | None:
+    """Estimate how far the exact depth with a wear coefficient [m2/N] may be from the measured one.
+
+    That is the distance of the depth of a run, whose meshes may be finer than those of the fit, and its error.
+
+    Parameters
+    ----------
+    model : Model
+        Model with wear.
+    coefficient : float
+        Fitted coefficient [m2/N].
+    target : MeasuredDepth
+        Measured depth.
+    area : float
+        Area of the patch [m2].
+    progress : callable or None
+        Called with the completed fraction of the run.
+
+    Returns
+    -------
+    float or None
+        [m]; None if the run has no error.
+    """
+    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
+    try:
+        result = run(model, progress=progress)
+    except (NotConverged, Missing):
+        return None
+
+    # the mean depth is the worn volume over the area
+    name = target.name
+    divisor = 1.0
+    if name != MAX_DEPTH:
+        name = "worn_volume"
+        divisor = area
+    measure = result.measures.get(name)
+    if measure is None or measure.error is None:
+        return None
+    return float(abs(measure.value / divisor - target.value) + measure.error / divisor)
 
 
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
@@ -258,6 +308,6 @@ def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, prog
         raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
     area = nodal_areas(model.patch, patch.pieces.interface).ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
-    depth = depths.max(axis=1) if name == "worn_depth_max" else depths @ area / area.sum()
+    depth = depths.max(axis=1) if name == MAX_DEPTH else depths @ area / area.sum()
     fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles
     return WearCurve(fraction, depth)

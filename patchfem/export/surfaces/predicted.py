@@ -19,6 +19,11 @@ from .variables import band, make_variables
 
 # Smallest relative difference of the proportional coefficient that is reported.
 MIN_DEPARTURE = 0.01
+# Number of independent blocks of a difference of depths below which it is a smooth pattern, not scatter
+MIN_SCATTER_BLOCKS = 10.0
+# Smallest rms of a smooth difference, relative to the mean depth and to its noise, that shows another shape
+MIN_MISFIT = 0.1
+MIN_MISFIT_DEVIATIONS = 2.0
 COEFFICIENT_MARGIN = 1.2  # ratio of the coefficient that a note proposes to the fitted one
 
 
@@ -46,6 +51,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     values = sentences.to_answers(numbers)
     sentence = describe(fitted)
     notes = describe_reliability(fitted)
+    warnings = warn_of_other_shape(fitted)
 
     entry = {
         "coefficient": values["wear_coefficient"],
@@ -58,10 +64,11 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         "proportional_coefficient": fitted.proportional,
         "extrapolated": fitted.is_extrapolated,
         "mirrored": fitted.is_mirrored,
+        "warnings": warnings,
         "notes": notes,
     }
     details = answer.details | {"predicted": entry}
-    details["sentences"] = [*details["sentences"], sentence]
+    details["sentences"] = [*details["sentences"], sentence, *warnings]
     details["notes"] = [*details["notes"], *notes]
 
     # the sentence belongs to the verdict, whose last sentence then becomes a note
@@ -82,7 +89,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         | values
         | {"difference_rms": Quantity(fitted.difference_rms, "m")},
         data=answer.data | data,
-        remarks=Remarks(answer.remarks.warnings, notes),
+        remarks=Remarks((*answer.remarks.warnings, *warnings), notes),
         details=details,
     )
 
@@ -168,11 +175,34 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 def describe(fitted: PredictedWear) -> str:
     """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
-    percent = 100 * fitted.difference_rms / fitted.depths.computed[fitted.on_patch].mean()
     return (
         f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
-        f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({format_number(percent, 2)} % of its mean)."
+        f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({_format_percent(fitted)} of the mean computed "
+        f"depth over the patch, {format_length(fitted.mean_computed, 3)})."
     )
+
+
+def _format_percent(fitted: PredictedWear) -> str:
+    """Return the rms difference of both depths relative to the mean computed depth as text, such as "2.6 %"."""
+    return f"{format_number(100 * fitted.difference_rms / fitted.mean_computed, 2)} %"
+
+
+def warn_of_other_shape(fitted: PredictedWear) -> list[str]:
+    """Return the warning on a computed depth of another shape than the measured one; [] if it fits.
+
+    The shape is another one if the difference of both depths is a smooth pattern that neither scatter nor noise explains.
+    """
+    noise = fitted.depths.noise[fitted.on_patch]
+    deviation = np.sqrt(np.mean(noise**2) + fitted.datum_error**2)
+    limit = max(MIN_MISFIT * fitted.mean_computed, MIN_MISFIT_DEVIATIONS * deviation)
+    if fitted.n_blocks >= MIN_SCATTER_BLOCKS or fitted.difference_rms <= limit:
+        return []
+    return [
+        f"The computed shape does not fit: the two depths differ in a smooth pattern by {_format_percent(fitted)} of the "
+        "mean computed depth (rms), which noise and scatter do not explain, so the wear coefficient may lie outside its "
+        "interval; check wear.upper_share and --piece, the place of the patch in the traces (patch_centre), and load, "
+        "pieces and wear.coefficient of the run."
+    ]
 
 
 def describe_reliability(fitted: PredictedWear) -> list[str]:

@@ -24,7 +24,7 @@ COULOMB_LENGTH_RATIO = 0.1
 # Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
 MIN_LENGTH_RATIO = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
-MIN_PRESSURE_FRACTION = 1.0
+ADDED_PRESSURE_FRACTION = 1.0
 # Error of the backbone curve by neglected shear modes, relative to the tolerance.
 MODES_TOLERANCE_RATIO = 0.1
 
@@ -81,7 +81,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     """Return the points of a patch whose contact set changes with heave and pitch of the upper piece.
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
-    pieces. The shear modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so
+    pieces. The shear modes are weighted with mu_s times the preload plus ADDED_PRESSURE_FRACTION of its mean pressure, so
     that nodes that are open at first also count. With m modes they are exact for any weights.
 
     Parameters
@@ -117,7 +117,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
         if weakening != 1:
             _choose_modes(patch, law.static * force, length, 1, 1.0, weakening)
         mean = force.sum() * weight / weight.sum()
-        limit = law.static * (force + mean * MIN_PRESSURE_FRACTION)
+        limit = law.static * (force + mean * ADDED_PRESSURE_FRACTION)
         shear = _choose_modes(patch, limit, length, n_modes, model.accuracy.tolerance)
 
     modes = model.rig.modes

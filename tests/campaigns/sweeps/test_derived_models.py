@@ -104,6 +104,14 @@ def model_or_reason(sweep_scene: SweepScene, sets: tuple, values: tuple):
         return str(error)
 
 
+def format_case(keys: list, values: tuple) -> tuple:
+    """Return a case as strings `key=value`."""
+    return tuple(
+        f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
+        for key, value in zip(keys, values)
+    )
+
+
 def random_cases(seed: int, count: int):
     """Yield (sets, values) of random cases over random keys, some of them invalid."""
     r = np.random.default_rng(seed)
@@ -124,14 +132,7 @@ def random_cases(seed: int, count: int):
                 )
                 for _ in keys
             )
-            units = [UNITS.get(key.rpartition(".")[2], "") for key in keys]
-            yield (
-                tuple(
-                    f"{key}={value!r} {unit}".strip()
-                    for key, value, unit in zip(keys, values, units)
-                ),
-                values,
-            )
+            yield format_case(keys, values), values
             count -= 1
 
 
@@ -164,9 +165,8 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
     keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
     for _ in range(20):
         chosen_keys = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
-        values = 10.0 ** r.uniform(-6, -1, (1, len(chosen_keys)))
-        sets = format_case(chosen_keys, values, 0)
-        values = tuple(values[0].tolist())
+        values = tuple((10.0 ** r.uniform(-6, -1, len(chosen_keys))).tolist())
+        sets = format_case(chosen_keys, values)
         is_derived = "friction.static" not in chosen_keys or "kinetic" not in PATCHES[name]
         assert (derive_model(sweep_scene, sets, values) is not None) == is_derived
         assert are_identical(
@@ -183,11 +183,3 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
         )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
         assert derive_model(SweepScene(Path("b.toml"), text), ("contact.load=3 N",), (3.0,)) is None
-
-
-def format_case(keys: list, values: np.ndarray, case: int) -> list:
-    """Return a case as strings `key=value`."""
-    return [
-        f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
-        for key, value in zip(keys, values[case].tolist())
-    ]

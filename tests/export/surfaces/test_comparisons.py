@@ -106,6 +106,23 @@ def test_exact_compare_json_has_the_keys_of_the_contract(written):
     assert data["reference"] == "place" and data["before"] == "before.csv"
 
 
+@pytest.mark.parametrize(
+    "numbers, text",
+    [
+        ((0.9999980, 0.9999931, 1.0000028), "0.9999980 (0.9999931 to 1.0000028)"),
+        ((1 + 2e-9, 1 - 1e-9, 1 + 5e-9), "1.0000000020 (0.9999999990 to 1.0000000050)"),
+        ((1.0, 0.93, 1.066), "1.000 (0.930 to 1.066)"),
+        ((1.0, 1 - 1e-12, 1 + 1e-12), "1 (1 to 1)"),
+    ],
+)
+def test_exact_ends_of_an_interval_have_the_last_digit_of_the_value(numbers, text):
+    """Value and ends end at the second digit of the half-width, also where an end has one digit more than the value."""
+    value, low, high = numbers
+    assert (
+        quantities.format_quantity("amplitude_ratio", Quantity(value, low=low, high=high)) == text
+    )
+
+
 def test_exact_curves_are_in_csv_and_netcdf():
     """depth.csv and result.nc hold x, both heights and the depth of the comparison, and the ends of its track."""
     comparison = compare_traces()
