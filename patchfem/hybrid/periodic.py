@@ -159,6 +159,8 @@ def _grows_for_ever(case: Case, size: float) -> bool:
 class Shooting:
     """State of a motion at the start of a period, and its map."""
 
+    remembers_loop_alone = False  # whether the reversal points are those of the loop of a period
+
     def __init__(self, case: Case):
         settings = case.rig.settings
         self.period = float(settings[Setting.PERIOD])
@@ -291,14 +293,17 @@ class Shooting:
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
     def _columns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in the packed state: what a period changes, and the reversal points."""
+        """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop."""
         start = pack_state(before, self.n)
         is_unknown = pack_state(self.state, self.n) != start
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
 
-        # A periodic motion leaves the reversal points as they were, but they move with it.
-        is_used = find_used(before) & find_used(self.state)
-        is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
+        # A periodic motion leaves the reversal points of its loop as they were, but they move with it. The many points of
+        # the past beside them do not.
+        is_used = (find_used(before) & find_used(self.state)).ravel()
+        if self.remembers_loop_alone:
+            is_unknown[self.n :] = is_used & (start[self.n :] != 0)
+        is_unknown[self.n :] &= is_used
         return np.flatnonzero(is_unknown)
 
     def differentiate(self, before: State) -> tuple["_Map", np.ndarray]:

@@ -58,6 +58,8 @@ class _LoopShooting(Shooting):
     motion, because its reversals neither exceed those of the period before nor fall short of them.
     """
 
+    remembers_loop_alone = True
+
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0."""
         faces = self.case.rig.faces
