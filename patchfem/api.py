@@ -1186,7 +1186,7 @@ def compare(
     units : tuple of str, optional
         Units of x and z for files without units, such as ("mm", "um").
     shift : float or str, optional
-        Known shift of the second trace [m]; 0.0 if both start at the same mark. Default: the shift is estimated.
+        Known shift of the second trace [m]. It is 0.0 if both start at the same mark. Default: the shift is estimated.
     keep_spikes : bool
         Whether to keep spikes, dropouts and dust instead of removing them.
     pairs : path, optional
@@ -1201,13 +1201,17 @@ def compare(
     Returns
     -------
     dict
-        The contents of compare.json, in SI units. `verdict` and `sentences` summarise the comparison. Measures such as
-        `shift`, `worn_depth_mean` and `amplitude_ratio` have `value`, `low`, `high`, `unit`, and a `reason` if the value is
-        None. Scans also have `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With
-        the option `pairs`, the entry `pairs` lists the comparisons; a pair that fails has a `message`. For results
-        folders, the dict contains the wear between the two runs over the whole patch, and the measures of both runs in
-        `runs`. With the option `predicted`, the entry `predicted` contains the fitted wear `coefficient`, the
-        `difference_rms` and a `sentence`.
+        The contents of compare.json, in SI units. Measures such as `shift`, `worn_depth_mean` and `amplitude_ratio` have
+        `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Scans also have `worn_volume`, `grown_volume`
+        and `worn_share`. The other entries, where they exist, are:
+
+        - `verdict`, `sentences`: summary of the comparison.
+        - `roughness`: Ra, Rq and rms slope inside and outside the track of two traces.
+        - `registration`: shift in x and y, and rotation of the second scan.
+        - `predicted`: fitted wear `coefficient`, `difference_rms`, a `sentence` and `warnings`, with the option `predicted`.
+        - `pairs`: list of the comparisons, with the option `pairs`. A pair that fails has a `message`.
+        - `runs`: measures of both runs, for results folders. The measures beside are the wear between the two runs over the
+          whole patch.
 
     Raises
     ------

@@ -66,6 +66,7 @@ RULES = {
     "D4": "a docstring begins with What, Who, How many, With, As ...",
     "D5": "the first line of a docstring is not a sentence",
     "D6": "the names in the section Parameters are not the parameters",
+    "D7": "a docstring of the package quotes a name that its code does not use",
     "F1": "a function returns a bare tuple of 3 or more values",
     "F2": "a function has more than 6 parameters",
     "F3": "a flag that can be passed by position",
@@ -106,6 +107,10 @@ PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", re.M | re.S)
 OPENING = re.compile(
     r"(What|Who|Whether what|How many|How far|That|With|As|Where|Why|Between which)\b"
 )
+# A name or dotted names in backquotes, and the quoted names that are not those of the package: modules that only comments
+# name, a page, a library, and a column of a file that a user writes
+QUOTED = re.compile(r"`([A-Za-z_][\w.]*)(?:\(\))?`")
+FOREIGN_NAMES = frozenset("ADDING calendar email mmread scipy socket x_um".split())
 FRAGMENT = re.compile(
     r"(above|an?|and|at|below|beyond|by|from|in|its|of|or|over|so|that|times|to|where|which|within)\b"
 )
@@ -133,6 +138,12 @@ def parse_source(text: str, path: Path) -> Source:
     """Parse the text of a file."""
     nodes = syntax_nodes(text)
     return Source(path, text, nodes[0], nodes)
+
+
+def list_docstrings(source: Source) -> list:
+    """Return (node, docstring) of the module, the functions and the classes that have a docstring."""
+    documented = [node for node in source.nodes if isinstance(node, DOCUMENTED)]
+    return [(node, text) for node in documented if (text := ast.get_docstring(node, clean=False))]
 
 
 # ---- the rules
@@ -201,6 +212,25 @@ def docstring_rules(node, documentation: str):
         yield "D4", node, f"{node.name}: {first}"
     if first and not first.endswith((".", ":")):
         yield "D5", node, f"{node.name}: {first}"
+
+
+def find_words(sources: list) -> set:
+    """Return the words of the code and of its texts, without comments and docstrings, and the names of the modules."""
+    words = set(FOREIGN_NAMES)
+    for source in sources:
+        text = source.text
+        for _, documentation in list_docstrings(source):
+            text = text.replace(documentation, "")
+        words.update(source.path.with_suffix("").parts, re.findall(r"\w+", re.sub("#.*", "", text)))
+    return words
+
+
+def quoted_name_rules(source: Source, words: set):
+    """Yield the rule that docstrings break if they quote a name that is not among the words of the code."""
+    for node, documentation in list_docstrings(source):
+        for name in QUOTED.findall(documentation):
+            if not words.issuperset(name.split(".")):
+                yield "D7", node, name
 
 
 def nodes_of_function(node) -> list:
@@ -373,12 +403,8 @@ def border_rules(nodes: tuple, offered: frozenset):
 
 def count_tokens(source: Source) -> int:
     """Count the tokens of a source without comments and docstrings."""
-    n_docstrings = sum(
-        isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None
-        for node in source.nodes
-    )
     comments = TOKEN.findall(source.text)  # an empty text for each token that is no comment
-    return comments.count("") - n_docstrings
+    return comments.count("") - len(list_docstrings(source))
 
 
 def folder_of_file(path: Path, root: Path) -> str:
@@ -401,6 +427,7 @@ def count_sources(root: Path = ROOT) -> Counts:
     sources = [parse_source(path.read_text("utf-8"), path) for path in paths]
     offered = offered_names(sources, root)
     measures = measure_names(sources, root)
+    words = find_words([one for one in sources if one.path.is_relative_to(root / "patchfem")])
     for source in sources:
         folder = folder_of_file(source.path, root)
         values[folder]["tokens"] += count_tokens(source)
@@ -408,15 +435,14 @@ def count_sources(root: Path = ROOT) -> Counts:
             found = border_rules(source.nodes, offered)
         else:
             found = [*style_rules(source)]
-        if (
-            folder.startswith("patchfem")
-            and str(source.path.relative_to(root)) not in MEASURE_TABLES
-        ):
-            found += measure_rules(source.nodes, measures)
-        for rule, node, words in found:
+        if folder.startswith("patchfem"):
+            found += quoted_name_rules(source, words)
+            if str(source.path.relative_to(root)) not in MEASURE_TABLES:
+                found += measure_rules(source.nodes, measures)
+        for rule, node, text in found:
             values[folder][rule] += 1
             line = getattr(node, "lineno", 1)
-            breaches[folder, rule].append(Breach(rule, source.path, line, words))
+            breaches[folder, rule].append(Breach(rule, source.path, line, text))
     return Counts({folder: dict(counter) for folder, counter in values.items()}, dict(breaches))
 
 
@@ -483,10 +509,8 @@ def main(words: list) -> None:
     if words == ["--lower"]:
         write_baseline(lower_baseline(counts, read_baseline()))
     elif words:
-        for breaches in (
-            found for (folder, _), found in counts.breaches.items() if folder == words[0]
-        ):
-            for breach in breaches:
+        for (folder, _), breaches in counts.breaches.items():
+            for breach in breaches * (folder == words[0]):
                 print(f"{breach.rule} {breach.path.relative_to(ROOT)}:{breach.line}: {breach.text}")
     else:
         print_table(counts.values)

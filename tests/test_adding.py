@@ -1,6 +1,5 @@
 """The examples of ADDING.md (new laws, shapes, drives and measures) run as printed on the page."""
 
-import json
 import re
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import adding
 import numpy as np
 import pytest
 import xarray
+from command_line import read_json, read_page
 
 from patchfem.core import G_N, Response
 
@@ -68,15 +68,12 @@ def law_folder(tmp_path_factory):
 
 def read_measures(example_folder: Path) -> dict:
     """Return the measures in the summary of a results folder."""
-    return json.loads((example_folder / "summary.json").read_text("utf-8"))["measures"]
+    return read_json(example_folder / "summary.json")["measures"]
 
 
 def test_always_examples_write_html_reports(example_folder):
     """Runs and sweeps with new measures and a new drive write reports; that of a run names the measures."""
-    pages = {
-        name: (example_folder / name / "report.html").read_text("utf-8")
-        for name in ("hold", "rig", "rigs")
-    }
+    pages = {name: read_page(example_folder / name) for name in ("hold", "rig", "rigs")}
     assert all(len(page) > 10_000 for page in pages.values())
     assert "slide range" in pages["hold"] and "slide range" in pages["rig"]
 
@@ -156,12 +153,12 @@ def test_refuses_shape_table_without_piece_key(tmp_path):
 
 def test_always_added_drive_gives_waveform_and_sweep(example_folder):
     """The base accelerates by 5 g for one second and then rests, and a sweep over the acceleration has three cases."""
-    run = xarray.load_dataset(example_folder / "hold" / "result.nc")
+    run = xarray.load_dataset(example_folder / "hold/result.nc")
     acceleration = run.base_acceleration.values
     late = run.time.values > 1.0001
     assert np.allclose(acceleration[~late & (run.time.values < 0.9999)], 5 * G_N)
     assert not acceleration[late].any()
-    cases = xarray.load_dataset(example_folder / "holds" / "sweep.nc")
+    cases = xarray.load_dataset(example_folder / "holds/sweep.nc")
     assert cases.sizes["drive_acceleration"] == 3 and set(cases.outcome.values) <= {
         "stuck",
         "steady",
@@ -175,7 +172,7 @@ def test_always_added_measures_agree_with_histories(example_folder, law_folder):
     Their error estimates are small, and a sweep contains them.
     """
     found = read_measures(example_folder / "rig")
-    run = xarray.load_dataset(example_folder / "rig" / "result.nc")
+    run = xarray.load_dataset(example_folder / "rig/result.nc")
     late = run.isel(time=run.time.values >= 190 / 143 * (1 - 1e-12))
     slide = late.relative_displacement.values
     assert found["slide_range"]["value"] == pytest.approx(np.ptp(slide), rel=1e-9)
@@ -192,6 +189,6 @@ def test_always_added_measures_agree_with_histories(example_folder, law_folder):
         abs(found["slide_mean"]["value"])
         <= found["slide_mean"]["error"] + found["slide_mean"]["floor"]
     )
-    cases = xarray.load_dataset(example_folder / "rigs" / "sweep.nc")
+    cases = xarray.load_dataset(example_folder / "rigs/sweep.nc")
     assert cases.slide_range.values[-1] == pytest.approx(found["slide_range"]["value"], rel=1e-9)
     assert np.isfinite(cases.slide_range_error.values).all()

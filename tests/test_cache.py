@@ -101,7 +101,7 @@ def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_res
     cache = shutil.copytree(shared_cache, tmp_path / "cache")
     first = parallel_results[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
-    law = package / "patchfem" / "points" / "return_maps_kernels.py"
+    law = package / "patchfem/points/return_maps_kernels.py"
     text, count = re.subn(
         r"PointState\((?=mu \* state, 0.5)", "PointState(0.8 * ", law.read_text("utf-8")
     )
@@ -187,7 +187,7 @@ keys.append(compiled.compute_kernel_key())
 for path in (*kernels, *(package / name for name in compiled.TUPLE_MODULES)):
     path.write_text(path.read_text("utf-8") + "# edited\\n", "utf-8")
     keys.append(compiled.compute_kernel_key())
-(package / "mesh" / "new_kernels.py").write_text("", "utf-8")
+(package / "mesh/new_kernels.py").write_text("", "utf-8")
 keys.append(compiled.compute_kernel_key())
 print(json.dumps(keys))
 """
@@ -217,7 +217,7 @@ def test_exact_cache_key_depends_on_kernels(tmp_path):
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
     assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 35
     assert len({own, *others}) == 1 + len(others)
-    metadata = home / "numba-0.0.dist-info" / "METADATA"
+    metadata = home / "numba-0.0.dist-info/METADATA"
     metadata.parent.mkdir()
     metadata.write_text("Metadata-Version: 2.1\nName: numba\nVersion: 0.0\n", "utf-8")
     assert compute_keys()[-1] not in others
@@ -228,13 +228,13 @@ def test_exact_cache_folder_follows_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "mine"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "theirs"))
     folder = compiled.cache_folder()
-    assert folder == tmp_path / "mine" / "patchfem" / compiled.compute_kernel_key()
+    assert folder == tmp_path / "mine/patchfem" / compiled.compute_kernel_key()
     assert folder.is_dir() and not list(folder.iterdir())
     monkeypatch.delenv("PATCHFEM_CACHE")
     assert compiled.cache_folder().is_relative_to(tmp_path / "theirs")
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
+    assert compiled.cache_folder().is_relative_to(tmp_path / "home/.cache")
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_exact_untrusted_cache_folder_is_avoided(tmp_path, monkeypatch, obstacle
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "session"))
     found = compiled.cache_folder()
-    assert found == tmp_path / "session" / "patchfem" / compiled.compute_kernel_key()
+    assert found == tmp_path / "session/patchfem" / compiled.compute_kernel_key()
     assert found.is_dir()
     assert str(base) in compiled.explain_cache_folder()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
@@ -347,7 +347,7 @@ def test_always_generated_module_needs_no_file(code_folder):
         assert found.WIDE == 3 and found.load_module().wide(2) == 6
         assert found.load_module().part.__name__ == "patchfem.compiled.jit"
     assert not [path for path in code_folder.rglob("*") if path.is_file()]
-    source = code_folder / "instances" / "compiled.with_file.py"
+    source = code_folder / "instances/compiled.with_file.py"
     for harm in ("", text[:20], "mine = 1"):
         source.parent.mkdir(parents=True, exist_ok=True)
         source.write_text(harm)

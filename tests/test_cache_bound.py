@@ -15,7 +15,7 @@ def make_code_folders(base: Path, ages: list) -> list:
     for number, age in enumerate(ages):
         folder = base / f"{number:016x}"
         (folder / "code").mkdir(parents=True)
-        (folder / "code" / "a.code").write_bytes(b"machine code")
+        (folder / "code/a.code").write_bytes(b"machine code")
         for one in (folder / "code", folder):
             os.utime(one, (time() - age * HOUR,) * 2)
         out.append(folder)
@@ -99,4 +99,4 @@ def test_always_folder_used_during_removal_is_restored(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "rename", use_then_rename)
     cache_limit.remove_old_folders(current, 0)
-    assert (old / "code" / "a.code").is_file() and len(list(tmp_path.iterdir())) == 2
+    assert (old / "code/a.code").is_file() and len(list(tmp_path.iterdir())) == 2

@@ -9,10 +9,12 @@ from house import (  # fmt: skip
     count_sources,
     count_tokens,
     exceeded_counts,
+    find_words,
     lower_baseline,
     measure_rules,
     offered_names,
     parse_source,
+    quoted_name_rules,
     read_baseline,
     style_rules,
     write_baseline,
@@ -47,6 +49,7 @@ PLANTED = {
     "D3": 'def solve():\n    """(force, slip) of a rig."""',
     "D4": 'def solve():\n    """What a rig does."""',
     "D6": 'def solve(modes, *drives):\n    """Solve.\n\n    Parameters\n    ----------\n    mode, drives : int\n    """',
+    "D7": 'def solve(rig):\n    """Solve a `rig` as `solve_old` does."""',
     "D5": 'def solve():\n    """Solve a rig that has\n    two masses."""',
     "F1": "def solve():\n    return 1, 2, 3",
     "F2": "def solve(a1, a2, a3, a4, a5, a6, a7): pass",
@@ -73,6 +76,7 @@ def broken_rules(text: str) -> set:
         *style_rules(source),
         *border_rules(source.nodes, OFFERED),
         *measure_rules(source.nodes, frozenset({"loop_area"})),
+        *quoted_name_rules(source, find_words([source])),
     )
     return {rule for rule, _, _ in found}
 
@@ -126,7 +130,7 @@ def test_exact_comments_and_docstrings_are_not_counted():
 
 def test_refuses_count_above_baseline(tmp_path):
     """A count above the baseline is reported with the file and the line of the new breach."""
-    module = tmp_path / "patchfem" / "contact" / "gaps.py"
+    module = tmp_path / "patchfem/contact/gaps.py"
     module.parent.mkdir(parents=True)
     (tmp_path / "tests").mkdir()
     module.write_text(CLEAN + "def settled(): pass\n", "utf-8")

@@ -161,7 +161,7 @@ def test_refuses_code_that_needs_numba(tmp_path):
     dispatcher = njit(double_positive)
     dispatcher(1.0)
     # the folder does not exist
-    assert not machine.store_code(tmp_path / "none" / "folder" / "a.code", dispatcher, (1.0,))
+    assert not machine.store_code(tmp_path / "none/folder/a.code", dispatcher, (1.0,))
     assert not machine.store_code(
         tmp_path / "a.code", dispatcher, (1,)
     )  # the function was never compiled for an integer

@@ -69,6 +69,17 @@ WRONG = '[drive]\nkind = "bass"\n'
 THREADS = "import os, patchfem.__main__, numpy; numpy.ones((9, 9)) @ numpy.ones((9, 9)); print(len(os.listdir('{}')))"
 
 
+NEEDS_SIGNALS = pytest.mark.skipif(
+    os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
+)
+
+
+def run_code(code: str, *words):
+    """Run code with arguments in a new interpreter and return the ended process."""
+    command = [sys.executable, "-c", code, *words]
+    return subprocess.run(command, text=True, capture_output=True, timeout=60)
+
+
 @pytest.fixture
 def scene(tmp_path):
     """Return the path of a scene with a mistake."""
@@ -79,12 +90,7 @@ def scene(tmp_path):
 
 def test_exact_process_flushes_output_before_early_exit(scene, tmp_path):
     """A command ends with its exit code, its whole output and its atexit functions, although the process ends early."""
-    done = subprocess.run(
-        [sys.executable, "-c", LEAVING, "check", scene, tmp_path / "end"],
-        text=True,
-        capture_output=True,
-        timeout=60,
-    )
+    done = run_code(LEAVING, "check", scene, tmp_path / "end")
     assert done.returncode == 2
     assert f"{scene}:2: drive.kind" in done.stderr
     assert "Traceback" not in done.stderr
@@ -92,36 +98,25 @@ def test_exact_process_flushes_output_before_early_exit(scene, tmp_path):
     assert (tmp_path / "end").read_text() == "of atexit"
 
 
-@pytest.mark.skipif(
-    os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
-)
+@NEEDS_SIGNALS
 @pytest.mark.parametrize("when, code, said", [("begin", 130, ""), ("end", 2, "drive.kind")])
 def test_exact_signal_shows_no_traceback(scene, when, code, said):
     """A signal to end the command prints no traceback.
 
     Before the start it ends the process with code 130; after the end it changes nothing.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", ASKED_TO_END, "check", scene, when],
-        text=True,
-        capture_output=True,
-        timeout=60,
-    )
+    done = run_code(ASKED_TO_END, "check", scene, when)
     assert done.returncode == code and said in done.stderr and "Traceback" not in done.stderr
     assert when == "end" or not done.stderr
 
 
-@pytest.mark.skipif(
-    os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
-)
+@NEEDS_SIGNALS
 def test_exact_interrupt_in_compiler_callback_is_kept():
     """An interrupt during a callback of LLVM (ctypes) ends the run instead of being printed and dropped.
 
     Signals that this process ignores, as under nohup, are ignored there.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60
-    )
+    done = run_code(SWALLOWED)
     taken = [
         name
         for name in ("SIGTERM", "SIGINT", "SIGHUP")

@@ -11,26 +11,26 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 
 import patchfem as pf
 
 ROOT = Path(__file__).parents[1]
-GUIDE = ROOT / "patchfem" / "scene" / "guide"
+GUIDE = ROOT / "patchfem/scene/guide"
 MIL = 25.4e-6  # m
 
 
 def test_exact_version_agrees_in_all_documents(tmp_path):
     """Citation file, change log, `--version`, `doctor`, summary and report give the version of the package."""
     citation = (ROOT / "CITATION.cff").read_text()
-    changes = (ROOT / "patchfem" / "CHANGES.md").read_text()
+    changes = (ROOT / "patchfem/CHANGES.md").read_text()
     released = re.search(r"^date-released: (\S+)$", citation, re.M).group(1)
     assert re.search(r"^version: (\S+)$", citation, re.M).group(1) == pf.__version__
     assert re.search(r"^## (.+?):", changes, re.M).group(1) == f"{pf.__version__} ({released})"
     assert run_cli("--version").out.strip() == pf.__version__
     assert re.search(rf"patchfem +{re.escape(pf.__version__)}\n", run_cli("doctor").out)
     pf.run(pf.new("bench")).save(tmp_path)
-    assert json.loads((tmp_path / "summary.json").read_text())["patchfem"] == pf.__version__
+    assert read_json(tmp_path / "summary.json")["patchfem"] == pf.__version__
     assert f"patchfem {pf.__version__}" in (tmp_path / "report.html").read_text()
 
 
@@ -149,7 +149,7 @@ def test_always_guide_python_example_runs(tmp_path, monkeypatch):
     )
     assert names["result"].measures.friction_ratio_peak.value == pytest.approx(0.4, rel=1e-6)
     assert {path.name for path in tmp_path.iterdir()} == {"loop.png", "out"}
-    assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
+    assert len(names["axes"].lines) == 2 and (tmp_path / "out/mine/summary.json").is_file()
 
 
 @pytest.fixture
@@ -174,8 +174,7 @@ def run_recipe(tmp_path, monkeypatch):
     def run_commands(question: str) -> str:
         """Run the commands of a recipe and return the output of the last."""
         for words in commands[question].split("&&"):
-            answer = run_cli(*shlex.split(words)[1:])
-            assert answer.code == 0, answer.err
+            answer = run_successfully(*shlex.split(words)[1:])
         return answer.out
 
     return run_commands
@@ -185,7 +184,7 @@ def run_recipe(tmp_path, monkeypatch):
 def test_always_tilt_limit_agrees_on_all_pages(run_recipe):
     """The recipe of tilts runs, all pages quote its tilt limit, and a run at this limit changes the loop area by 5 %."""
     verdict = run_recipe("how much tilt may I allow")
-    content = json.loads(Path("out/tilts-sweep/sweep.json").read_text("utf-8"))
+    content = read_json("out/tilts-sweep/sweep.json")
     limits = {limit["measure"]: limit["value"] for limit in content["limits"]}
     motion = set(limits) & {
         "relative_displacement_amplitude",

@@ -52,11 +52,6 @@ def read_file(reader, name: str, folder) -> None:
     reader(path)
 
 
-def export_structure(folder) -> None:
-    """Export the matrices of a rig as .npz."""
-    pf.export(write_rig(folder), folder / "rig.npz")
-
-
 def export_script(folder) -> None:
     """Export the results of a patch as a script for ParaView."""
     results = pf.run(COATED, **{"accuracy.tolerance": 0.05}).save(folder / "out")
@@ -147,7 +142,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         lambda folder: pf.sweep(RIG, {"friction.static": "0.3 +- 5 %"}),
         "write the range as low..high",
     ),
-    "export of a structure as .npz": (export_structure, "exported as .mat"),
+    "export of a structure as .npz": (
+        lambda folder: pf.export(write_rig(folder), folder / "rig.npz"),
+        "exported as .mat",
+    ),
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
     "backbone --method decay": (
         lambda folder: pf.backbone(write_rig(folder), method="decay"),

@@ -4,7 +4,6 @@ Other tests ask what a sentence must contain. Here its words are compared, with 
 change of words, `python tests/test_sentences.py` writes the list anew; read the difference before you commit it.
 """
 
-import json
 import re
 import sys
 import tempfile
@@ -17,7 +16,7 @@ HERE = Path(__file__).parent
 LIST = HERE / "sentences.toml"
 sys.path[:0] = [str(HERE / "support")] if __name__ == "__main__" else []
 
-from command_line import run_cli  # noqa: E402
+from command_line import read_json, run_cli  # noqa: E402
 from scene_texts import BENCH, COULOMB, POINT, RIG, SHORT, SMALL_PATCH  # noqa: E402
 
 import patchfem as pf  # noqa: E402
@@ -86,7 +85,7 @@ def collect_sentences(folder: Path) -> dict:
     out["warning"] = {}
     for name, words in SCREENS.items():
         answer = run_cli(*words, "-o", folder / name, "--no-page")
-        verdict = json.loads((folder / name / "summary.json").read_text("utf-8"))["verdict"]
+        verdict = read_json(folder / name / "summary.json")["verdict"]
         out["answer"][name] = "\n".join(verdict)
         # the screen shows the same sentences, below the title
         assert out["answer"][name] in answer.out

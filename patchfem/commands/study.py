@@ -125,8 +125,8 @@ def fit(
         'measurements; for a scene with [slide]: a loop with the header "time [s],displacement [um],force [N]", '
         'or one written by export; for a rig: "amplitude [um],frequency [Hz],damping [%]" of a mode, optionally with '
         "frequency_error [Hz] and damping_error [%], or what import --decay wrote, or responses "
-        '"frequency [Hz],input [g],acceleration [g],displacement [um],flag"; for a scene with [wear]: compare.json, or a '
-        'depth such as "worn_depth_max=2.5 um..3.5 um"'
+        '"frequency [Hz],input [g],acceleration [g],displacement [um],flag"; for a scene with [wear]: compare.json of two '
+        'runs, or a depth of both pieces such as "worn_depth_max=2.5 um..3.5 um"'
     ) = "",
     free: repeated_option(
         'key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated'

@@ -32,8 +32,9 @@ from importlib.util import module_from_spec, spec_from_file_location, spec_from_
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 from threading import RLock
-from time import monotonic, sleep
+from time import monotonic, process_time, sleep
 
+from .. import cost_model
 from ..disk import user_cache
 from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
@@ -207,12 +208,14 @@ COMPILE_SECONDS = [0.0]
 
 @contextmanager
 def measure_compile_time():
-    """Add the time of the block to `COMPILE_SECONDS`."""
+    """Add the time of the block to `COMPILE_SECONDS`, and its CPU time to `cost_model.COMPILE_CPU_SECONDS`."""
     begin = monotonic()
+    begin_cpu = process_time()
     try:
         yield
     finally:
         COMPILE_SECONDS[0] += monotonic() - begin
+        cost_model.COMPILE_CPU_SECONDS[0] += process_time() - begin_cpu
 
 
 @contextmanager

@@ -179,9 +179,9 @@ class LossyFile:
 
 @contextmanager
 def open_lossy(path) -> Iterator[LossyFile]:
-    """Open the file `path` for `h5py.File(file, "w")`.
+    """Open a file at `path` to which h5py writes, and raise the first error of writing at its end.
 
-    The first OSError is raised after closing it.
+    `h5py.File(file, "w")` inside the block accepts the LossyFile. OSError is raised at the end of the block.
     """
     with open(path, "w+b", buffering=0) as file:
         lossy = LossyFile(file)

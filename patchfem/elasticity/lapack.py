@@ -66,12 +66,12 @@ def cho_factor(matrix) -> np.ndarray:
 
 
 def cho_solve(lower_factor, right) -> np.ndarray:
-    """Solve a symmetric system from its factor by `cho_factor`, for right-hand sides (n,) or (n, k)."""
+    """Solve a symmetric system for right-hand sides (n,) or (n, k), with the result of `cho_factor`."""
     return dpotrs(lower_factor, right, lower=1)[0]
 
 
 def cho_inverse(low) -> np.ndarray:
-    """Return the symmetric inverse (n, n) of a matrix from its factor by `cho_factor`."""
+    """Return the inverse (n, n) of a symmetric matrix from its Cholesky factor, the result of `cho_factor`."""
     lower_half, _ = _LAPACK.dpotri(np.asfortranarray(low), lower=1)
     return np.tril(lower_half) + np.tril(lower_half, -1).T
 

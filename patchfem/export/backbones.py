@@ -169,6 +169,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
 
     # first and last point of the recommended curve, and the peak of the damping ratio between them
     peak = f"{show('largest_damping')} at {show('amplitude_of_largest_damping')}"
+    is_range = curve.amplitude.size > 1
     has_peak = False
     changes = []
     for name, label in NAMES.items():
@@ -186,9 +187,9 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
         elif _exceeds(first, last):
             changes.append(f"{label} falls from {low} to {high}")
         else:
-            changes.append(f"{label} stays at {low}")
+            changes.append(f"{label} {'stays at' if is_range else 'is'} {low}")
     ends = [format_quantity(curve.amplitude[k], "m", 3) for k in (0, -1)]
-    span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
+    span = f"from {ends[0]} to {ends[1]}" if is_range else f"at {ends[0]}"
     sentences = [f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}.", natural]
 
     if backbone.flutter is not None:
@@ -196,7 +197,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
             f"Above {show('flutter_amplitude')} the mode gains energy: friction dissipates less than the "
             "negative damping supplies."
         )
-    elif not has_peak:
+    elif is_range and not has_peak:
         sentences.append(f"The largest damping ratio is {peak}.")
     return (*sentences, *backbone.advice[:1])
 
@@ -216,11 +217,9 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
     data = {}
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
+    all_bands = [backbone.band for backbone in backbones]
     for method in METHODS:
-        bands = [
-            backbone.band if backbone.band and backbone.band.method == method else None
-            for backbone in backbones
-        ]
+        bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
         if axis is not None:
             curves = [curve if band else None for curve, band in zip(curves, bands, strict=True)]

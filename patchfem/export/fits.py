@@ -433,6 +433,13 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
         warnings.append(
             "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
         )
+    max_depth = fit.curve[1][-1]
+    if measured.high > max_depth:
+        warnings.append(
+            f"the interval of the measured {name} reaches beyond {format_length(max_depth, 4)}, the depth with the high "
+            "bound of the coefficient, at which the interval of the coefficient ends; raise the high bound, unless the "
+            "coating is worn through"
+        )
     residual = f"The interval contains {' and '.join(parts)}." if parts else ""
 
     details = {

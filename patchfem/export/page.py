@@ -147,18 +147,14 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
     rows = []
     zeros = []
     for name in dict.fromkeys(name for answer in answers.values() for name in answer.quantities):
-        by_answer = [answer.quantities.get(name) for answer in answers.values()]
-        if all(
-            quantity is not None and quantities.is_zero(name, quantity) for quantity in by_answer
-        ):
+        entries = [answer.quantities.get(name) for answer in answers.values()]
+        if all(entry is not None and quantities.is_zero(name, entry) for entry in entries):
             zeros.append(name.replace("_", " "))
             continue
 
         # every answer is compared with the first one
-        texts = [format_entry(name, quantity, by_answer[0]) for quantity in by_answer]
-        reasons = dict.fromkeys(
-            quantity.reason for quantity in by_answer if quantity and quantity.value is None
-        )
+        texts = [format_entry(name, entry, entries[0]) for entry in entries]
+        reasons = dict.fromkeys(entry.reason for entry in entries if entry and entry.value is None)
         kind = next(iter(answers.values())).kind
         missing = [f"No value: {reason}." for reason in reasons if reason]
         rows.append((name, texts, " ".join([quantities.describe(name, kind), *missing])))

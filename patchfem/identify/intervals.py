@@ -5,6 +5,7 @@ The profile of the sum of squares is used if the residual is not linear over the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -105,6 +106,9 @@ class _Minimum(NamedTuple):
         nearby = self.u
         max_step = self.u[k] if sign < 0 else 1 - self.u[k]
 
+        # A value is kept, because the descent from another point may end in another minimum, so that the ends of the bracket
+        # would have equal signs.
+        @cache
         def compute_excess(step: float) -> float:
             """Return the root of the relative growth minus 1 at a step of parameter k."""
             nonlocal nearby

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
+from ..scene.files import UNIVERSAL_EXTENSIONS
 from . import matlab, universal
 from .damage import shorten
 from .loops import EXPORTED_NAMES, find_standard_name
-from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
     Channel,
     Records,

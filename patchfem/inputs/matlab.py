@@ -186,9 +186,9 @@ def _read_sparse(group) -> sparse.csc_array:
 
 
 def _check_sparse(matrix: sparse.csc_array) -> sparse.csc_array:
-    """Return a sparse matrix.
+    """Check that the indices of a sparse matrix fit its shape, and return it.
 
-    ValueError is raised if its indices do not fit its shape, with which SciPy would crash.
+    ValueError is raised for others, with which SciPy would crash.
     """
     matrix.check_format(full_check=True)
     return matrix

@@ -5,6 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..exceptions import PatchfemError
+from ..scene.files import UNIVERSAL_EXTENSIONS
 from ..scene.keys.quantities import UNIT_FACTORS
 from .damage import shorten
 from .tables import TableFormat, find_factors, parse_number, read_text
@@ -23,8 +24,6 @@ TABLE_FORMAT = TableFormat(
     "frequency [Hz],input [g],acceleration [g],displacement [um],flag",
     "a measured table",
 )
-# File name extensions of universal files
-UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
 # Meanings of the letters in the column `flag` of a table of measured responses
 FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 

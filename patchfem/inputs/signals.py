@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
+from ..scene.files import UNIVERSAL_EXTENSIONS
 from ..scene.keys.quantities import UNIT_FACTORS
 from .records import select_channels
 from .tables import TableFormat, read_columns, require_increasing_time
@@ -32,7 +33,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     Parameters
     ----------
     path : path-like
-        CSV file with a header like ``time [s],acceleration [g]``, or a universal file (.uff, .unv)
+        CSV file with a header like ``time [s],acceleration [g]``, or a universal file
         with one time response of the quantity, in the unit of its label, of dataset 164 or in SI.
     quantity : {"acceleration", "force"}
         What the record contains.
@@ -52,7 +53,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
         If the file does not contain such a record.
     """
     path = Path(path)
-    if path.suffix.lower() in (".uff", ".unv"):
+    if path.suffix.lower() in UNIVERSAL_EXTENSIONS:
         time, value = _read_universal(path, quantity)
     else:
         table = TableFormat(

@@ -20,18 +20,12 @@ def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
 
     @lru_cache(MAX_CACHED_FILES)
     def call_cached(paths, _versions, *arguments):
-        """Call the function.
-
-        Its result is cached for these paths, versions of the files and arguments.
-        """
+        """Call the function, unless its result is cached for these paths, versions of files and arguments."""
         return function(paths, *arguments)
 
     @wraps(function)
     def read_cached(paths, *arguments):
-        """Call the function for a path or a tuple of `paths`.
-
-        It runs again if a file has changed.
-        """
+        """Return the result for a path or a tuple of `paths`, computed again if a file has changed."""
         versions = map(_find_version, paths if isinstance(paths, tuple) else (paths,))
         return call_cached(paths, tuple(versions), *arguments)
 

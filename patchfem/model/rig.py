@@ -46,6 +46,8 @@ MIN_SLIDE_FRACTION = 1e-9
 # Fraction of the squared motion of the output below which a mode moves the output by round-off only.
 MIN_MODE_FRACTION = 1e-12
 
+# Tables of the joint that was bolted when the modes were measured.
+JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 # The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
 JOINT_SCENES = {
     None: "the scene as written",

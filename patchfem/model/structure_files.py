@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError
-from ..scene.rules.structure import LOCATION_KEYS, UNIVERSAL_EXTENSIONS
+from ..scene.files import UNIVERSAL_EXTENSIONS
+from ..scene.rules.structure import LOCATION_KEYS
 from ..structure import arrays, places, universal
 from ..structure.modes import PATCH_MOTIONS
 from .file_cache import cache_by_file

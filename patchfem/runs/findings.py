@@ -85,10 +85,10 @@ class Missed(NamedTuple):
         """Named measure with the largest ratio of error to allowed error."""
         return max(self.find_names(), key=self.excess.get)
 
-    def is_time_short(self, *axes: str) -> bool:
-        """Return whether accuracy.max_seconds ended the refinement along one of some axes."""
+    def is_time_short(self, axis: str) -> bool:
+        """Return whether accuracy.max_seconds ended the refinement along an axis."""
         shortage = self.result.shortage
-        return shortage is not None and shortage.axis in axes
+        return shortage is not None and shortage.axis == axis
 
     def make_finding(self, advice: Advice) -> Finding:
         """Return the finding on these measures: errors, tolerance and advice."""

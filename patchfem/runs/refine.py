@@ -8,13 +8,13 @@ tolerance within accuracy.max_seconds is not repeated; its result names the axis
 
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
-from math import ceil, inf, log
-from time import process_time
+from math import ceil, inf, log, log2
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..core import Measure, Outcome
+from ..cost_model import measure_cpu_time
 from ..formatting import format_number
 from ..model.model import Model
 from ..response import rows
@@ -24,7 +24,9 @@ from .results.patch_rows import Measures, Values
 from .results.result import TimeShortage
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
-COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
+MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
+# The same of runs with twice the steps, or with a hundredth of the step error.
+STEP_COST_RATIO = 2.0
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
 MIN_ERROR_GAIN = 1.5
@@ -53,7 +55,7 @@ class Verdict(NamedTuple):
     finer: Hashable = None
     axis: str = ""
     seconds: float = 0.0
-    cost_ratio: float = COST_RATIO
+    cost_ratio: float = MESH_COST_RATIO
     max_passes: float = inf
     reason: str = ""
 
@@ -68,12 +70,12 @@ class TimeLimit(NamedTuple):
 
     - seconds: largest CPU time of the run [s], accuracy.max_seconds.
     - begin: CPU time of this process at which the run began [s].
-    - clock: function that returns the CPU time of this process [s].
+    - clock: function that returns the CPU time of this process [s], without that of compiling.
     """
 
     seconds: float
     begin: float
-    clock: Callable[[], float] = process_time
+    clock: Callable[[], float] = measure_cpu_time
 
 
 class Refined(NamedTuple, Generic[Solution]):
@@ -238,12 +240,18 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     if finer is None:
         return Verdict(excess)
-    resolution = "half the element size" if axis == "mesh" else "twice the steps"
+    resolution = "half the element size"
+    cost_ratio = MESH_COST_RATIO
+    max_passes = inf
+    if axis == "steps":
+        resolution = "twice the steps"
+        cost_ratio = STEP_COST_RATIO
+        max_passes = int(log2(MAX_BENCH_STEPS / result.settings.steps_per_cycle))
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
     )
-    return Verdict(excess, finer, axis, done.seconds, reason=reason)
+    return Verdict(excess, finer, axis, done.seconds, cost_ratio, max_passes, reason)
 
 
 def bound_errors(measures: Measures, before: Measures) -> Measures:

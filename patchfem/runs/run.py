@@ -8,12 +8,13 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Measure, Missing, NotConverged, Outcome
+from ..cost_model import measure_cpu_time
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..points import checkpoint
@@ -139,13 +140,13 @@ class _Passes:
         self.state_file = state_file
         self.estimate = estimate
         max_seconds = run_plan.model.accuracy.max_seconds or refine.MAX_SECONDS
-        self.limit = refine.TimeLimit(max_seconds, process_time())
+        self.limit = refine.TimeLimit(max_seconds, measure_cpu_time())
         self._count = 0
         self._pressed: tuple[Face, ...] = ()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
         """Run a model after an earlier pass, None for the first one; return None if it cannot improve the earlier pass."""
-        begin = process_time()
+        begin = self.limit.clock()
         seconds = {}
         try:
             result, pressed = self._run_model(model, seconds)
@@ -161,7 +162,7 @@ class _Passes:
             bounded = refine.bound_errors(result.measures, earlier.result.measures)
             result = replace(result, measures=bounded)
         self._count += 1
-        return FinishedPass(model, result, pressed, process_time() - begin)
+        return FinishedPass(model, result, pressed, self.limit.clock() - begin)
 
     def judge(self, done: FinishedPass, excesses: list[float]) -> refine.Verdict:
         """Decide whether a pass is followed by another one.
@@ -382,7 +383,7 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunI
         progress=None,
         stiffer=stiffer,
         # The time of the wear, which has passes of its own, is not that of the motion.
-        limit=inputs.limit._replace(begin=process_time()),
+        limit=inputs.limit._replace(begin=inputs.limit.clock()),
     )
 
 

@@ -413,10 +413,10 @@ class _ValueReader:
 
 
 def _find_value_key(key: str, texts: Sequence[str]) -> Key:
-    """Find a key.
+    """Find a key to which values can be assigned.
 
-    ValueError, with suggestions, is raised if it is not known or is a table without a value. `texts` are the values that
-    are assigned to it, as written.
+    `texts` are these values as written. ValueError, with suggestions, is raised if the key is not known, or if it is a
+    table without a value.
     """
     first = texts[0].partition("..")[0] if texts else ""
     known = require_key(key, read_set_value("", first))

@@ -10,6 +10,9 @@ from .keys.types import list_keys
 from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
 
+# File name extensions of universal files, by which every reader knows them
+UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
+
 
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
     """Return (dotted key, file) for every file that a scene, or its tables, names.
@@ -33,7 +36,7 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 def file_exists(path: Path) -> bool:
     """Return whether a path is that of an existing file.
 
-    One that the system does not accept is not.
+    A path that the system does not accept is that of none.
     """
     try:
         return path.is_file()
@@ -54,9 +57,9 @@ def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
 
 
 def require_files(scene: Any) -> Any:
-    """Return the scene itself.
+    """Require that the files exist that a scene names, and return the scene.
 
-    An error is raised if a file that it names does not exist.
+    SceneError names the files that do not exist.
     """
     absent = list_absent_files(scene, scene.path.parent)
     if absent:

@@ -60,9 +60,9 @@ def format_values(key: str, values: PythonValue, separator: str = ",") -> str:
 
 
 def require_units(scene: Any, values: dict[str, PythonValue]) -> Any:
-    """Return a scene.
+    """Require that lengths without unit can be metres, and return the scene.
 
-    SceneError is raised if lengths were given as numbers without unit that cannot be metres.
+    SceneError is raised for longer ones.
 
     Parameters
     ----------

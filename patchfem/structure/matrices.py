@@ -209,9 +209,9 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _require_finite(per_mass) -> np.ndarray:
-    """Return the stiffness `per_mass` (n, n) [1/s2].
+    """Require that a stiffness `per_mass` (n, n) [1/s2] has not overflowed, and return it.
 
-    PatchfemError is raised if it has overflowed.
+    PatchfemError is raised if it has.
     """
     if not np.isfinite(per_mass).all():
         raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
@@ -246,9 +246,9 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
 
 
 def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
-    """Return a symmetric matrix as a dense array.
+    """Check that a matrix is symmetric, and return it as a dense array.
 
-    PatchfemError is raised if it is not symmetric. `name`, such as "K", stands in the message. `shape` is that of the
+    PatchfemError is raised if it is not. `name`, such as "K", stands in the message. `shape` is that of the
     mass matrix, with which it must agree.
     """
     if hasattr(matrix, "toarray"):
@@ -264,8 +264,8 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
 def _project_damping_matrix(phi, C) -> np.ndarray:
     """Project a damping matrix C [N s/m] on mode shapes phi.
 
-    PatchfemError is raised if C adds energy. The columns of phi (n, n) are shapes of unit modal mass, so the result (n,
-    n) is in 1/s.
+    The columns of phi (n, n) are shapes of unit modal mass, so the result (n, n) is in 1/s. PatchfemError is raised if C
+    adds energy.
     """
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)

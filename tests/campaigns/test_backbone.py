@@ -13,6 +13,7 @@ from patchfem.export.columns import format_curves
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
+STRUCTURE = "[structure]" + make_shaken_block("").partition("[structure]")[2]
 
 
 def build_block(law: str, **sets):
@@ -124,8 +125,7 @@ def test_exact_backbone_of_cubic_spring_agrees_with_duffing():
 
     It is omega^2 = omega_0^2 + 3 k3 A^2/(4 m), and the damping is that of the structure alone.
     """
-    scene = make_shaken_block(PLASTIC)
-    scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
+    scene = STRUCTURE + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     amplitudes = np.array([1e-5, 1e-4])
     backbone = compute_backbone(pf.build(scene), "", amplitudes, ("balance", "quasi-static"))
     omega = np.sqrt(OMEGA**2 + 0.75e9 * amplitudes**2 / 0.5)
@@ -234,7 +234,7 @@ stiffness = "100 kN/m"
 [[structure.damper]]
 between = [1, 0]
 coefficient = "40 N s/m"
-""" + make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[drive]") :]
+""" + STRUCTURE[STRUCTURE.index("[drive]") :]
     curves = compute_backbone(pf.build(scene), "2", [1e-4]).curves
     k = np.array([[3e5, -1e5], [-1e5, 1e5]])
     m = np.diag([0.5, 0.3])
@@ -308,7 +308,8 @@ def test_curve_continues_beyond_a_fold():
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
 
 
-CROWNED = """\
+CROWNED = (
+    """\
 [contact]
 length = "20 mm"
 width = "20 mm"
@@ -321,7 +322,9 @@ radius = "20 m"
 [friction]
 law = "coulomb"
 static = 0.3
-""" + make_shaken_block("")[make_shaken_block("").index("[structure]") :]
+"""
+    + STRUCTURE
+)
 
 
 def test_always_errors_of_micro_slip_include_the_mesh():
@@ -386,9 +389,7 @@ def test_quasi_static_curve_ends_at_maximum_force():
     This is at a quarter of its wavelength of 80 um.
     """
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
-    scene = make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :].replace(
-        "[[structure.mode]]", bonded, 1
-    )
+    scene = STRUCTURE.replace("[[structure.mode]]", bonded, 1)
     model = pf.build(scene)
     amplitudes = np.array([5e-6, 1e-5, 1.5e-5, 5e-5])
     backbone = compute_backbone(model, "", amplitudes, ("quasi-static",))

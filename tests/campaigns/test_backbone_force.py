@@ -1,14 +1,13 @@
 """Force of the phase resonance, amplitudes of given forces, and backbones for several values of a key."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
+from command_line import read_json, read_page, run_successfully
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem.__main__ import main
 
 # A block of 1 kg at 100 Hz whose joint slips at 30 N, 60 um of its own motion or 120 um at the output.
 JOINT = """
@@ -179,7 +178,7 @@ def solve_one_harmonic(load: float, amplitude: float) -> tuple[float, float]:
     return omega / (2 * np.pi), damping
 
 
-def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypatch):
+def test_preloads_on_one_page_agree_with_closed_form(tmp_path, monkeypatch):
     """Three preloads give curves in one table and page that agree with equivalent linearization within 0.2 %.
 
     The sentence states the sign of both changes, and the CSV has the values of the key.
@@ -187,11 +186,9 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(JOINT, "utf-8")
     over = ("--over", "normal.load=80 N,100 N,120 N", "--amplitudes", "0.1 mm..1 mm:5")
-    with pytest.raises(SystemExit) as ended:
-        main(["backbone", "joint.toml", *over, "-o", "out", "--plot", "curves.png"])
-    assert not ended.value.code
+    answer = run_successfully("backbone", "joint.toml", *over, "-o", "out", "--plot", "curves.png")
     # the screen has the table of the page: a row for each preload under the headings
-    rows = [line.split("  ") for line in capsys.readouterr().out.splitlines()]
+    rows = [line.split("  ") for line in answer.out.splitlines()]
     cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
     first = next(k for k, row in enumerate(cells) if row and row[0] == "80 N")
     assert cells[first - 1][:2] == ["value", "frequency with a sticking contact"]
@@ -209,10 +206,10 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
         frequency, damping = solve_one_harmonic(load, float(row["amplitude [m]"]))
         assert float(row["frequency [Hz]"]) == pytest.approx(frequency, rel=2e-3)
         assert float(row["damping"]) == pytest.approx(damping, rel=2e-2)
-    headline = json.loads((tmp_path / "out/summary.json").read_text("utf-8"))["verdict"][0]
+    headline = read_json(tmp_path / "out/summary.json")["verdict"][0]
     assert headline.startswith("normal.load from 80 N to 120 N (50 % more), at ")
     assert "raises the frequency by" in headline
-    page = (tmp_path / "out/report.html").read_text("utf-8")
+    page = read_page(tmp_path / "out")
     assert "Values of the key" in page
     assert (tmp_path / "curves.png").stat().st_size > 1000
 

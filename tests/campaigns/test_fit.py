@@ -1,11 +1,10 @@
 """Parameters of each friction law fitted to friction loops, and output and refusals of the fit command."""
 
-import json
 import math
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 from friction_loops import dahl_force, elastic_plastic_force, write_loop
 
 from patchfem import SceneError, build
@@ -230,10 +229,8 @@ def fit_command(tmp_path):
 def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     """A run of the fitted scene, whose path file is the measured loop, agrees with the fitted rows."""
     free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
-    answer = run_cli(*fit_command, "--free", free, "--hold", "cycle=2", "--json")
-    assert answer.code == 0, answer.err
-    result = json.loads(answer.out)
-    assert result == json.loads((tmp_path / "out/fit.json").read_text())
+    result = run_successfully(*fit_command, "--free", free, "--hold", "cycle=2", "--json").content
+    assert result == read_json(tmp_path / "out/fit.json")
     static = result["values"]["friction.static"]
     assert static["interval"][0] < 0.31 < static["interval"][1]
     assert result["held"]["rows"] == 24 and result["unit"] == "N"
@@ -244,7 +241,7 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     at = [np.argmin(np.abs(run.time - t)) for t in written.time]
     fitted = np.array(written.labels["fitted"], float)
     assert run.force[at] == pytest.approx(fitted, abs=1e-9)
-    measures = json.loads((tmp_path / "out/summary.json").read_text())["measures"]
+    measures = read_json(tmp_path / "out/summary.json")["measures"]
     for name, force in (("work_measured", written.reading), ("work_fitted", fitted)):
         work = np.trapezoid(force, written.displacement)
         assert measures[name]["value"] == pytest.approx(work, rel=1e-12)
@@ -261,7 +258,7 @@ def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_
         ).code
         == 3
     )
-    assert json.loads((tmp_path / "out/fit.json").read_text())["outcome"] == "not_converged"
+    assert read_json(tmp_path / "out/fit.json")["outcome"] == "not_converged"
 
 
 @pytest.mark.parametrize("free, message", [

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
@@ -26,32 +26,32 @@ def scene(tmp_path):
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("name", ["worn_depth_max", "worn_depth_mean"])
-def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path, name):
+@pytest.mark.parametrize(
+    "name, source, area",
+    [("worn_depth_max", "worn_depth_max", 1), ("worn_depth_mean", "worn_volume", 12.7e-3**2)],
+)
+def test_exact_wear_coefficient_is_recovered_from_computed_depth(
+    scene, tmp_path, name, source, area
+):
     """The wear coefficient is recovered from the computed worn depth within 1e-3."""
     measures = pf.run(load(WORN)).measures
-    length = 12.7e-3
-    value = {"worn_depth_mean": measures["worn_volume"].value / length**2}.get(name) or measures[
-        name
-    ].value
-    answer = run_cli(
+    measure = measures[source]
+    value = measure.value / area
+    content = run_successfully(
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
-    )
-    assert answer.code == 0, answer.err
-    content = json.loads(answer.out)
+    ).content
     fitted = content["values"]["wear.coefficient"]
     assert fitted["value"] == pytest.approx(3e-15, rel=1e-3)
     assert "without an interval" in content["warnings"][0]
 
     # A depth without an interval leaves the numerical error of the run, to which the rounding of the fit is added.
-    measure = measures["worn_volume" if name == "worn_depth_mean" else name]
     relative_error = measure.error / measure.value
     assert relative_error > 0
     for end in ("low", "high"):
         deviation = abs(fitted[end] / fitted["value"] - 1)
         assert relative_error * (1 - 1e-2) <= deviation <= 1.5 * relative_error + 1e-3
     assert fitted["low"] <= 3e-15 <= fitted["high"]
-    refitted = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
+    refitted = pf.run(tmp_path / "fit/scene.fitted.toml").measures
     assert refitted["worn_volume"].value == pytest.approx(measures["worn_volume"].value, rel=1e-3)
 
 
@@ -65,12 +65,12 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
         json.dumps(
             {
                 "worn_depth_max": None,
+                "measures": {"loop_area": {}},
                 "worn_depth_mean": {"value": 20e-9, "low": 15e-9, "high": 30e-9, "unit": "m"},
             }
         )
     )
-    answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
-    content = json.loads(answer.out)
+    content = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json").content
     fitted = content["values"]["wear.coefficient"]
     assert fitted["low"] / fitted["value"] == pytest.approx(0.75, rel=2e-3)
     assert fitted["high"] / fitted["value"] == pytest.approx(1.5, rel=2e-3)
@@ -78,13 +78,19 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
     error = content["model_error"] / 20e-9
     assert 0 < error < 2e-3 and not content["warnings"]
     assert fitted["low"] / fitted["value"] < 0.75 < 1.5 < fitted["high"] / fitted["value"]
+    low = ("--free", "wear.coefficient=1e-16 m^2/N..8e-15 m^2/N")
+    content = run_cli("fit", scene, "--to", page, *low, "-o", tmp_path / "fit", "--json").content
+    assert "raise the high bound" in content["warnings"][0]
+    page.write_text('{"common_length": {}, "worn_depth_max": {}}')
+    assert "--predicted" in run_cli("fit", scene, "--to", page, *FREE).err
 
 
 def test_warns_of_an_unknown_numerical_error(scene):
     """On a mesh so coarse that its error cannot be estimated, the fit says that its interval lacks this error."""
     coarse = ("--set", "contact.element_size=2 mm")
-    answer = run_cli("fit", scene, *coarse, "--to", "worn_depth_mean=15 nm..30 nm", *FREE, "--json")
-    content = json.loads(answer.out)
+    content = run_cli(
+        "fit", scene, *coarse, "--to", "worn_depth_mean=15 nm..30 nm", *FREE, "--json"
+    ).content
     assert content["model_error"] is None
     assert content["warnings"] == [
         "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"

@@ -1,12 +1,11 @@
 """Screens and reports of the templates and of the shipped scenes: only expected warnings, and readable numbers."""
 
-import json
 import re
 from html import unescape
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import read_json, read_page, run_successfully
 
 from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
@@ -47,9 +46,8 @@ def visible_text(page: str) -> str:
 
 def run_and_list_warnings(path: Path, out: Path, *words) -> list:
     """Run a scene, assert that screen and report have readable numbers, and return the warnings."""
-    answer = run_cli(*words, path, "-o", out)
-    assert answer.code == 0, answer.err
-    page = (out / "report.html").read_text("utf-8")
+    answer = run_successfully(*words, path, "-o", out)
+    page = read_page(out)
     for text in (answer.out, answer.err, visible_text(page)):
         assert [
             text[max(0, one.start() - 40) : one.end() + 20] for one in UGLY.finditer(text)
@@ -76,7 +74,7 @@ def test_always_templates_run_without_warnings(kind, tmp_path):
     path.write_text(read_template(kind), "utf-8")
     assert run_and_list_warnings(path, tmp_path / "out", NEXT_VERBS.get(kind, "run")) == []
     if kind not in NEXT_VERBS:
-        summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+        summary = read_json(tmp_path / "out/summary.json")
         assert summary["outcome"] == ("steady" if kind in STEADY else "done")
 
 

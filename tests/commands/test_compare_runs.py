@@ -1,10 +1,8 @@
 """`patchfem compare` of two results folders: wear between them, in the measures of compared traces, and error messages."""
 
-import json
-
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, read_page, run_cli, run_successfully
 from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
@@ -116,28 +114,26 @@ def test_exact_hidden_line_is_highest_line_below_depth():
 
 def test_exact_compare_command_agrees_with_python(result_folders, tmp_path):
     """The command prints and stores the results of `pf.compare`, and writes a report with the verdict."""
-    answer = run_cli(
+    found = run_successfully(
         "compare",
         result_folders / "half",
         result_folders / "worn",
         "--json",
         "-o",
         tmp_path / "out",
-    )
-    assert answer.code == 0, answer.err
-    found = json.loads(answer.out)
+    ).content
     assert (
         found
         == pf.compare(result_folders / "half", result_folders / "worn")
-        == json.loads((tmp_path / "out/compare.json").read_text())
+        == read_json(tmp_path / "out/compare.json")
     )
-    page = (tmp_path / "out" / "report.html").read_text()
+    page = read_page(tmp_path / "out")
     assert found["verdict"] in page and "Friction loops" in page and "pressure peak" in page
     answer = run_cli(
         "compare", result_folders / "half", result_folders / "worn", "-o", tmp_path / "out"
     )
     assert found["verdict"] in answer.out and "worn_volume" in answer.out
-    table = np.loadtxt(tmp_path / "out" / "depth.csv", delimiter=",", skiprows=1)
+    table = np.loadtxt(tmp_path / "out/depth.csv", delimiter=",", skiprows=1)
     assert table[:, 3].max() == found["worn_depth_max"]["value"]
     assert table[:, 2] - table[:, 1] == pytest.approx(table[:, 3], abs=1e-18)
 

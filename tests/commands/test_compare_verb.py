@@ -1,10 +1,9 @@
 """`patchfem compare`: verdict, table, JSON, report, a scene solved with both surfaces, and error messages."""
 
-import json
 import re
 
 import pytest
-from command_line import run_cli
+from command_line import read_json, read_page, run_cli
 from traces import write_traces
 
 UM = 1e-6
@@ -41,7 +40,7 @@ def test_exact_compare_reports_shift_and_worn_depth(comparison):
         answer.out.splitlines()[1],
     )
     assert f"results: {out}" in answer.out
-    found = json.loads((out / "compare.json").read_text())
+    found = read_json(out / "compare.json")
     assert found["reference"] == "place" and found["direction"] == "y"
     for name in NAMES:
         assert {"value", "low", "high", "unit"} <= set(found[name])
@@ -51,7 +50,7 @@ def test_exact_compare_reports_shift_and_worn_depth(comparison):
     assert [found[name]["unit"] for name in NAMES] == ["m", "m", "m", "m2", "1", "1"]
     assert found["shift"]["value"] == pytest.approx(-SHIFT, abs=0.1 * UM)
     assert found["worn_depth_max"]["value"] == pytest.approx(DEPTH, abs=0.1 * UM)
-    page = (out / "report.html").read_text()
+    page = read_page(out)
     assert page.index("the mean of the lost material over the common length.") < page.index(
         "<figure"
     )
@@ -61,4 +60,4 @@ def test_exact_compare_reports_shift_and_worn_depth(comparison):
 def test_exact_given_shift_is_used(trace_pair):
     """A given shift in um is used: beyond the traces it gives no common place."""
     words = ("compare", *trace_pair, "--shift", f"{10_000 - SHIFT / UM:.1f} um", "--json")
-    assert json.loads(run_cli(*words).out)["reference"] != "place"
+    assert run_cli(*words).content["reference"] != "place"

@@ -1,10 +1,9 @@
 """Output of a run on the screen: verdict, key numbers in readable units, one line for each file; no output with -q."""
 
-import json
 import shlex
 
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli
 from page_data import find_wrong_numbers
 
 from patchfem.__main__ import VERB_GROUPS, app, register_verbs
@@ -16,11 +15,7 @@ def run_template(tmp_path, kind, *words, **keys):
     """Run the template of a kind of scene with settings, and return the answer."""
     path = tmp_path / f"{kind}.toml"
     path.write_text(read_template(kind), "utf-8")
-    sets = [
-        word
-        for key, value in keys.items()
-        for word in ("--set", f"{key.replace('__', '.')}={value}")
-    ]
+    sets = [f"--set={key.replace('__', '.')}={value}" for key, value in keys.items()]
     return run_cli("run", path, "-o", tmp_path / "out", "--no-page", *sets, *words)
 
 
@@ -33,7 +28,7 @@ def read_numbers(text: str) -> dict[str, str]:
 def test_exact_printed_numbers_equal_summary(tmp_path):
     """Title, verdict, key numbers and files are printed in this order; the numbers equal summary.json."""
     answer = run_template(tmp_path, "rig")
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    summary = read_json(tmp_path / "out/summary.json")
     lines = answer.out.splitlines()
     assert lines[0] == summary["title"] == "A rubbing block on flexures, shaken at one frequency"
     count = len(summary["verdict"])
@@ -50,7 +45,7 @@ def test_exact_printed_numbers_equal_summary(tmp_path):
 def test_exact_verbose_run_prints_all_measures(tmp_path):
     """With -v all measures are printed; one without a value has its reason."""
     answer = run_template(tmp_path, "rig", "-v")
-    measures = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["measures"]
+    measures = read_json(tmp_path / "out/summary.json")["measures"]
     shown = read_numbers(answer.out)
     assert shown.keys() == measures.keys()
     assert find_wrong_numbers(shown, measures) == []
@@ -75,7 +70,7 @@ def test_exact_quiet_run_prints_nothing(tmp_path, words, out):
     """A run with -q prints nothing, or only its JSON, and writes its files."""
     answer = run_template(tmp_path, "bench", *words)
     assert answer.code == 0 and answer.err == "" and answer.out[:1] == out
-    assert (tmp_path / "out" / "summary.json").is_file()
+    assert (tmp_path / "out/summary.json").is_file()
 
 
 def test_exact_results_are_named_if_the_picture_fails(tmp_path):

@@ -1,13 +1,12 @@
 """`patchfem compare --predicted`: wear coefficient from traces and a run with wear, and roughness by region."""
 
-import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
-from command_line import run_cli
+from command_line import read_json, read_page, run_successfully
 from scipy.ndimage import gaussian_filter1d
 
 import patchfem as pf
@@ -44,6 +43,12 @@ def write_trace(path: Path, x, z) -> Path:
     return path
 
 
+def write_traces(folder: Path, x, *heights) -> list[Path]:
+    """Write the traces before and after wear, and return their paths."""
+    names = ("before.csv", "after.csv")
+    return [write_trace(folder / name, x, z) for name, z in zip(names, heights, strict=True)]
+
+
 def draw_surface(x) -> np.ndarray:
     """Draw a Gaussian surface (n,) [m] of 0.5 um rms and waves above 10 um."""
     random = np.random.default_rng(58)
@@ -59,7 +64,7 @@ def artificial_pair(tmp_path_factory) -> tuple:
     The depth along a crowned, tilted patch is that of an independent program (`tests/support/wear_scenes.py` of version
     1.10). It varies by 6 % about Archard's law, and each trace has its own start, tilt and noise.
     """
-    truth = json.loads(Path(__file__).with_name("worn_patch.json").read_text("utf-8"))
+    truth = read_json(Path(__file__).with_name("worn_patch.json"))
     folder = tmp_path_factory.mktemp("made") / "wear"
     pf.run(truth["scene"], **COARSE).save(folder)
     x = np.arange(0.0, 8e-3, 1e-6)
@@ -79,17 +84,23 @@ def artificial_pair(tmp_path_factory) -> tuple:
     return folder, traces, truth, middle - starts[1]
 
 
+@pytest.fixture(scope="module")
+def crowned_run(tmp_path_factory) -> Path:
+    """Return the folder of a run in which the contact of a crown grows by wear."""
+    return pf.run(RUN, **COARSE).save(tmp_path_factory.mktemp("crowned") / "wear")
+
+
 def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp_path):
     """The intervals of the wear coefficient and of the patch centre cover the true values."""
     folder, traces, truth, centre = artificial_pair
     out = tmp_path / "out"
-    files = []
-    for name, (x, z) in zip(("before.csv", "after.csv"), traces):
-        files.append(write_trace(tmp_path / name, x, z[::-1]))
+    x = traces[0][0]
+    files = write_traces(tmp_path, x, *(z[::-1] for _, z in traces))
     centre = x[0] + x[-1] - centre
-    answer = run_cli("compare", *files, "--predicted", folder, "--piece", "lower", "-o", out)
-    assert answer.code == 0, answer.err
-    data = json.loads((out / "compare.json").read_text("utf-8"))
+    answer = run_successfully(
+        "compare", *files, "--predicted", folder, "--piece", "lower", "-o", out
+    )
+    data = read_json(out / "compare.json")
     predicted = data["predicted"]
     for name, true in (("coefficient", truth["coefficient"]), ("patch_centre", centre)):
         assert predicted[name]["low"] <= true <= predicted[name]["high"]
@@ -104,16 +115,15 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
         depth = np.interp(table[:, 0], result.x.values, result.wear_worn_depth.values[-1])
     inside = np.abs(table[:, 0]) < 0.45 * truth["length"]
     assert np.corrcoef(depth[inside], table[inside, 4])[0, 1] > 0.99
-    page = (out / "report.html").read_text("utf-8")
+    page = read_page(out)
     assert "Computed and measured wear" in page
 
 
-def test_exact_wear_coefficient_follows_run_history(tmp_path):
+def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
     The depth is not proportional to the coefficient there.
     """
-    crowned_run = pf.run(RUN, **COARSE).save(tmp_path / "wear")
     with xarray.open_dataset(crowned_run / "result.nc") as result:
         frame = 8
         place = result.x.values
@@ -124,10 +134,7 @@ def test_exact_wear_coefficient_follows_run_history(tmp_path):
     before = draw_surface(x)
     worn = PIECE_SHARE * np.interp(x - 2.2e-3, place, depth, left=0.0, right=0.0)
     noise = 1e-9 * np.random.default_rng(1).normal(size=x.size)
-    files = (
-        write_trace(tmp_path / "before.csv", x, before),
-        write_trace(tmp_path / "after.csv", x, before - worn + noise),
-    )
+    files = write_traces(tmp_path, x, before, before - worn + noise)
     predicted = pf.compare(*files, predicted=crowned_run)["predicted"]
     assert predicted["coefficient"]["value"] / 1e-14 == pytest.approx(ratio, rel=2e-3)
     assert predicted["proportional_coefficient"] / 1e-14 > 1.05 * ratio
@@ -153,10 +160,7 @@ def test_tells_a_wrong_share_from_scatter(crowned_run, tmp_path, share, scatter)
     before = draw_surface(x)
     worn = share * PIECE_SHARE * np.interp(x - 2.2e-3, place, depth, left=0.0, right=0.0)
     worn = worn * (1 + scatter * waves) + 1e-9 * random.normal(size=x.size)
-    files = (
-        write_trace(tmp_path / "before.csv", x, before),
-        write_trace(tmp_path / "after.csv", x, before - worn),
-    )
+    files = write_traces(tmp_path, x, before, before - worn)
     content = pf.compare(*files, predicted=crowned_run)
     predicted = content["predicted"]
     mean = re.search(r"mean computed depth over the patch, ([\d.]+) nm", predicted["sentence"])

@@ -1,6 +1,5 @@
 """`patchfem profile`: definitions, JSON, report, several files, split traces, and error messages."""
 
-import json
 from pathlib import Path
 
 import contact_forms as closed_forms
@@ -41,7 +40,7 @@ def scan_file(tmp_path) -> Path:
 
 def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
     """The JSON gives parameters in SI units; Sq of a scan agrees with the rms about a least-squares plane within 1e-9."""
-    answer = json.loads(run_cli("profile", trace_file, scan_file, "--json").out)
+    answer = run_cli("profile", trace_file, scan_file, "--json").content
     first, second = answer["profiles"]
     assert (
         first["file"] == str(trace_file)
@@ -60,7 +59,7 @@ def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
         1e-9 * np.sqrt((residual**2).mean()), rel=1e-9
     )
     assert second["shape"] == [12, 16]
-    window = json.loads(run_cli("profile", trace_file, "--window", "1 mm,1.8 mm", "--json").out)[
+    window = run_cli("profile", trace_file, "--window", "1 mm,1.8 mm", "--json").content[
         "profiles"
     ][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
@@ -107,7 +106,7 @@ def split_scene(tmp_path, monkeypatch) -> Path:
 def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     """Truth: 0.45 times the rms height beyond the Gaussian filter; the pressure that closes a sine of this slope."""
     words = ("profile", "waves.csv", "--split", split_scene, "--cutoff", "250 um", "--json")
-    split = json.loads(run_cli(*words).out)["split"]
+    split = run_cli(*words).content["split"]
     waves = np.array([LONG, SHORT])
     heights = np.array([HIGH, LOW]) * (1 - 2 ** -((250e-6 / waves) ** 2))
     assert split["cutoff"] == pytest.approx(250e-6)

@@ -42,7 +42,6 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
         ((*STATIC, "--plot", "a.jpg"), ("a.jpg: a picture is written as .png, .svg, .pdf",)),
-        ((*STATIC, "--of", "damping"), ("sweep --of was removed",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
         (
@@ -63,9 +62,6 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         ),
     ],
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
-    "plan rig.toml": [
-        (STATIC, ("plan --over was removed",)),
-    ],
     **{
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
         for verb in ("check", "sweep")

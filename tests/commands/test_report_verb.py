@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from command_line import run_cli
+from command_line import read_page, run_cli, run_successfully
 from page_data import read_charts, read_measures
 from scene_texts import BENCH
 
@@ -17,16 +17,16 @@ def folders(tmp_path_factory):
     (base / "bench.toml").write_text(BENCH, encoding="utf-8")
     for name, static in SETS.items():
         words = ("--set", f"friction.static={static}", "-o", base / name, "-q", "--no-page")
-        assert run_cli("run", base / "bench.toml", *words).code == 0
+        run_successfully("run", base / "bench.toml", *words)
     over = ("--over", "friction.static=0.2,0.3", "-o", base / "sweep", "-q", "--no-page")
-    assert run_cli("sweep", base / "bench.toml", *over).code == 0
+    run_successfully("sweep", base / "bench.toml", *over)
     return base
 
 
 def test_exact_two_runs_share_charts_and_measures(folders):
     """The page of two runs has a curve and a column of measures for each; the forces are 0.2 and 0.4 of the load."""
     page = folders / "both.html"
-    assert run_cli("report", folders / "low", folders / "high", "-o", page).code == 0
+    run_successfully("report", folders / "low", folders / "high", "-o", page)
     text = page.read_text("utf-8")
     curves = read_charts(text)["Friction loop"]["data"]
     names = {curve["name"]: curve for curve in curves}
@@ -38,9 +38,9 @@ def test_exact_two_runs_share_charts_and_measures(folders):
 
 def test_exact_page_of_a_case_lists_its_effects_without_time(folders):
     """The summary of a case of a sweep has effects without a CPU time; its page once ended as a fault."""
-    folder = next((folders / "sweep" / "cases").iterdir())
-    assert run_cli("report", folder).code == 0
-    text = (folder / "report.html").read_text("utf-8")
+    folder = next((folders / "sweep/cases").iterdir())
+    run_successfully("report", folder)
+    text = read_page(folder)
     rows = re.findall(r"<tr><td>(.*?)</td><td>.*?</td><td class=\"v\">(.*?)</td></tr>", text)
     assert {("normal", ""), ("slide.kind=triangle", "")} <= set(rows)
 

@@ -1,6 +1,5 @@
 """The commands for beginners: `new`, `demo`, `schema`, `doctor`, `cite`, help and completion."""
 
-import json
 import re
 import subprocess
 import tomllib
@@ -8,7 +7,7 @@ from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 
 import patchfem as pf
 from patchfem import load
@@ -25,8 +24,7 @@ def test_exact_new_writes_template(tmp_path):
     """`patchfem new` writes the template that it prints, names the next command, and does not overwrite a file."""
     path = tmp_path / "mine.toml"
     assert run_cli("new", "joint").out == read_template("joint") == pf.new("joint")
-    answer = run_cli("new", "joint", "-o", path)
-    assert answer.code == 0
+    answer = run_successfully("new", "joint", "-o", path)
     assert path.read_text("utf-8") == read_template("joint")
     assert f"patchfem run {path}" in answer.out
     for kind, verb in NEXT_VERBS.items():
@@ -40,22 +38,17 @@ def test_exact_new_writes_template(tmp_path):
 def test_exact_demo_runs_shipped_rig(tmp_path):
     """`patchfem demo` runs the rig of the report: its amplitude agrees with 14.8028 um within the error."""
     answer = run_cli("demo", "-o", tmp_path / "out", "--no-page")
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    summary = read_json(tmp_path / "out/summary.json")
     amplitude = summary["measures"]["relative_displacement_amplitude"]
     assert answer.code == 0 and amplitude["value"] == pytest.approx(
         14.8028e-6, abs=amplitude["error"]
     )
 
 
-def replace_versions(monkeypatch, version_of) -> None:
-    """Let the doctor find the versions that a function returns."""
-    monkeypatch.setattr(examine, "version", version_of)
-
-
 def examine_with(monkeypatch, version_of) -> dict:
     """Run the doctor with these versions of packages; return the findings by name."""
-    replace_versions(monkeypatch, version_of)
-    return {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
+    monkeypatch.setattr(examine, "version", version_of)
+    return {finding["name"]: finding for finding in run_cli("doctor", "--json").content}
 
 
 def versions_of_only(*installed: str):

@@ -49,7 +49,7 @@ def test_exact_closed_pipe_changes_neither_files_nor_exit_code(scene_file, tmp_p
     words = ("sweep", scene_file, "--over", "normal.load=100 N,-1 N", "--json", "--no-page")
     done = run_patchfem(*words, "-o", tmp_path / "out", stdout=writer, stderr=writer)
     os.close(writer)
-    assert done.returncode == 3 and (tmp_path / "out" / "sweep.csv").is_file()
+    assert done.returncode == 3 and (tmp_path / "out/sweep.csv").is_file()
 
 
 def test_exact_full_stderr_keeps_exit_code(tmp_path):

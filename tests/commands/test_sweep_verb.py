@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 from scene_texts import COULOMB, POINT, SHORT
 from sweep_tables import read_rows
 
@@ -58,7 +58,7 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
         sets = {"normal.load": row["normal.load"], "drive.acceleration": row["drive.acceleration"]}
         single = pf.run(rig_scene, **sets)
         assert row["outcome"] == single.outcome and row["message"] == ""
-        stored = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
+        stored = read_json(out / "cases" / row["case"] / "summary.json")
         assert (
             stored["case"] == sets
             and stored["kind"] == "rig"
@@ -126,7 +126,7 @@ def test_exact_cases_file_gives_rows(rig_scene, tmp_path):
     assert [tuple(row[key] for key in keys) for row in read_rows(tmp_path / "a")] == [
         (*one, level) for one in (("10 N", "0.3"), ("20 N", "0.4")) for level in LEVELS
     ]
-    with xr.open_dataset(tmp_path / "a" / "sweep.nc") as found:
+    with xr.open_dataset(tmp_path / "a/sweep.nc") as found:
         assert dict(found.sizes) == {"case": 4} and found.normal_load.dims == ("case",)
         np.testing.assert_array_equal(found.friction_static, [0.3, 0.3, 0.4, 0.4])
 
@@ -153,10 +153,10 @@ def test_exact_command_and_table_repeat_random_cases(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     over = ("--over", "friction.static=0.24..0.36", "--random", "5", "--seed", "3", "--no-page")
     given = ["sweep", "bench.toml", *over]
-    assert run_cli(*given, "-o", "first").code == 0
+    run_successfully(*given, "-o", "first")
     assert store.read(tmp_path / "first").origin["command"].startswith("patchfem")
-    assert run_cli(*given, "-o", "again").code == 0
-    listed = sweep_into(tmp_path / "listed", scene, "--cases", tmp_path / "first" / "sweep.csv")
+    run_successfully(*given, "-o", "again")
+    listed = sweep_into(tmp_path / "listed", scene, "--cases", tmp_path / "first/sweep.csv")
     assert listed.code == 0
     tables = [(tmp_path / name / "sweep.csv").read_bytes() for name in ("first", "again", "listed")]
     assert tables[1:] == tables[:1] * 2

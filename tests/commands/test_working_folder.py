@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from command_line import run_cli
+from command_line import run_successfully
 from scene_texts import BENCH
 
 NAMES = "random numpy pyvista signal copy socket selectors matplotlib h5py".split()
@@ -15,6 +15,6 @@ def test_always_commands_execute_no_local_modules(tmp_path, monkeypatch):
     for name in NAMES:
         Path(f"{name}.py").write_text("open('RAN', 'a')\nraise SystemExit(9)\n")
     over = ("--over", "friction.static=0.2,0.3", "-j", 2, "--no-page")
-    assert run_cli("run", "bench.toml", "-o", "out").code == 0
-    assert run_cli("sweep", "bench.toml", *over, "-o", "swept").code == 0
+    run_successfully("run", "bench.toml", "-o", "out")
+    run_successfully("sweep", "bench.toml", *over, "-o", "swept")
     assert Path("swept/sweep.csv").is_file() and not Path("RAN").exists()

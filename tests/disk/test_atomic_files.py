@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from limits import limit_file_size
 from scene_texts import BENCH, COATED
 
@@ -23,7 +23,7 @@ def results_folder(tmp_path_factory):
     """Scene and results folder of two pressed pieces."""
     folder = tmp_path_factory.mktemp("results")
     (folder / "scene.toml").write_text(COATED, "utf-8")
-    assert run_cli("run", folder / "scene.toml", "-o", folder / "out", "--no-page").code == 0
+    run_successfully("run", folder / "scene.toml", "-o", folder / "out", "--no-page")
     return folder / "scene.toml", folder / "out"
 
 
@@ -121,7 +121,7 @@ def test_exact_interrupted_write_preserves_older_file(tmp_path, raised):
 def test_refuses_unwritable_path(tmp_path):
     """A path that is a folder, in a missing folder or too long is refused."""
     (tmp_path / "folder").mkdir()
-    for path in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
+    for path in tmp_path / "folder", tmp_path / "none/a", tmp_path / ("a" * 300):
         with pytest.raises(Missing, match="cannot be written"):
             write_text(path, "text")
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"] and not list(
@@ -152,6 +152,6 @@ def test_always_output_folder_below_file_is_refused(tmp_path, words):
     """An output folder below a file is refused with the name of the file."""
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
-    answer = run_cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
+    answer = run_cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE/x")
     assert answer.code == 4
     assert f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err

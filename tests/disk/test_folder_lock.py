@@ -3,10 +3,9 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import list_names, run_cli
 from scene_texts import BENCH
 
 from patchfem.core import Missing
@@ -49,11 +48,6 @@ def start_process(code: str, *words):
     return subprocess.Popen(
         [*PYTHON, code, *map(str, words)], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
-
-
-def list_names(folder: Path) -> set:
-    """Return the names in a folder."""
-    return {path.name for path in folder.iterdir()}
 
 
 def test_always_simultaneous_processes_have_single_owner(tmp_path):

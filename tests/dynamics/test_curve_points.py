@@ -38,10 +38,10 @@ def test_always_linear_interpolation_of_peak_meets_tolerance(zeta, ends):
     assert values.max() == pytest.approx(1 / (2 * zeta * np.sqrt(1 - zeta**2)), rel=0.01)
 
 
-@pytest.mark.parametrize("tolerance", [1e-4])
-def test_always_smaller_tolerance_is_met_with_few_points(tolerance):
-    """Smaller tolerances are met with fewer than three times the optimal number of points, int
+def test_always_tolerance_is_met_with_few_points():
+    """A tolerance of 1e-4 is met with fewer than three times the optimal number of points, int
     sqrt(|y''|/(8 tolerance y)) df."""
+    tolerance = 1e-4
     values, frequencies = sample_curve(
         lambda f: magnification(f, 3e-3), np.linspace(120, 170, 6), tolerance
     )

@@ -2,7 +2,7 @@
 
 import pytest
 from chromium import Chromium, find_chromium
-from command_line import run_cli
+from command_line import run_successfully
 from scene_texts import CROWNED_BENCH as CROWNED
 
 
@@ -11,8 +11,7 @@ def bench_folder(tmp_path_factory):
     """Return the results folder of a crowned, coated pair that slips."""
     base = tmp_path_factory.mktemp("bench")
     (base / "bench.toml").write_text(CROWNED, "utf-8")
-    answer = run_cli("run", base / "bench.toml", "-o", base / "out", "-q")
-    assert answer.code == 0, answer.err
+    run_successfully("run", base / "bench.toml", "-o", base / "out", "-q")
     return base / "out"
 
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 from scene_texts import BENCH
 
 from patchfem import PatchfemError
@@ -104,7 +104,7 @@ def change_summary(**entries):
 
     def change(folder) -> None:
         """Change the entries in a folder."""
-        content = json.loads((folder / "summary.json").read_text("utf-8"))
+        content = read_json(folder / "summary.json")
         (folder / "summary.json").write_text(json.dumps(content | entries), "utf-8")
 
     return change
@@ -162,7 +162,7 @@ def bench_results(tmp_path_factory):
     """Return the results folder of a bench."""
     base = tmp_path_factory.mktemp("files")
     (base / "bench.toml").write_text(BENCH, "utf-8")
-    assert run_cli("run", base / "bench.toml", "-o", base / "out", "-q").code == 0
+    run_successfully("run", base / "bench.toml", "-o", base / "out", "-q")
     return base / "out"
 
 

@@ -1,32 +1,23 @@
 """Runs that do not converge: the results of the pressed patch are stored and marked, or no folder is written."""
 
-import json
-
 import pytest
-from command_line import run_cli
+from command_line import read_json, read_page, run_cli
 from scene_texts import DRIVE, MODE, PLASTIC, POINT, SMALL_PATCH
 
 import patchfem as pf
 
 # At resonance, neither damping nor friction limits an undamped mode that slips, so that a curve from there has no start.
-UNBOUNDED_SETTINGS = (
-    "--set",
-    "structure.mode.axial.damping=0",
-    "--set",
-    "drive.acceleration=30 g",
-    "--set",
-    "accuracy.method=harmonic",
-    "--set",
-    "friction.law=nonlocal",
-    "--set",
-    "drive.waveform=sweep",
-    "--set",
-    "drive.from=143 Hz",
-    "--set",
-    "drive.to=160 Hz",
-    "--set",
-    "drive.rate=80 Hz/s",
-)
+UNBOUNDED = {
+    "structure.mode.axial.damping": 0,
+    "drive.acceleration": "30 g",
+    "accuracy.method": "harmonic",
+    "friction.law": "nonlocal",
+    "drive.waveform": "sweep",
+    "drive.from": "143 Hz",
+    "drive.to": "160 Hz",
+    "drive.rate": "80 Hz/s",
+}
+SETTINGS = [f"--set={key}={value}" for key, value in UNBOUNDED.items()]
 
 
 def test_exact_pressed_patch_is_stored_as_not_converged(tmp_path):
@@ -37,11 +28,11 @@ def test_exact_pressed_patch_is_stored_as_not_converged(tmp_path):
     scene = tmp_path / "rig.toml"
     folder = tmp_path / "out"
     scene.write_text(SMALL_PATCH + PLASTIC + MODE + DRIVE)
-    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED_SETTINGS)
+    answer = run_cli("run", scene, "-o", folder, *SETTINGS)
     assert (
         answer.code == 3 and "grows for ever" in answer.err and f"results: {folder}" in answer.out
     )
-    summary = json.loads((folder / "summary.json").read_text("utf-8"))
+    summary = read_json(folder / "summary.json")
     assert summary["outcome"] == "not_converged" and summary["kind"] == "rig"
     assert (
         "grows for ever" in summary["warnings"][0] and str(tmp_path) not in summary["warnings"][0]
@@ -54,17 +45,11 @@ def test_exact_pressed_patch_is_stored_as_not_converged(tmp_path):
     assert {"fields.vtkhdf", "result.nc", "report.html"} <= {
         entry.name for entry in folder.iterdir()
     }
-    assert "not_converged" in (folder / "report.html").read_text("utf-8")
+    assert "not_converged" in read_page(folder)
     with pytest.raises(
         pf.NotConverged, match="grows for ever"
     ) as raised:  # Python raises NotConverged with the same partial results
-        pf.run(
-            scene,
-            **{
-                key: value
-                for key, _, value in (entry.partition("=") for entry in UNBOUNDED_SETTINGS[1::2])
-            },
-        )
+        pf.run(scene, **UNBOUNDED)
     assert raised.value.partial_result.outcome == "not_converged"
 
 
@@ -73,7 +58,7 @@ def test_exact_unconverged_rig_without_patch_has_no_folder(tmp_path):
     scene = tmp_path / "rig.toml"
     folder = tmp_path / "out"
     scene.write_text(POINT + PLASTIC + MODE + DRIVE)
-    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED_SETTINGS)
+    answer = run_cli("run", scene, "-o", folder, *SETTINGS)
     assert answer.code == 3 and answer.out == "" and len(answer.err.strip().splitlines()) == 1
     assert "grows for ever" in answer.err and "so there is no results folder" in answer.err
     assert not folder.exists() and not (tmp_path / "out.partial").exists()

@@ -1,10 +1,8 @@
 """A failure of the page never damages the results of a run."""
 
-import json
-
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import list_names, read_json, read_page, run_cli, run_successfully
 from scene_texts import BENCH
 
 from patchfem.core import Missing
@@ -23,16 +21,16 @@ def scene_file(tmp_path):
 
 def test_exact_page_is_added_to_results(scene_file, tmp_path):
     """The page is added to the results and lists all measures; a later run without a page removes it."""
-    assert run_cli("run", scene_file, "-o", tmp_path / "out").code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES | {"report.html"}
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
-    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    run_successfully("run", scene_file, "-o", tmp_path / "out")
+    assert list_names(tmp_path / "out") == RESULT_FILES | {"report.html"}
+    summary = read_json(tmp_path / "out/summary.json")
+    page = read_page(tmp_path / "out")
     assert page.endswith("</html>") and all(
         name.replace("_", " ") in page for name in summary["measures"]
     )
     # the page of an earlier run is removed
-    assert run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page").code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
+    run_successfully("run", scene_file, "-o", tmp_path / "out", "--no-page")
+    assert list_names(tmp_path / "out") == RESULT_FILES
 
 
 @pytest.mark.parametrize(
@@ -56,7 +54,7 @@ def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, f
     assert answer.code == code and words in answer.err
     assert "are complete except for report.html" in answer.err
     assert "friction_force_peak" in answer.out
-    assert {path.name for path in out.iterdir()} == RESULT_FILES
-    assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
+    assert list_names(out) == RESULT_FILES
+    assert read_json(out / "summary.json")["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0

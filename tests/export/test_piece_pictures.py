@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from exported import write_small_series
 from PIL import Image
 
@@ -79,15 +79,15 @@ def test_exact_pictures_of_a_frame_are_equal_files(small_folder, tmp_path, endin
     """Two pictures of the same frame are equal byte for byte; an SVG file once had random names of its parts."""
     paths = [tmp_path / f"{name}.{ending}" for name in "ab"]
     for path in paths:
-        assert run_cli("view", small_folder, "-o", path).code == 0
+        run_successfully("view", small_folder, "-o", path)
     first, second = (path.read_bytes() for path in paths)
     assert first == second and len(first) > 1000
 
 
 def test_exact_gif_has_frames_of_last_cycle(small_folder, tmp_path):
     """A .gif has the frames of the last cycle, each with other pixels."""
-    answer = run_cli("view", small_folder, "-o", tmp_path / "a.gif")
-    assert answer.code == 0 and "3 frames, 1 s to 1.002 s" in answer.out
+    answer = run_successfully("view", small_folder, "-o", tmp_path / "a.gif")
+    assert "3 frames, 1 s to 1.002 s" in answer.out
     film = Image.open(tmp_path / "a.gif")
     frames = []
     for number in range(film.n_frames):

@@ -1,12 +1,11 @@
 """Notes on yielding, compared with Hertz's line contact: 0.558 of the peak pressure, 0.70 half-widths deep."""
 
-import json
 import re
 from math import pi
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_successfully
 
 import patchfem as pf
 from patchfem.scene import MATERIALS
@@ -47,8 +46,8 @@ def find_yield_notes(tmp_path, peak: float, substrate: str = '"steel"') -> list:
     load = float(peak**2 * pi * RADIUS / MODULUS * WIDTH)
     scene = tmp_path / "hertz.toml"
     scene.write_text(SCENE.format(load=load, substrate=substrate))
-    assert run_cli("run", scene, "-o", tmp_path / "out", "--no-page", "-q").code == 0
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    run_successfully("run", scene, "-o", tmp_path / "out", "--no-page", "-q")
+    summary = read_json(tmp_path / "out/summary.json")
     return [note for note in summary["notes"] if "yield strength" in note]
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from scene_texts import DRIVE, PAIR, PLASTIC, POINT, STRUCTURE, make_friction_table
 from scipy.io import loadmat
 
@@ -17,8 +17,8 @@ FRICTION_RIG = POINT + PLASTIC + STRUCTURE
 def export_structure(folder, text: str):
     """Return the model of a scene and the path of its export."""
     (folder / "rig.toml").write_text(text)
-    answer = run_cli("export", folder / "rig.toml", "-o", folder / "rig.mat")
-    assert answer.code == 0 and "friction element" in answer.out, answer.err
+    answer = run_successfully("export", folder / "rig.toml", "-o", folder / "rig.mat")
+    assert "friction element" in answer.out, answer.err
     return build(pf.load(folder / "rig.toml")), folder / "rig.mat"
 
 
@@ -80,7 +80,9 @@ def element_force(stiffness, limit, slide):
 def test_exact_exported_elements_agree_with_bench(tmp_path, law, tolerance):
     """Under a triangular slide the force of the exported elements agrees with the bench of the law, relative to its limit.
 
-    The bench has the density of Iwan's law, which the elements replace with an error below 2e-6."""
+    The bench has the density of Iwan's law, which the elements replace with an error of 1e-6 on first loading and of 2e-6
+    after a reversal (MATRICES.md).
+    """
     _, path = export_structure(tmp_path, POINT + make_friction_table(law) + STRUCTURE)
     exported = loadmat(path)
     exported |= {name: exported[name].ravel() for name in ("stiffness", "limit")}
@@ -157,7 +159,6 @@ def test_exact_matrices_and_elements_of_several_interfaces(tmp_path):
             "cannot be written with [normal.grooves]",
         ),
         (FRICTION_RIG, ".csv", "a structure is exported as .mat"),
-        (FRICTION_RIG, ".npz", "removed in patchfem 1.2"),
         (
             POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n',
             ".mat",

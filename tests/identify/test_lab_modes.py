@@ -48,12 +48,20 @@ def test_exact_free_decay_frequency_damping_and_amplitude(amplitudes):
 
 
 def test_always_noisy_decay_is_within_stated_error():
-    """The damping from a decay with noise is within 1.6 times its stated error."""
-    time, value = free_decay()
-    rng = np.random.default_rng(4)
-    for _ in range(2):
-        modes = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
-        assert (np.abs(modes.damping - ZETA) < 1.6 * modes.damping_error).all()
+    """At least 85 % of 40 damping ratios from decays with 3 % noise are within their stated 95 % errors.
+
+    Frequencies of 110 to 290 Hz and damping ratios of .002 to .03 are random. The errors are not far too wide.
+    """
+    random = np.random.default_rng(4)
+    ratios = []
+    for _ in range(20):
+        zeta = ZETA * random.uniform(0.5, 3, 2)
+        time, value = free_decay(omega=OMEGA * random.uniform(0.8, 1.1, 2), zeta=zeta)
+        modes = fit_decay(time, value + 0.01 * random.normal(size=time.size))
+        ratios.append(np.abs(modes.damping - zeta) / modes.damping_error)
+    ratios = np.array(ratios)
+    assert np.mean(ratios <= 1) >= 0.85
+    assert np.median(ratios) > 0.15  # 0.34 for normal errors
 
 
 def test_always_friction_decay_is_reported_as_not_exponential():

@@ -262,3 +262,15 @@ def test_exact_descent_begins_at_bound_beside_failures():
     model = least_squares.UnitCubeResidual(residual, make_search_space([0.0], [1.0]))
     found = least_squares.descend(model, [0.0], [0])
     assert found.is_converged and found.u == pytest.approx([2e-4], abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [4, 9])
+def test_always_profile_with_several_minima_has_ends(seed):
+    """A descent that ends in another minimum than before at the same value of a parameter does not end the search."""
+    random = np.random.default_rng(seed)
+    slopes, phases = 3 * random.normal(size=(6, 3)), random.uniform(0, 6, 6)
+    data = 0.3 * random.normal(size=6)
+    fit = Problem(lambda v: np.sin(slopes @ v + phases) - data, [-1] * 3, [1] * 3).solve()
+    low, high = fit.intervals.ends.T
+    assert "profile" in fit.intervals.methods
+    assert not (fit.values < low).any() and not (fit.values > high).any()

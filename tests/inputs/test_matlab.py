@@ -28,6 +28,7 @@ ARRAYS = {
     "full": np.random.default_rng(1).normal(size=(4, 3)), "counts": np.arange(6, dtype="u1")[None],
     "small": np.array([[1.5, -2.5]], "f4"), "scattered": sparse.random(7, 5, 0.4, "csc", random_state=3),
     "none": np.zeros((0, 3)), "cube": np.arange(24.0).reshape(2, 3, 4), "waves": np.ones((1, 3)) * 1j,
+    **{kind: np.arange(6).astype(kind)[None] for kind in ("i1", "i2", "u2", "i4", "u4", "i8", "u8")},
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from patchfem.core import G_N, PatchfemError
 from patchfem.inputs import read_slide, read_table
 from patchfem.inputs.measured import FLAG_MEANINGS
 
-TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
+TABLE_1 = Path(__file__).parents[2] / "studies/rig/table1.csv"
 OMEGA = 2 * pi * 143
 HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 

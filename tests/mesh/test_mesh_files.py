@@ -20,4 +20,4 @@ def test_refuses_missing_mesh_file_and_unknown_suffix(tmp_path):
     with pytest.raises(PatchfemError, match=r"\.msh or \.vtu"):
         write_mesh(SMALL, tmp_path / "pair.stl")
     with pytest.raises(Missing, match="cannot be written"):
-        write_mesh(SMALL, tmp_path / "nowhere" / "pair.msh")
+        write_mesh(SMALL, tmp_path / "nowhere/pair.msh")

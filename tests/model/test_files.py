@@ -2,12 +2,11 @@
 scene."""
 
 import io
-import json
 
 import meshio
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
 from patchfem import SceneError, load, run
@@ -114,7 +113,7 @@ def test_refuses_mesh_of_wrong_size_unit_or_order(tmp_path, name, sets, message)
     """`check` and `run` report a mesh of another size, or in another unit with the same line."""
     write_meshes(tmp_path)
     (tmp_path / "scene.toml").write_text(mesh_text(name), "utf-8")
-    options = [word for text in sets for word in ("--set", text)]
+    options = [f"--set={text}" for text in sets]
     answers = [
         run_cli(*command, *options)
         for command in (
@@ -136,9 +135,9 @@ def test_exact_mesh_in_millimetres_gives_results_of_mesh_in_metres(tmp_path):
         load(tmp_path / "scene.toml", **sets)
         for sets in ({}, {"contact.mesh": "mm.vtu", "contact.mesh_unit": "mm"})
     ]
-    assert run_cli(
+    run_successfully(
         "check", tmp_path / "scene.toml", "--set", "contact.mesh=mm.vtu", "--set", "contact.mesh_unit=mm"
-    ).code == 0  # fmt: skip
+    )  # fmt: skip
     metres, millimetres = (run(scene).measures for scene in scenes)
     for name, measure in metres.items():
         assert millimetres[name].value == pytest.approx(measure.value, rel=1e-9), name
@@ -161,9 +160,9 @@ def test_exact_check_and_run_report_same_profile_notes(tmp_path):
         and "adds -6.5 mm to x" in lines[0]
         and "from the heights; to include a tilt" in lines[1]
     ), lines
-    answer = json.loads(
-        run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out
-    )
+    answer = run_cli(
+        "run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json"
+    ).content
     texts = [text for text in (*answer["notes"], *answer["warnings"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in texts]
-    assert json.loads(run_cli("check", tmp_path / "scene.toml", "--json").out)["notes"] == texts
+    assert run_cli("check", tmp_path / "scene.toml", "--json").content["notes"] == texts

@@ -10,8 +10,6 @@ from test_loops import evenly
 
 from patchfem.response import measures
 
-OMEGA = 2 * pi * 143
-
 
 @given(st.floats(0, pi), st.floats(0, 0.22))
 def test_always_slip_start_phase_is_mean_modulo_pi(middle, spread):

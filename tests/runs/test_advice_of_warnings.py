@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from command_line import read_json
 from scene_texts import JOINT_SHAKEN
 
 import patchfem
@@ -19,7 +20,7 @@ from patchfem.scene import choose_law, compose_scene
 
 # Random scenes with few steps, elements or strips or a tight tolerance, whose warnings advise to set or to leave
 # out a key (drawn by `support/remedies.py` of version 1.11).
-WARNED = json.loads((Path(__file__).parent / "found/warned_scenes.json").read_text("utf-8"))
+WARNED = read_json(Path(__file__).parent / "found/warned_scenes.json")
 ADVICE = re.compile(
     r"(?:set|try|leave out) (accuracy|contact|drive|slide)\.(\w+)(?: = ([\w.+-]*\w))?"
 )
@@ -94,7 +95,7 @@ def test_always_unresolved_free_vibration_is_solved_without_prescribed_steps():
 def test_always_steps_are_refined_until_all_measures_meet_tolerance():
     """The steps of a march are doubled until its instants of slip meet the tolerance too, not only its
     displacement, which meets it with 400 steps; prescribed steps are not doubled."""
-    scene = (files(patchfem) / "scene" / "templates" / "rig.toml").read_text("utf-8")
+    scene = (files(patchfem) / "scene/templates/rig.toml").read_text("utf-8")
     scene = scene.replace("cycles = 200", "cycles = 40")
     refined = run(scene, **{"accuracy.method": "march"})
     assert not refined.warnings

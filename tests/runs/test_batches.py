@@ -230,6 +230,7 @@ def test_always_internal_fault_of_case_keeps_results_of_others():
 # ---- shared meshes
 
 TILTED = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+BARE_CROWN = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\ncrown = {radius = "1 m"}\n'
 LOOP = '[slide]\nkind = "sine"\namplitude = "0.2 um"\nfrequency = "1 Hz"\ncycles = 3\n'
 
 
@@ -269,11 +270,17 @@ def test_always_case_that_fails_keeps_shared_mesh_of_others():
         pf.run(models[4])
 
 
-def test_always_loop_errors_of_sweep_are_close_to_single_runs():
+@pytest.mark.parametrize(
+    "text, tolerance, amplitudes",
+    [
+        (CROWNED_JOINT, 1e-2, ("0.2 um", "10 um")),
+        (BARE_CROWN + SHEAR + COULOMB, 1e-3, ("0.02 um", "0.5 um")),
+    ],
+)
+def test_always_loop_errors_of_sweep_are_close_to_single_runs(text, tolerance, amplitudes):
     """On a shared mesh the error of the loop area is at most 1.5 times that of a single run, and the values agree."""
-    cases = build_family(
-        CROWNED_JOINT + LOOP, "accuracy.tolerance=1e-2", "slide.amplitude", ("0.2 um", "10 um")
-    )
+    changes = f"accuracy.tolerance={tolerance}"
+    cases = build_family(text + LOOP, changes, "slide.amplitude", amplitudes)
     for pair in zip(cases, with_shared_meshes(cases), strict=True):
         single, shared = (pf.run(case).measures["loop_area"] for case in pair)
         assert shared.error <= 1.5 * single.error

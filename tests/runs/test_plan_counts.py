@@ -1,6 +1,5 @@
 """Plans agree with the run: sticking, and the measured probe."""
 
-import json
 from time import perf_counter
 
 import numpy as np
@@ -20,11 +19,11 @@ def test_exact_probe_measures_what_the_plan_does_not_predict(tmp_path, monkeypat
     measures of this run, and what each setting multiplies."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(PROBED)
-    described = json.loads(run_cli("plan", "a.toml", "--json").out)
+    described = run_cli("plan", "a.toml", "--json").content
     for name in ("seconds", "bytes", "compile_seconds", "steps"):
         assert described[name] is None
     begin = perf_counter()
-    probed = json.loads(run_cli("plan", "a.toml", "--probe", "--json").out)
+    probed = run_cli("plan", "a.toml", "--probe", "--json").content
     elapsed = perf_counter() - begin
     stages = probed["probe"]["seconds"]
     assert 0 < stages["contact"] <= stages["total"] == probed["seconds"] <= elapsed

@@ -72,7 +72,7 @@ def test_refuses_worn_depth_of_other_pieces(earlier_run_folder, sets, message):
     answer = run_cli(
         "check",
         earlier_run_folder / "a.toml",
-        *(word for assignment in sets for word in ("--set", assignment)),
+        *(f"--set={assignment}" for assignment in sets),
     )
     assert answer.code == 2 and message in answer.err and "Traceback" not in answer.err
 

@@ -6,12 +6,12 @@ with uncertainties are those of elements of order 4 with an interior-point metho
 (`patch_of_order_four.py` and `random_rigs.py` in `tests/support` of version 1.10).
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from campaigns import measure_rows
+from command_line import read_json
 from scene_runs import assert_covers, find_sentences, run_scene
 from scene_texts import COATING, PIECE
 
@@ -193,7 +193,7 @@ KNOWN = (
 )
 MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 RANDOM_PATCHES, RANDOM_RIGS = (
-    json.loads((FOUND / f"random_{kind}.json").read_text("utf-8")) for kind in ("patches", "rigs")
+    read_json(FOUND / f"random_{kind}.json") for kind in ("patches", "rigs")
 )
 
 

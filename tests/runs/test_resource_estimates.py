@@ -29,11 +29,6 @@ RIG = POINT + TANH + STRUCTURE
 MARCH, GIGABYTE = "accuracy.method=march", 10**9
 
 
-def plan_text(text, *sets):
-    """Return the plan of a scene with --set options."""
-    return plan(loads(text, "a.toml", sets))
-
-
 @pytest.mark.share(0, 2, 3)
 @pytest.mark.parametrize(
     "text, sets, key",
@@ -63,7 +58,7 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     """A run that needs more memory than is free is refused with the key to change, before large arrays are allocated."""
     monkeypatch.setattr(memory, "free_bytes", lambda: GIGABYTE)
     tracemalloc.start()
-    run_plan = plan_text(text, *sets)
+    run_plan = plan(loads(text, "a.toml", sets))
     with pytest.raises(Missing, match=f"^about .* 1 GB are free.*{re.escape(key)}"):
         memory.refuse_insufficient_memory(run_plan)
     peak = tracemalloc.get_traced_memory()[1]

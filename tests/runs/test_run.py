@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import run_successfully
 from scene_texts import (
     BENCH,
     COULOMB,
@@ -49,8 +49,7 @@ def run_case(tmp_path_factory):
         if name not in results:
             path = base / f"{name}.toml"
             path.write_text(SCENES[name], "utf-8")
-            answer = run_cli("run", path, "-o", base / name, "--json")
-            assert answer.code == 0, answer.err
+            answer = run_successfully("run", path, "-o", base / name, "--json")
             results[name] = base / name, answer
         return results[name]
 
@@ -71,7 +70,7 @@ def test_exact_netcdf_file_has_units_and_balanced_fields(run_case, name):
     """All variables of the dataset have units, and its pressure balances the load and excludes gaps."""
     folder, answer = run_case(name)
     data = read_netcdf(folder)
-    measures = json.loads(answer.out)["measures"]
+    measures = answer.content["measures"]
     assert all(
         "units" in variable.attrs
         for variable in data.variables.values()

@@ -1,17 +1,17 @@
 """Errors of random joints, rigs and chains with partial slip cover results on much finer meshes and steps."""
 
-import json
 from pathlib import Path
 
 import pytest
 from campaigns import measure_rows
+from command_line import read_json
 
 import patchfem as pf
 from patchfem.scene import loads
 
 # Random scenes with the tolerance of their reference, drawn by the campaigns `shear-rigs`, `shear-joints` and `shear-chains`
 # (`support/shear_scenes.py` of version 1.11).
-SCENES = json.loads((Path(__file__).parent / "found/shear_scenes.json").read_text("utf-8"))
+SCENES = read_json(Path(__file__).parent / "found/shear_scenes.json")
 NAMES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",

@@ -1,11 +1,9 @@
 """A rough measured profile gives the same results by run and by sweep, in the measures and in the
 fields."""
 
-import json
-
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli
 
 import patchfem as pf
 
@@ -67,7 +65,7 @@ radius = "2 mm"
     )
     (tmp_path / "scene.toml").write_text(text)
     answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    summary = read_json(tmp_path / "out/summary.json")
     assert (answer.code, summary["outcome"]) == (3, "not_converged")
     assert "are as large as the values; use the other measures" in answer.out
     assert any("at least its value" in text for text in summary["warnings"])

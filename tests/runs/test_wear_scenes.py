@@ -1,12 +1,11 @@
 """Scenes with [wear]: volumes in closed form, the worn patch, shakedown, refusals and files."""
 
 import io
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_cli, run_successfully
 from scene_texts import (
     COATED,
     COULOMB,
@@ -166,19 +165,21 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 
     with monkeypatch.context() as patched:
         patched.setattr(evolve, "save_wear_state", save_and_record)
-        assert run_cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
+        run_successfully("run", scene, "-o", tmp_path / "whole", "-q", "--no-page")
     assert len(states) >= 2
     for state in (states[0], states[-1]):
         (tmp_path / "out.partial").mkdir()
-        (tmp_path / "out.partial" / "wear.npz").write_bytes(state)
-        resumed = run_cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
-        assert resumed.code == 0 and "held the state" not in resumed.err
+        (tmp_path / "out.partial/wear.npz").write_bytes(state)
+        resumed = run_successfully(
+            "run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page"
+        )
+        assert "held the state" not in resumed.err
         for name in ("result.nc", "fields.vtkhdf", "scene.resolved.toml"):
             assert (tmp_path / "out" / name).read_bytes() == (
                 tmp_path / "whole" / name
             ).read_bytes(), name
         full_summary, resumed_summary = (
-            json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out")
+            read_json(tmp_path / name / "summary.json") for name in ("whole", "out")
         )
         times = dict.fromkeys(("seconds", "effects", "accuracy_seconds"), 0)
         assert full_summary | times == resumed_summary | times
@@ -223,8 +224,8 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
         "run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N"
     )
     assert other.code == 2 and "another scene" in other.err
-    assert run_cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
-    assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
+    run_successfully("run", scene, "-o", tmp_path / "out", "--resume", "--no-page")
+    assert not (tmp_path / "out/wear.npz").exists() and not (tmp_path / "out.partial").exists()
 
 
 def test_exact_wear_at_step_agrees_with_independent_program():
@@ -250,11 +251,10 @@ def test_exact_new_run_reports_discarded_state_once(tmp_path, state):
     partial.mkdir()
     if state:
         (partial / state).write_bytes(b"kept")
-    answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page")
-    assert answer.code == 0, answer.err
+    answer = run_successfully("run", scene, "-o", tmp_path / "out", "--no-page")
     message = "out.partial held the state of an interrupted run, which is now discarded"
     assert answer.err.count(message) == bool(state)
-    assert not partial.exists() and not (tmp_path / "out" / "wear.npz").exists()
+    assert not partial.exists() and not (tmp_path / "out/wear.npz").exists()
 
 
 def test_refuses_to_resume_wear_without_valid_state(tmp_path):

@@ -1,10 +1,10 @@
 """Randomly changed scenes: each mistake names its place, and a scene without mistakes reads its own values again."""
 
-import json
 import re
 from pathlib import Path
 
 import numpy as np
+from command_line import read_json
 from torture import scenes
 from torture.toml import to_toml
 from torture.trial import Trial
@@ -50,7 +50,7 @@ def test_always_scene_refused_by_release_1_5_is_refused_at_the_same_places():
 
     Since 1.11 the method of levels by harmonic balance is one of them.
     """
-    rows = json.loads(Path(__file__).with_name("faulty_scenes.json").read_text(encoding="utf-8"))
+    rows = read_json(Path(__file__).with_name("faulty_scenes.json"))
     assert len(rows) == 320
     for row in rows:
         assert list_places(row["text"]) == set(row["places"]), row["text"]

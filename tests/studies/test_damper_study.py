@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "studies" / "damper"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "studies/damper"))
 import damper
 
 FOLDER = os.environ.get("PATCHFEM_DATA")

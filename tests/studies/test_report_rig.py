@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
-from study_module import assert_contains, load_study
+from study_module import assert_contains, load_study, make_study_fixture
 
 import patchfem as pf
 
+figure = make_study_fixture("report/figure_8.py")
 
-def test_figure_8_peak_spring_force_agrees_with_closed_form():
+
+def test_figure_8_peak_spring_force_agrees_with_closed_form(figure):
     """Up to 20 Hz the peak force in the load cell agrees with the closed form within 0.2 %.
 
     The friction force on the piece stays at Coulomb's limit.
     """
-    figure = load_study("report/figure_8.py")
     for frequency in (5.0, 10.0, 20.0):
         loop = figure.loop(frequency)
         assert loop.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
@@ -23,27 +24,24 @@ def test_figure_8_peak_spring_force_agrees_with_closed_form():
         )
 
 
-def test_figure_8_loop_area_equals_the_friction_work():
+def test_figure_8_loop_area_equals_the_friction_work(figure):
     """The loop area equals the friction work per cycle and agrees with the closed form."""
-    figure = load_study("report/figure_8.py")
     loop = figure.loop(10.0)
     area = abs(np.trapezoid(loop.friction, loop.slip)) / (4 * figure.LIMIT * figure.STROKE)
     assert area == pytest.approx(loop.work, rel=2e-3)
     assert loop.work == pytest.approx(1 - figure.LIMIT / figure.STIFFNESS / figure.STROKE, rel=5e-3)
 
 
-def test_figure_8_piece_sticks_on_almost_every_swing():
+def test_figure_8_piece_sticks_on_almost_every_swing(figure):
     """With static friction above kinetic the last of six cycles has all its events, of more than 1600 in the run."""
-    figure = load_study("report/figure_8.py")
     kinetic = figure.loop(2.0, 0.33)
     assert_contains(figure.__doc__, f"the cell shows {kinetic.peak:.2f}")
     assert kinetic.sticks > 50 > 10 > figure.loop(2.0).sticks
 
 
 @pytest.mark.slow
-def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
+def test_figure_8_study_gives_its_stated_figures(figure, tmp_path, capsys):
     """Peaks, static friction coefficient and length from the loops are those stated in the study."""
-    figure = load_study("report/figure_8.py")
     loops = {loop.frequency: loop for loop in figure.main(tmp_path / "x.svg")}
     assert_contains(
         figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz"

@@ -1,7 +1,6 @@
 """The table of all studies agrees with the docstrings of the studies."""
 
-import json
-
+from command_line import read_json
 from study_module import ROOT, make_study_fixture
 
 page = make_study_fixture("report/table.py")
@@ -9,7 +8,7 @@ page = make_study_fixture("report/table.py")
 
 def test_always_table_of_studies_is_up_to_date(page):
     """README.md of the studies is the table that `python studies/report/table.py` writes."""
-    seconds = json.loads(page.SECONDS_FILE.read_text("utf-8"))
+    seconds = read_json(page.SECONDS_FILE)
     assert (page.FOLDER / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
         "run python studies/report/table.py"
     )

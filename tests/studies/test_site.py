@@ -18,7 +18,7 @@ import patchfem as pf
 from patchfem.effects import EFFECTS
 
 ROOT = Path(__file__).parents[2]
-SITE = ROOT / "studies" / "site"
+SITE = ROOT / "studies/site"
 sys.path.insert(0, str(SITE))
 check, examples, made = (__import__(name) for name in ("check", "examples", "made"))
 
@@ -146,7 +146,7 @@ def test_always_page_links_resolve_and_its_python_parses(page):
 def test_always_commands_of_the_paraview_page_run(tmp_path, monkeypatch):
     """The nine commands of the page on ParaView run without error."""
     monkeypatch.chdir(tmp_path)
-    commands = check.commands(SITE / "tasks" / "paraview.md")
+    commands = check.commands(SITE / "tasks/paraview.md")
     assert len(commands) == 9
     for command in commands:
         program, *words = shlex.split(command)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SITE = Path(__file__).parents[2] / "studies" / "site"
+SITE = Path(__file__).parents[2] / "studies/site"
 sys.path.insert(0, str(SITE))
 pictures = __import__("pictures")
 

@@ -1,13 +1,12 @@
 """Statements of the studies, checked by running them."""
 
 import csv
-import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import read_json, run_successfully
 from scipy.special import gamma
 from study_module import load_study
 
@@ -76,13 +75,12 @@ def test_exact_cost_table_in_the_readme_is_reproduced(words, tmp_path, monkeypat
     """
     monkeypatch.setattr("patchfem.campaigns.cost.N_TIMINGS", 1)
     scene = STUDIES / "rig/pieces.toml"
-    answer = run_cli("cost", scene, *words, "-o", tmp_path, "-q")
-    assert answer.code == 0, answer.err
+    run_successfully("cost", scene, *words, "-o", tmp_path, "-q")
     page = (STUDIES / "speed/README.md").read_text("utf-8")
     blocks = re.findall(r"(?s)```text\n((?:tolerance|element_size)  .*?)```", page)
     names, theirs, sentence = parse_cost_table(blocks[bool(words)])
     ours = read_cost_rows(tmp_path / "cost.csv", names)
-    verdict = json.loads((tmp_path / "summary.json").read_text("utf-8"))["verdict"]
+    verdict = read_json(tmp_path / "summary.json")["verdict"]
     told, printed = (re.sub(r"[\d.]+ CPU s", "", text) for text in (" ".join(verdict), sentence))
     assert printed and printed in told
     assert [label for label, *_ in ours] == [label for label, *_ in theirs] and len(ours) in (4, 6)

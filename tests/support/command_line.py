@@ -47,6 +47,26 @@ class CommandResult(NamedTuple):
     out: str
     err: str
 
+    @property
+    def content(self):
+        """Content of the JSON text on standard output."""
+        return json.loads(self.out)
+
+
+def read_json(path):
+    """Return the content of a JSON file."""
+    return json.loads(Path(path).read_text("utf-8"))
+
+
+def list_names(folder) -> set[str]:
+    """Return the names of the files and folders in a folder."""
+    return {path.name for path in folder.iterdir()}
+
+
+def read_page(folder) -> str:
+    """Return the page of a results folder."""
+    return (folder / "report.html").read_text("utf-8")
+
 
 def run_cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
     """Run `patchfem WORDS` in this process; `stdout` may be a stream that receives the output."""
@@ -59,6 +79,13 @@ def run_cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
     ):
         main([str(word) for word in words])
     return CommandResult(end.value.code or 0, out.getvalue(), err.getvalue())
+
+
+def run_successfully(*words) -> CommandResult:
+    """Run `patchfem WORDS` in this process, and assert that it ends with code 0."""
+    answer = run_cli(*words)
+    assert answer.code == 0, answer.err
+    return answer
 
 
 def modules_after(code: str, *words) -> set:

@@ -40,10 +40,10 @@ def driven_response(quantity: str, seed: int = 1) -> tuple:
     return np.fft.irfft(spectrum, SAMPLES), total
 
 
-def free_decay(amplitudes=(0.3, 0.2), offset=0.01, count=3000) -> tuple:
-    """Return (time, displacement) of the modes released from rest."""
+def free_decay(amplitudes=(0.3, 0.2), offset=0.01, count=3000, omega=OMEGA, zeta=ZETA) -> tuple:
+    """Return (time, displacement) of modes released from rest, those of this module by default."""
     time = TIME[:count]
     return time, offset + sum(
         a * np.exp(-z * w * time) * np.cos(w * np.sqrt(1 - z * z) * time + k)
-        for k, (w, z, a) in enumerate(zip(OMEGA, ZETA, amplitudes))
+        for k, (w, z, a) in enumerate(zip(omega, zeta, amplitudes))
     )

@@ -8,6 +8,7 @@ from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
+import xarray as xr
 
 from patchfem.formatting import UNIT_LADDERS
 
@@ -101,12 +102,14 @@ def find_wrong_numbers(
     return wrong
 
 
-def find_strange_curves(text: str, arrays: dict[str, np.ndarray]) -> list[str]:
+def find_strange_curves(text: str, path) -> list[str]:
     """Return the charts of a page with a curve whose largest value is in no array, in SI, g or a power of ten of SI units.
 
-    arrays: numbers of the netCDF file by name. The stress in both pieces is from another file.
+    path: the netCDF file. The stress in both pieces is from another file.
     """
-    numbers = [np.abs(np.asarray(one, float)).ravel() for one in arrays.values()]
+    with xr.open_dataset(path) as data:
+        arrays = [one.values for one in data.variables.values() if one.dtype.kind in "fi"]
+    numbers = [np.abs(one.astype(float)).ravel() for one in arrays]
     numbers = np.concatenate([one[np.isfinite(one)] for one in numbers])
     scales = [10.0**k for k in range(-12, 13, 3)] + [1 / 9.80665]
     strange = []

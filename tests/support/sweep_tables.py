@@ -53,3 +53,9 @@ def read_rows(folder) -> list[dict]:
     """Return the rows of sweep.csv."""
     with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+def assert_same_files(folder, other, names=("sweep.csv", "sweep.nc")) -> None:
+    """Assert that these files of two sweeps are identical byte for byte."""
+    for name in names:
+        assert (folder / name).read_bytes() == (other / name).read_bytes(), name

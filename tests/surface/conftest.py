@@ -1,10 +1,10 @@
 """Measured data for the tests of surfaces."""
 
-import json
 import os
 from pathlib import Path
 
 import pytest
+from command_line import read_json
 
 
 @pytest.fixture(scope="session")
@@ -16,4 +16,4 @@ def data_folder() -> Path:
 @pytest.fixture(scope="session")
 def reference_values(data_folder) -> dict:
     """Return the reference values of the measured data."""
-    return json.loads((data_folder / "truth.json").read_text())
+    return read_json(data_folder / "truth.json")

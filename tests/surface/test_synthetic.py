@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from synthetic import report_area, report_density, self_affine
 
 LENGTH = 12.7e-3
-STEP, POINTS = 3.2e-6, 320  # a square raster with sides of 1.02 mm
+STEP = 3.2e-6
 
 
 @given(st.integers(0, 10**6), st.floats(0.1, 1.0), st.integers(200, 999))

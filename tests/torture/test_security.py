@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import read_page, run_cli, run_successfully
 from import_graph import read_sources, syntax_nodes
 from scene_texts import BENCH, MODE
 
@@ -114,16 +114,16 @@ def test_always_commands_write_only_into_output_folder(tmp_path):
     """The commands write no file outside the folder given by -o, even if a title or a value of a
     sweep contains `../`."""
     (tmp_path / "work").mkdir()
-    scene = tmp_path / "work" / "scene.toml"
+    scene = tmp_path / "work/scene.toml"
     scene.write_text('title = "../../escaped"\n' + BENCH, "utf-8")
     old_paths = {path for path in tmp_path.rglob("*")}
-    out = tmp_path / "work" / "out"
+    out = tmp_path / "work/out"
     sweep = run_cli(
         "sweep", scene, "--over", "title=../../escaped,/escaped", "-o", out / "swept", "-j", "1"
     )
     assert sweep.code in (0, 2), sweep.err
-    assert run_cli("run", scene, "-o", out / "run", "--no-page").code == 0
-    assert run_cli("export", out / "run", "-o", out / "histories.csv").code == 0
+    run_successfully("run", scene, "-o", out / "run", "--no-page")
+    run_successfully("export", out / "run", "-o", out / "histories.csv")
     new_paths = {path for path in tmp_path.rglob("*")} - old_paths
     assert new_paths and all(path.is_relative_to(out) for path in new_paths)
     assert not Path("/escaped").exists()
@@ -138,8 +138,8 @@ def test_always_pages_escape_text_of_scenes(tmp_path):
     scene.write_text(
         f'title = "{markup}"\n' + MODE.replace('"axial"', f'"{markup}"') + drive, "utf-8"
     )
-    assert run_cli("run", scene, "-o", tmp_path / "out").code == 0
-    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    run_successfully("run", scene, "-o", tmp_path / "out")
+    page = read_page(tmp_path / "out")
     assert "&lt;img src=x" in page
     page_without_scripts = re.sub(r"<script.*?</script>", "", page, flags=re.S)
     assert "<img src=x" not in page_without_scripts

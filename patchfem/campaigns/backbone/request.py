@@ -9,9 +9,10 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_quantity
 from ...model.model import Model
-from ...model.rig import JOINT_SCENES
+from ...model.rig import JOINT_SCENES, JOINT_TABLES
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
+from ...scene.backbone_scene import BackboneTables, parse_modes
 from ...scene.scene import SceneError
 from .curves import Levels, choose_methods, compute_backbones
 from .given_modes import prepare_model
@@ -125,10 +126,12 @@ def compute_cases(
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
     base = models[0]
+    notes = []
     if axis is not None:
         base = _build_base_model(build, request.modes) or base
-        note = _note_written_value(base, axis, backbones)
-        backbones = [case._replace(notes=(*case.notes, *note)) for case in backbones]
+        notes += _note_written_value(base, axis, backbones)
+    notes += _note_changed_joint(base, build, request.modes)
+    backbones = [case._replace(notes=(*case.notes, *notes)) for case in backbones]
     return BackboneCases(axis, backbones, base.source)
 
 
@@ -183,3 +186,32 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
     if not is_listed:
         note += "; no curve has this value"
     return [note]
+
+
+def _note_changed_joint(
+    base: Model, build: Callable[..., Model], modes: str | Iterable
+) -> list[str]:
+    """Return a list of notes on keys of a bolted joint whose values in the written file are not those of the modal test.
+
+    These are keys that --set changes. `base` is the model whose scene is written, and `build` and `modes` are as in
+    `compute_cases`.
+    """
+    bolted = base.rig.structure.bolted
+    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+        return []
+    sets = base.source.sets
+    if not any(text.startswith(JOINT_TABLES) for text in sets):
+        return []
+
+    # Assignments of the scene as written, which the API accepts, come first.
+    written = build(BackboneTables(parse_modes(modes) if modes else (), stuck=False), None)
+    changed = sets[len(written.source.sets) :]
+    keys = dict.fromkeys(text.partition("=")[0].strip() for text in changed)
+    names = [key for key in keys if key.startswith(JOINT_TABLES)]
+    if not names:
+        return []
+    return [
+        "the joint that is subtracted from the modes is that of the scene as written, without --set of "
+        f"{' and '.join(names)}; scene.resolved.toml has the values of --set, so that its run subtracts another joint: "
+        "repeat this backbone with the scene as written and the same --set"
+    ]

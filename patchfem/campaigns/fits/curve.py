@@ -107,7 +107,7 @@ class MeasuredCurve(NamedTuple):
         return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 
     def describe_given_errors(self, rms: float) -> str:
-        """Return a sentence on the effect of errors that the table gives; "" if it lacks one of both columns.
+        """Return a sentence on the use of the errors in the table, or "" unless it has those of both measured values.
 
         `rms` is the root mean square of the residual in standard deviations.
         """

@@ -15,15 +15,13 @@ from ...core import Outcome, PatchfemError
 from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
+from ...model.rig import JOINT_TABLES
 from ...runs.patch import mesh_levels
 from ...scene.assignments import BOUNDS, Range, read_assignments
 from ...scene.lines import find_scene_value
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, add_sets
 from .options import FitOptions
-
-# Tables of the joint that was bolted when the modes were measured.
-JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,8 @@ from ...scene.keys.quantities import parse_quantity
 MAX_DEPTH = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", MAX_DEPTH)
+# Names in compare.json of the part that two measured surfaces of a piece have in common
+SURFACE_PARTS = {"common_length", "common_area"}
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
@@ -88,8 +90,25 @@ class WearCurve(NamedTuple):
     depth: np.ndarray
 
 
+class FoundCoefficient(NamedTuple):
+    """Wear coefficient without its interval.
+
+    - value: coefficient [m2/N].
+    - depth: depth of a run with it [m].
+    - curve: depth with the upper bound of the coefficient.
+    - inverse: function of a depth [m] on this curve that returns the fraction of the cycles.
+    - runs: number of wear runs.
+    """
+
+    value: float
+    depth: float
+    curve: WearCurve
+    inverse: PchipInterpolator
+    runs: int
+
+
 def read_measured_depth(text: str) -> MeasuredDepth:
-    """Read a measured depth from a text, or from a JSON file written by `compare`.
+    """Read a measured depth of both pieces from a text, or from a JSON file that `compare` writes for two runs.
 
     The text has the form "worn_depth_max=2.5 um..3.5 um", or gives a single value, or is the name of the file. Raises
     PatchfemError for an invalid depth and Missing for a missing file.
@@ -114,12 +133,15 @@ def read_measured_depth(text: str) -> MeasuredDepth:
 
 
 def _read_depth_file(path: Path) -> MeasuredDepth:
-    """Read a measured depth from the JSON file `path`, written by `compare`."""
+    """Read a worn depth of both pieces from the JSON file `path`, written by `compare` for two runs.
+
+    Raises PatchfemError for a comparison of measured surfaces, whose depth is that of one piece.
+    """
     try:
         content = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
         raise Missing(
-            f"{path}: no such file; give --to the JSON file that compare writes, or "
+            f"{path}: no such file; give --to the JSON file that compare writes for two runs, or "
             "worn_depth_max=VALUE"
         ) from None
     except (OSError, ValueError, RecursionError) as error:
@@ -127,8 +149,18 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
             f"{path}: this is not the JSON file that compare writes ({error})"
         ) from None
 
+    # compare.json has the depths beside other tables, and summary.json among its measures.
+    measures = content if isinstance(content, dict) else {}
+    if isinstance(measures.get("measures"), dict):
+        measures = measures["measures"] | measures
+    if SURFACE_PARTS & measures.keys():
+        raise PatchfemError(
+            f"{path}: the worn depth of two measured surfaces is that of one piece and of their common part, but the fit "
+            "needs that of both pieces and of the whole patch; to fit the coefficient to two traces run `patchfem compare "
+            'BEFORE AFTER --predicted RESULTS_FOLDER`, or give a depth such as "worn_depth_mean=2.5 um..3.5 um"'
+        )
+
     # Of several depths in the file the first in the order of QUANTITIES is fitted.
-    measures = content.get("measures", content) if isinstance(content, dict) else {}
     for name in QUANTITIES:
         try:
             numbers = [float(measures[name][part]) for part in ("value", "low", "high")]
@@ -139,8 +171,7 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
             return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
 
     raise PatchfemError(
-        f"{path}: the file contains no worn depth above zero; compare writes a depth only if the "
-        "traces have a common reference"
+        f"{path}: the file contains no worn depth above zero; give --to the JSON file that compare writes for two runs"
     )
 
 
@@ -177,8 +208,8 @@ def fit_wear(
             "m^2/N..1e-12 m^2/N"
         )
 
+    # The measured depth needs a patch without earlier wear.
     bounds = ranges[0]
-    # The measured depth needs a patch without earlier wear
     target = read_measured_depth(measured_depth)
     if model.patch is None:
         raise PatchfemError(
@@ -197,7 +228,53 @@ def fit_wear(
         """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
-    # one run with the largest coefficient gives the depth for all smaller ones
+    found = _search_coefficient(compute, target, bounds, DEPTH_TOL * model.accuracy.tolerance)
+    value = found.value
+    area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
+    error = _estimate_depth_error(model, value, target, area, progress)
+
+    # The depth depends almost only on the product of coefficient and cycles. So the curve of the depth gives the
+    # coefficients at both ends of the measured interval, which the error of the computed depth widens.
+    curve = found.curve
+    ends = np.array([target.low - (error or 0.0), target.high + (error or 0.0)])
+    ends = found.inverse(np.clip(ends, curve.depth[0], curve.depth[-1]))
+    low, high = value * ends / found.inverse(target.value)
+    return FittedCoefficient(
+        value=value,
+        low=float(low),
+        high=float(high),
+        measured=target,
+        model=Measure(found.depth, "m", error),
+        bounds=bounds,
+        runs=found.runs + 1,
+        curve=np.array([bounds.high * curve.fraction, curve.depth]),
+    )
+
+
+def _search_coefficient(
+    compute: Callable[[float], WearCurve], target: MeasuredDepth, bounds: Range, tolerance: float
+) -> FoundCoefficient:
+    """Find the wear coefficient whose computed depth equals the measured one.
+
+    Parameters
+    ----------
+    compute : callable
+        Function of a wear coefficient [m2/N] that runs the wear with it.
+    target : MeasuredDepth
+        Measured depth.
+    bounds : Range
+        Bounds of the coefficient.
+    tolerance : float
+        Largest relative difference of both depths.
+
+    Raises
+    ------
+    PatchfemError
+        If no coefficient within the bounds gives the depth.
+    NotConverged
+        If MAX_RUNS runs do not meet the tolerance.
+    """
+    # One run with the largest coefficient gives the depth for all smaller ones.
     curve = compute(bounds.high)
     max_depth = curve.depth[-1]
     if not max_depth >= target.value:
@@ -207,25 +284,23 @@ def fit_wear(
             "unless the coating is worn through"
         )
 
-    # the interpolated coefficient is corrected until a run with it has the measured depth
+    # The interpolated coefficient is corrected until a run with it has the measured depth.
     is_growing = np.diff(curve.depth, prepend=-1.0) > 0
     inverse = PchipInterpolator(
         curve.depth[is_growing], curve.fraction[is_growing], extrapolate=False
     )
     value = float(bounds.high * inverse(target.value))
-
     n_runs = 1
     while n_runs < MAX_RUNS:
         n_runs += 1
-        computed_depth = compute(value).depth[-1]
-        error = abs(computed_depth / target.value - 1)
-        if error <= DEPTH_TOL * model.accuracy.tolerance:
+        depth = float(compute(value).depth[-1])
+        if abs(depth / target.value - 1) <= tolerance:
             break
-        value *= float(inverse(target.value) / inverse(computed_depth))
+        value *= float(inverse(target.value) / inverse(depth))
     else:
         raise NotConverged(
             f"fit {COEFFICIENT_KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
-            f"{computed_depth:.6g} in place of {target.value:.6g}"
+            f"{depth:.6g} in place of {target.value:.6g}"
         )
 
     if value < bounds.low:
@@ -233,24 +308,7 @@ def fit_wear(
             f"--free {COEFFICIENT_KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
-
-    # The depth depends nearly on coefficient times cycles alone, so the curve turns the interval of the depth into that
-    # of the coefficient. The error of the computed depth adds to both sides, by the slope of the curve.
-    middle = float(inverse(target.value))
-    low, high = inverse(np.minimum([target.low, target.high], max_depth)) / middle
-    area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
-    model_error = _estimate_depth_error(model, value, target, area, progress)
-    error = (model_error or 0.0) * float(inverse.derivative()(target.value)) / middle
-    return FittedCoefficient(
-        value=value,
-        low=float(value * max(low - error, 0.0)),
-        high=float(value * (high + error)),
-        measured=target,
-        model=Measure(computed_depth, "m", model_error),
-        bounds=bounds,
-        runs=n_runs + 1,
-        curve=np.array([bounds.high * curve.fraction, curve.depth]),
-    )
+    return FoundCoefficient(value, depth, curve, inverse, n_runs)
 
 
 def _estimate_depth_error(
@@ -276,7 +334,7 @@ def _estimate_depth_error(
     Returns
     -------
     float or None
-        [m]; None if the run has no error.
+        Distance [m], or None if the run has no error.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     try:
@@ -284,7 +342,7 @@ def _estimate_depth_error(
     except (NotConverged, Missing):
         return None
 
-    # the mean depth is the worn volume over the area
+    # The mean depth is the worn volume over the area.
     name = target.name
     divisor = 1.0
     if name != MAX_DEPTH:

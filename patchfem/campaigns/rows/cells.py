@@ -67,7 +67,7 @@ class Readings:
 
     @property
     def columns(self) -> dict[str, list[float | str]]:
-        """Values (n,) of the columns of the table for each reading, by column, and its row name as "run"."""
+        """Columns by which rows can be selected: for each of the n readings the value in its row, and as "run" its name."""
         columns = {"run": [self.row_names[k] for k in self.row]}
         for name in ("frequency", "input", "flag"):
             columns[name] = [getattr(self.rows[k], name) for k in self.row]

@@ -220,11 +220,8 @@ def _name_elements(data: Variables, dimension: str) -> list[str]:
     """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers."""
     coordinate = data.get(dimension)
     if coordinate is None:
-        sizes = (
-            dict(zip(variable.dims, variable.values.shape, strict=True))
-            for variable in data.values()
-        )
-        size = next(variable[dimension] for variable in sizes if dimension in variable)
+        variable = next(variable for variable in data.values() if dimension in variable.dims)
+        size = variable.values.shape[variable.dims.index(dimension)]
         return [f"{dimension} {number}" for number in range(1, size + 1)]
     # the last part of a key, such as "load 4 kN"
     title = coordinate.text.rpartition(".")[2].replace("_", " ") or dimension.replace("_", " ")

@@ -55,7 +55,12 @@ def _make_layout(panel: Panel) -> Figure:
 
 def _make_axis_layout(axis) -> Figure:
     """Return the title and the scale of an `Axis` as plotly.js takes them."""
-    return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
+    # By default plotly.js writes 4e-14 as 40f.
+    return {
+        "title": {"text": axis.label},
+        "type": "log" if axis.is_log else "-",
+        "exponentformat": "power",
+    }
 
 
 def _make_vertical_line(position: float) -> Figure:

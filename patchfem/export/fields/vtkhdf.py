@@ -93,9 +93,10 @@ def _create_group(parent, name: str) -> h5py.Group:
 
 
 def _write_block(group, block: Block, times) -> None:
-    """Write the mesh of a block, its fields, and where each frame begins in them.
+    """Write a block of all frames into an HDF5 group, in the form of VTKHDF.
 
-    `group` is the HDF5 group to fill, and `times` [s] are those of the frames.
+    It consists of the mesh, the fields with the frames below each other, and the offset of each frame in every field.
+    `times` (f,) [s] are those of the frames.
     """
     connectivity, starts, types = block.vtk_cells()
     group.attrs["Version"] = VERSION

@@ -6,4 +6,6 @@ laboratory files as tables and modes, `structures` writes matrices and friction 
 Read `write` first.
 """
 
-ENDINGS = (".uff", ".unv", ".uf", ".58", ".mat", ".csv")
+from ...scene.files import UNIVERSAL_EXTENSIONS
+
+ENDINGS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv")

@@ -13,6 +13,7 @@ from ...identify import measured_modes
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
 from ...inputs.units import SI_UNITS
+from ...scene.files import UNIVERSAL_EXTENSIONS
 from ...scene.keys import quantities
 from ...scene.keys.removed import describe_removed
 from ..answer import JsonObject
@@ -257,7 +258,7 @@ def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[st
 
 def _refuse_modal_data(file: Path) -> None:
     """Raise PatchfemError for a universal file of mode shapes (dataset 55), or of frequency responses alone."""
-    if file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS:
+    if file.suffix.lower() not in UNIVERSAL_EXTENSIONS:
         return
     datasets = universal_files.read_datasets(file)
     if any(dataset["type"] == 55 for dataset in datasets):

@@ -103,13 +103,12 @@ def write_matlab(path: Path, answer: Answer) -> None:
     """Write all arrays of numbers as variables of a MATLAB file of version 5; `units.NAME` is the unit of NAME."""
     from scipy.io import savemat
 
-    arrays = {
-        name: variable
-        for name, variable in answer.data.items()
-        if variable.values.dtype.kind in "fiu"
-    }
-    content = {name: variable.values for name, variable in arrays.items()}
-    units = {name: variable.unit for name, variable in arrays.items()}
+    content = {}
+    units = {}
+    for name, variable in answer.data.items():
+        if variable.values.dtype.kind in "fiu":
+            content[name] = variable.values
+            units[name] = variable.unit
     content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
     with write_atomically(path) as partial, open(partial, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)

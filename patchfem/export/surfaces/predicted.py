@@ -188,7 +188,7 @@ def _format_percent(fitted: PredictedWear) -> str:
 
 
 def warn_of_other_shape(fitted: PredictedWear) -> list[str]:
-    """Return the warning on a computed depth of another shape than the measured one; [] if it fits.
+    """Return a list with a warning if the computed depth has another shape than the measured one, or [].
 
     The shape is another one if the difference of both depths is a smooth pattern that neither scatter nor noise explains.
     """

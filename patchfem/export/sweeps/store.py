@@ -118,25 +118,33 @@ class Chunks:
 
         `removes_others` tells whether to remove cases that are not requested.
         """
-        outdated = set(self.list_files())
-        if len(outdated) < 2:
+        files = self.list_files()[::-1]
+        if len(files) < 2:
             return
-        all_names = np.empty(0, np.uint64)
+        chunks = [read_chunk(path) for path in files]
+        names = np.concatenate([chunk_names for chunk_names, _ in chunks])
+        distinct, newest = np.unique(names, return_index=True)
+        if removes_others:
+            # Sorted, because the other method of NumPy 2.0 overflows for names of 64 bits.
+            newest = newest[np.isin(distinct, self.distinct, kind="sort")]
+
+        # The rows that are kept of each chunk, from the newest file to the oldest one.
+        is_kept = np.zeros(names.size, bool)
+        is_kept[newest] = True
+        ends = np.cumsum([chunk_names.size for chunk_names, _ in chunks])
         parts = []
-        for path in reversed(self.list_files()):
-            names, results = read_chunk(path)
-            distinct, rows = np.unique(names, return_index=True)
-            is_kept = ~np.isin(distinct, all_names)
-            if removes_others:
-                is_kept &= np.isin(distinct, self.distinct)
-            if is_kept.any():
-                rows = np.sort(rows[is_kept])
-                parts.append((all_names.size + np.arange(rows.size), results.select(rows)))
-                all_names = np.append(all_names, names[rows])
+        count = 0
+        for chunk_is_kept, (_, results) in zip(np.split(is_kept, ends[:-1]), chunks, strict=True):
+            rows = np.flatnonzero(chunk_is_kept)
+            if rows.size:
+                parts.append((count + np.arange(rows.size), results.select(rows)))
+                count += rows.size
+
+        outdated = set(files)
         if parts:
             # the new file may have the name of an old one
-            results = join_case_results(all_names.size, parts)
-            outdated.discard(write_chunk(self.folder, all_names, results))
+            results = join_case_results(count, parts)
+            outdated.discard(write_chunk(self.folder, names[is_kept], results))
         for path in outdated:
             path.unlink()
 

@@ -19,7 +19,8 @@ from ...core import frozen_array
 from ..protocol import Element, SteadyLoop
 from .elastic_plastic import parallel_element
 
-# Number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
+# Number of cells of the power law, each a Jenkins element; the force of first loading is exact to 1e-6 of F_S for
+# chi >= -0.5, and to 5e-6 for chi >= -0.99
 N_SLIDER_CELLS = 768
 # Smallest yield displacement of a slider with a cell of its own, relative to phi_max
 MIN_SLIDER_RATIO = 1e-5

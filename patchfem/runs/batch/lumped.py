@@ -181,7 +181,10 @@ def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResult
 
 
 def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults:
-    """Compute the case results of models by marches with more and more steps."""
+    """Compute the case results of models by marches with more and more steps, and by single runs where these are better.
+
+    `report` takes a line of text on the progress of a single run.
+    """
     begin = perf_counter()
     cases, scales = collect_cases(models)
     results = CaseResults.blank(len(models))
@@ -283,7 +286,9 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarse = _select(fine, ~is_done)
 
 
-def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[str, np.ndarray]:
+def estimate_errors(
+    fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], count: int, fewer: int
+) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name from the values of two marches with `count` and `fewer` steps per cycle.
 
     Instants are resolved to the shortest steps. Motions that differ by SAME_CASE_CYCLE from cycle to cycle count as
@@ -303,7 +308,9 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
         sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
         relative = np.array([errors[name] / sizes[name] for name in errors])
         is_change = (relative > CHANGE_ROUND_OFF) & (relative < 1)
-        typical = np.nanmedian(np.where(is_change, relative, np.nan), axis=0) / 2**MAX_ORDER
+        relative = np.where(is_change, relative, np.nan)
+        relative[:, ~is_change.any(axis=0)] = 0.0
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_ORDER
         for name, error in errors.items():
             least = typical * sizes[name] * (error > CHANGE_ROUND_OFF * sizes[name])
             error = np.fmax(error, least)
@@ -311,7 +318,7 @@ def estimate_errors(fine: dict, coarse: dict, count: int, fewer: int) -> dict[st
     return errors
 
 
-def find_floor(name: str, values: dict, scales: Scales) -> np.ndarray:
+def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
     """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
 
     Parameters

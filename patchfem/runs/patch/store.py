@@ -65,7 +65,8 @@ def _find_array_sizes(value) -> dict[int, int]:
     parts = [value]
     while parts:
         part = parts.pop()
-        if id(part) in visited:
+        # Numbers and texts hold no arrays. An outcome is a text whose class has more than 60 attributes.
+        if id(part) in visited or isinstance(part, str | int | float | None):
             continue
         visited.add(id(part))
         if isinstance(part, np.ndarray):

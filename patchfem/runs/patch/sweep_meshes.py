@@ -22,7 +22,7 @@ from .store import Key
 # Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
 MAX_LAYOUT_CASES = 48
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
-MAX_INTERFACE_NODES = 400
+MAX_INTERFACE_NODES = 500
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
 # are of second order in their length.
 SINGLE_CASE_TOL = 1e-3

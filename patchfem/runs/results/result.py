@@ -69,7 +69,7 @@ class Finding(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Finding in words, with its advice after a semicolon."""
+        """Finding as a sentence, with its advice, if there is any, after a semicolon."""
         return self.words if self.advice is None else f"{self.words}; {self.advice.text}"
 
 

@@ -19,9 +19,7 @@ from ...effects import law_has_trait
 from ...hybrid import cases
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import (
-    find_max_frequency_ratio,
-)
+from ...structure.drive_sizes import find_max_frequency_ratio
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
@@ -216,13 +214,14 @@ def refuse_long_hybrid_run(model: Model) -> None:
     """Raise Missing if a run of the engine `hybrid` needs many more steps than the engine takes."""
     steps = estimate_hybrid_steps(model)
     cycles = model.rig.drive.cycles
-    if steps * cycles > MAX_STEPS_EXCESS * (cases.MAX_STEPS + cases.MAX_CYCLE_STEPS * cycles):
+    max_steps = cases.MAX_STEPS + cases.MAX_CYCLE_STEPS * cycles
+    if steps * cycles > MAX_STEPS_EXCESS * max_steps:
         march = ""
         if estimate_march_seconds(model) < estimate_hybrid_seconds(model):
             march = ', or use accuracy.method = "march"'
         raise Missing(
-            f"the motion from event to event would need about {steps:.2g} steps per cycle, set by events, the fastest free "
-            f"vibration and the friction law, far more than the limit of {cases.MAX_STEPS:.0g} steps of a run; lower "
-            f"drive.cycles or the stiffness of modes and elements{march}",
+            f"the motion from event to event would need about {steps * cycles:.2g} steps ({steps:.2g} per cycle, set by "
+            f"events, the fastest free vibration and the friction law), far more than the limit of {max_steps:.1g} steps of "
+            f"a run; lower drive.cycles or the stiffness of modes and elements{march}",
             "",
         )

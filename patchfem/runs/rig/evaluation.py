@@ -4,9 +4,8 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
-from time import process_time
-
 from ...core import Outcome
+from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response.decay_curve import measure_last_cycle_amplitude
@@ -27,8 +26,8 @@ from .solution import (
 class RunEvaluator:
     """Evaluation of the runs of a model that one engine has computed.
 
-    The base class computes all measures from samples of the histories. Subclasses return more
-    accurate values of their engine by `describe_cycles`.
+    The base class computes all measures from samples of the histories. The subclass of an engine integrates the motion
+    (`integrate`), and returns more accurate values of its engine by `describe_cycles`.
 
     Parameters
     ----------
@@ -52,7 +51,7 @@ class RunEvaluator:
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 
     def integrate(self, drive, cycles: float, before, frames: int = 0, progress=None):
-        """Integrate the motion under a drive, and return the run of the engine.
+        """Integrate the motion under a drive, and return the run of the engine; each engine overrides this method.
 
         Parameters
         ----------
@@ -81,14 +80,14 @@ class RunEvaluator:
         prepare : dict
             CPU time of each part of the preparation [s].
         """
-        begin = process_time()
+        begin = measure_cpu_time()
         drive = self.model.rig.drive
         fields = {}
         if drive.levels.amplitudes:
             run, fields = run_levels(self, frames, progress)
         else:
             run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
-        return self.make_solution(run, process_time() - begin, prepare=prepare, **fields)
+        return self.make_solution(run, measure_cpu_time() - begin, prepare=prepare, **fields)
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.

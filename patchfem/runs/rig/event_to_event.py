@@ -218,6 +218,8 @@ class LumpedEvaluator(RunEvaluator):
         travel = find_travel(self.model.rig)
         times = self._choose_times(drive, cycles, frames)
         motion = self._run(drive, cycles, times.samples, travel, state)
+
+        # Why the motion ended early, as an outcome or as an error.
         outcome = EARLY_ENDS.get(motion.status)
         message = ""
         if outcome is Outcome.LEAVES_GROOVES:
@@ -225,9 +227,13 @@ class LumpedEvaluator(RunEvaluator):
         elif outcome is not None:
             message = describe_escape(self.model.rig, travel)
         elif motion.status != Status.DONE:
-            is_marched = not engines.MARCH.find_unsupported_feature(self.model)
-            march = ', or use accuracy.method = "march"' if is_marched else ""
+            march = ""
+            if not engines.MARCH.find_unsupported_feature(self.model):
+                # Some messages end with a remedy of their own.
+                before = ", or" if ";" in motion.message else ";"
+                march = f'{before} use accuracy.method = "march"'
             raise NotConverged(motion.message + march)
+
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period

@@ -44,8 +44,6 @@ MIN_RELATIVE_ERROR = 1e-9
 MAX_OTHER_WORK = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
 PRESSING_WORK = 40.0
-# Expected ratio of the CPU times of runs with twice the steps, or a hundredth of the step error.
-FINER_RUN_RATIO = 2.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -163,9 +161,7 @@ def _make_result(run: CoupledRun) -> Result:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
     moved = ()
     if model.has_interface_patches:
-        snapshots = [
-            snapshot for snapshot in solution.snapshots if isinstance(snapshot, ElementSnapshot)
-        ]
+        snapshots = [frame for frame in solution.snapshots if isinstance(frame, ElementSnapshot)]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(
@@ -318,7 +314,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         numerics.finer(),
         axis,
         seconds=run.solution.seconds,
-        cost_ratio=FINER_RUN_RATIO,
+        cost_ratio=refine.STEP_COST_RATIO,
         max_passes=max_passes,
     )
 

@@ -164,9 +164,9 @@ class Holder(Table):
 
 
 def require_convex_radius(value: TomlValue) -> TomlValue:
-    """Return the radius of a crown.
+    """Require that the radius of a crown is not that of a hollow, and return it.
 
-    ValueError is raised for the negative radius of a hollow.
+    ValueError is raised for a negative radius.
     """
     if str(value).lstrip().startswith("-"):
         raise ValueError(

@@ -159,7 +159,7 @@ class Friction(Table):
     rest_speed: optional(
         Speed,
         "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
-        "default: 1e-3 of the largest sliding speed",
+        "default: 1e-3 of the largest sliding speed; in a rig, of the one that its drive or start gives without resonance",
     )
     initial_bonds: key(
         Fraction, "fraction m_0 of all bonds that already exist when the run begins"

@@ -180,9 +180,9 @@ def array(kind: KeyType, least: int = 1, most: int | None = None) -> KeyType:
 
 
 def _require_printable(value: str) -> str:
-    """Return a text.
+    """Require that results files can hold the characters of a text, and return it.
 
-    ValueError is raised for characters that results files cannot hold.
+    ValueError is raised for other characters.
     """
     for sign in value:
         if category(sign) in ("Cc", "Cs") and sign not in "\n\t":

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..files import UNIVERSAL_EXTENSIONS
 from ..keys.removed import describe_removed
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
@@ -11,7 +12,6 @@ from .facts import TableFacts
 from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
-UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Files of Nastran, which have a refusal of their own because earlier versions read them.

@@ -44,9 +44,9 @@ class TableView:
         self.table = table
 
     def __getattr__(self, name: str) -> ViewValue:
-        """Return the value of a key of the table by its attribute name, wrapped.
+        """Return the value of a key of the table by its name, in the form of `wrap_value`.
 
-        It is unknown without a table.
+        Without a table it is UNKNOWN_VALUE.
         """
         value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds the value without this method

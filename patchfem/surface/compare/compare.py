@@ -518,10 +518,10 @@ def _name_ends(
 
 
 def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
-    """Compare the waves along lines of the common part, and return their ratios after/before by name.
+    """Return the ratios, after to before wear, of amplitude and slope of the waves in the common part of two surfaces.
 
-    `result` is the comparison, and `direction` "x" or "y" that of the lines. Without a common place the ratios have no
-    value.
+    The waves are those along lines in the `direction` "x" or "y". `result` is the comparison. Without a common place the
+    ratios, by name, have no value.
     """
     depths = result.evidence.curves
     if depths is None:

@@ -280,19 +280,12 @@ def test_refuses_keys_that_rows_do_not_determine(tmp_path, sets, wanted, match):
 )
 def test_refuses_unsuitable_rows_options(tmp_path, words, message):
     """Options that do not apply to a fit to rows are refused before any file is written."""
-    given = [
-        "fit",
-        str(write_and_load(tmp_path, LINEAR).path),
-        "--to",
-        str(write_rows(tmp_path, make_linear_rows())),
-        "--free",
-        *LINEAR_FREE,
-        "-o",
-        str(tmp_path / "out"),
-        *words,
-    ]
-    code, _, err = run_cli(*given)
-    assert code == 2 and message in err
+    scene = write_and_load(tmp_path, LINEAR).path
+    rows = write_rows(tmp_path, make_linear_rows())
+    answer = run_cli(
+        "fit", scene, "--to", rows, "--free", *LINEAR_FREE, "-o", tmp_path / "out", *words
+    )
+    assert answer.code == 2 and message in answer.err
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
 
 

@@ -50,8 +50,8 @@ def scene_path(tmp_path):
     """Return the path of a scene in a folder with a path file, beside another folder."""
     (tmp_path / "here").mkdir()
     (tmp_path / "there").mkdir()
-    (tmp_path / "here" / "path.csv").write_text(PATH)
-    return tmp_path / "here" / "bench.toml"
+    (tmp_path / "here/path.csv").write_text(PATH)
+    return tmp_path / "here/bench.toml"
 
 
 def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
@@ -130,7 +130,7 @@ def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
-        while running.poll() is None and not any((tmp_path / "out" / "chunks").glob("*.nc")):
+        while running.poll() is None and not any((tmp_path / "out/chunks").glob("*.nc")):
             pass
     finally:
         server.kill()

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import list_names, run_successfully
 from deadly_cases import KillingMeasure
 from scene_texts import BENCH, COULOMB, POINT, SHORT
+from sweep_tables import assert_same_files
 
 from patchfem.campaigns import (
     Cases,
@@ -142,18 +143,13 @@ sweep_into(sweep, cases, SweepTarget(Path(sys.argv[2])), Pool(2), report_progres
 """
 
 
-def file_names(folder: Path) -> list:
-    """Return the sorted names in a folder."""
-    return sorted(one.name for one in folder.iterdir())
-
-
 @pytest.fixture(scope="module")
 def whole_sweep(tmp_path_factory):
     """Return scene, axis and folder of a finished sweep."""
     place = tmp_path_factory.mktemp("whole")
     (place / "rig.toml").write_text(RIG, encoding="utf-8")
     over = "friction.static=0.05..0.6:20lin"
-    assert run_cli("sweep", place / "rig.toml", "--over", over, "-o", place / "whole").code == 0
+    run_successfully("sweep", place / "rig.toml", "--over", over, "-o", place / "whole")
     return place / "rig.toml", over, place / "whole"
 
 
@@ -162,15 +158,13 @@ def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
     path, over, expected = whole_sweep
     stored = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
     assert (
-        0 < len(stored) < len(file_names(expected / "cases")) and not (out / "sweep.csv").exists()
+        0 < len(stored) < len(list_names(expected / "cases")) and not (out / "sweep.csv").exists()
     )
     assert all((one / "summary.json").read_text().endswith("}\n") for one in stored)
-    assert run_cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
-    for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (expected / name).read_bytes()
-    assert file_names(out / "cases") == file_names(expected / "cases") and file_names(
-        out
-    ) == file_names(expected)
+    run_successfully("sweep", path, "--over", over, "-o", out, "--resume")
+    assert_same_files(out, expected)
+    assert list_names(out) == list_names(expected)
+    assert list_names(out / "cases") == list_names(expected / "cases")
 
 
 def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
@@ -179,7 +173,7 @@ def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
     out = tmp_path / "swept"
     process = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
     assert process.returncode == -signal.SIGKILL
-    incomplete = out / "cases" / ".0123456789abcdef.1"  # an incomplete case of a killed process
+    incomplete = out / "cases/.0123456789abcdef.1"  # an incomplete case of a killed process
     incomplete.mkdir()
     (incomplete / "summary.json").write_text('{"patchf')
     assert_resumes_to_same_files(whole_sweep, out)

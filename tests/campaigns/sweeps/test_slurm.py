@@ -6,9 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
+from command_line import list_names, run_successfully
 from scene_texts import BENCH
 from study_module import ROOT
+from sweep_tables import assert_same_files
 
 SBATCH = """\
 #!{python}
@@ -57,8 +58,8 @@ def run_sweep(tmp_path) -> tuple:
     """Run the sweep in a single process and return its scene, options and folder."""
     scene = tmp_path / "a scene.toml"  # a path with a space, which the scripts must quote
     scene.write_text(BENCH, encoding="utf-8")
-    words = [word for one in OVER for word in ("--over", one)]
-    assert run_cli("sweep", scene, *words, "-o", tmp_path / "whole").code == 0
+    words = [f"--over={one}" for one in OVER]
+    run_successfully("sweep", scene, *words, "-o", tmp_path / "whole")
     return scene, words, tmp_path / "whole"
 
 
@@ -68,13 +69,10 @@ def test_exact_job_array_writes_files_of_single_sweep(submission_log, tmp_path):
     scene, words, expected = run_sweep(tmp_path)
     out = tmp_path / "parts"
     process = subprocess.run(
-        [ROOT / "cluster" / "array.sh", scene, out, "2", *words], capture_output=True, text=True
+        [ROOT / "cluster/array.sh", scene, out, "2", *words], capture_output=True, text=True
     )
     assert process.returncode == 0, process.stderr
     first, second = submission_log.read_text().splitlines()
     assert "--array=1-2" in first and "--dependency=afterany:7 " in second
-    for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (expected / name).read_bytes()
-    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
-        one.name for one in (expected / "cases").iterdir()
-    )
+    assert_same_files(out, expected)
+    assert list_names(out / "cases") == list_names(expected / "cases")

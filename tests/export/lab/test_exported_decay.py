@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from command_line import run_cli
+from command_line import run_successfully
 
 from patchfem.response import DecayCurve
 
@@ -64,9 +64,7 @@ def decay_folders(tmp_path_factory):
             )
             (folder / f"{name}.toml").write_text(text + drive, "utf-8")
             folders[name] = folder / name
-            assert (
-                run_cli("run", folder / f"{name}.toml", "-o", folders[name], "--no-page").code == 0
-            )
+            run_successfully("run", folder / f"{name}.toml", "-o", folders[name], "--no-page")
         return folders[name]
 
     return run_case
@@ -89,9 +87,8 @@ def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, end
     sum.
     """
     folder = decay_folders(name)
-    assert run_cli("export", folder, "-o", tmp_path / f"run.{ending}", "--histories").code == 0
-    answer = run_cli("import", tmp_path / f"run.{ending}", "--decay", "-o", tmp_path / "decay.csv")
-    assert answer.code == 0, answer.err
+    run_successfully("export", folder, "-o", tmp_path / f"run.{ending}", "--histories")
+    run_successfully("import", tmp_path / f"run.{ending}", "--decay", "-o", tmp_path / "decay.csv")
     imported = DecayCurve(*np.loadtxt(tmp_path / "decay.csv", delimiter=",", skiprows=1).T)
     curve = read_decay_curve(folder)
     inside = np.isfinite(curve.interpolate("frequency", imported.amplitude))

@@ -1,11 +1,11 @@
 """Answer of a comparison of surfaces: sentences of every code, compare.json, curves and maps, and the page."""
 
 import csv
-import json
 import re
 
 import numpy as np
 import pytest
+from command_line import read_json, read_page
 from comparisons import FINDINGS, VERDICTS, compare_pair, compare_traces
 from page_data import read_tiles
 
@@ -79,7 +79,7 @@ def test_exact_compare_json_has_the_keys_of_the_contract(written):
     """compare.json has the names that scripts read, each number with value, low, high and unit, or with a reason."""
     answer, folder = written
     evidence = compare_pair("worn_volume" in answer.quantities).evidence
-    data = json.loads((folder / "compare.json").read_text("utf-8"))
+    data = read_json(folder / "compare.json")
     assert data == answer.details
     names = {"worn_depth_max", "worn_depth_mean", "amplitude_ratio", "slope_ratio", "hidden_wear"}
     names |= (
@@ -153,10 +153,10 @@ def test_exact_curves_are_in_csv_and_netcdf():
 def test_exact_page_is_made_again_and_shows_the_files(written):
     """The page is made again byte for byte; its verdict and its tiles are the texts of the numbers in summary.json."""
     _, folder = written
-    text = (folder / "report.html").read_text("utf-8")
+    text = read_page(folder)
     page.write_page(folder)
-    assert (folder / "report.html").read_text("utf-8") == text
-    summary = json.loads((folder / "summary.json").read_text("utf-8"))
+    assert read_page(folder) == text
+    summary = read_json(folder / "summary.json")
     for sentence in summary["verdict"]:
         assert f"<p>{sentence}</p>" in text
     tiles = read_tiles(text)

@@ -2,6 +2,7 @@
 
 import csv
 
+from command_line import read_page
 from comparisons import compare_traces
 
 from patchfem.export import page, store
@@ -33,7 +34,7 @@ def test_exact_files_of_pairs(tmp_path):
     rows = list(csv.DictReader((tmp_path / "pairs.csv").read_text("utf-8").splitlines()))
     assert [float(row["worn_depth_mean [m]"] or 0) for row in rows] == [*DEPTHS, 2e-6, 0]
     assert rows[4]["message"] == "x.csv: there is no such file" and rows[0]["part"] == "no. 2"
-    html = (tmp_path / "report.html").read_text("utf-8")
+    html = read_page(tmp_path)
     assert "Worn depth of the pairs" in html and "x.csv: there is no such file" in html
     page.write_page(tmp_path)
-    assert html == (tmp_path / "report.html").read_text("utf-8")
+    assert html == read_page(tmp_path)

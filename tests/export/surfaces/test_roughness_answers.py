@@ -1,10 +1,10 @@
 """Answer of the roughness of measured surfaces, against closed forms of a sine and against the parameters themselves."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
+from command_line import read_json
 from scipy.stats import t
 
 from patchfem.export import page, quantities, store
@@ -38,7 +38,7 @@ def sine_folder(tmp_path_factory):
 def test_exact_parameters_of_a_sine(sine_folder):
     """Ra = 2A/pi, Rq = A/sqrt(2), Rz = 2A, RSm = wavelength: in profile.json, in the headline and in profile.csv."""
     answer, folder = sine_folder
-    (entry,) = json.loads((folder / "profile.json").read_text("utf-8"))["profiles"]
+    (entry,) = read_json(folder / "profile.json")["profiles"]
     truths = {"Ra": 2 / np.pi * AMPLITUDE, "Rq": AMPLITUDE / np.sqrt(2), "Rz": 2 * AMPLITUDE}
     head, row = csv.reader((folder / "profile.csv").read_text("utf-8").splitlines())
     for name, truth in truths.items():

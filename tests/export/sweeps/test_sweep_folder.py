@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import run_cli, run_successfully
 from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
-from sweep_tables import make_table, read_rows
+from sweep_tables import assert_same_files, make_table, read_rows
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
@@ -38,12 +38,6 @@ def swept(scene_file):
     return folder
 
 
-def assert_same_tables(folder, other) -> None:
-    """Assert that the files of two sweeps are identical byte for byte."""
-    for name in TABLES:
-        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
-
-
 def test_exact_chunks_are_small_netcdf_files(swept):
     """The chunks take less than 600 bytes per case, and xarray reads the numbers of sweep.csv from them."""
     files = list((swept / "chunks").iterdir())
@@ -70,7 +64,7 @@ def test_always_cases_of_damaged_chunk_run_again(swept, scene_file, tmp_path, mo
     words = ("sweep", scene_file, *OVER, "-o", folder, "--keep", "none", "--resume")
     assert run_cli(*words).code == 3
     assert len(computed) == 110
-    assert_same_tables(folder, swept)
+    assert_same_files(folder, swept, TABLES)
 
 
 def test_exact_resumed_sweep_computes_what_is_missing(scene_file, tmp_path, monkeypatch):
@@ -82,7 +76,7 @@ def test_exact_resumed_sweep_computes_what_is_missing(scene_file, tmp_path, monk
         """Run a sweep over the friction coefficient, and return the number of computed cases."""
         before = len(computed)
         over = ("--over", f"friction.static={values}")
-        assert run_cli("sweep", scene_file, *over, "-o", folder, *words).code == 0
+        run_successfully("sweep", scene_file, *over, "-o", folder, *words)
         return len(computed) - before
 
     assert run_sweep("0.2,0.3,0.4") == 3
@@ -100,18 +94,18 @@ def test_exact_shards_give_same_files(swept, scene_file, tmp_path):
     """Shards with --collect give the files of a single sweep."""
     words = ("sweep", scene_file, *OVER, "--keep", "none")
     for shard in ("2/3", "1/3"):
-        assert run_cli(*words, "-o", tmp_path / "shards", "--shard", shard).code == 0
+        run_successfully(*words, "-o", tmp_path / "shards", "--shard", shard)
     early = run_cli(*words, "-o", tmp_path / "shards", "--collect")
     assert early.code == 4 and "37 of 110 cases have no answer" in early.err
-    assert run_cli(*words, "-o", tmp_path / "shards", "--shard", "3/3").code == 0
+    run_successfully(*words, "-o", tmp_path / "shards", "--shard", "3/3")
     assert run_cli(*words, "-o", tmp_path / "shards", "--collect").code == 3
-    assert_same_tables(tmp_path / "shards", swept)
+    assert_same_files(tmp_path / "shards", swept, TABLES)
 
 
 def test_exact_interrupted_sweep_that_is_run_anew_is_named(scene_file, tmp_path):
     """A sweep without --resume says how many cases of an interrupted one it computes again; a whole one has no note."""
     words = ("sweep", scene_file, "--over", "friction.static=0.2,0.3,0.4", "-o", tmp_path / "out")
-    assert run_cli(*words, "--shard", "1/3").code == 0
+    run_successfully(*words, "--shard", "1/3")
     assert "note: 1 of 3 cases already have an answer" in run_cli(*words).err
     assert "already have an answer" not in run_cli(*words).err
 
@@ -124,7 +118,7 @@ def test_exact_repeated_sweep_keeps_one_result_of_each_case(scene_file, tmp_path
     out = tmp_path / "out"
     for values in ("0.2,0.3", "0.2,0.3", "0.3,0.4"):
         over = ("--over", f"friction.static={values}")
-        assert run_cli("sweep", scene_file, *over, "-o", out).code == 0
+        run_successfully("sweep", scene_file, *over, "-o", out)
         (path,) = (out / "chunks").iterdir()
         names, results = store_chunks.read_chunk(path)
         assert len(names) == len(results) == np.unique(names).size == 2
@@ -171,7 +165,7 @@ def test_exact_partial_files_of_killed_writers_are_removed(scene_file, tmp_path)
     (partial / "interfaces" / name).write_text("half a file", "utf-8")
     with Folder(tmp_path / "run", resume=True) as run:
         (run.path / "summary.json").write_text("{}", "utf-8")
-    assert not list((tmp_path / "run").rglob(".*")) and (tmp_path / "run" / "summary.json").exists()
+    assert not list((tmp_path / "run").rglob(".*")) and (tmp_path / "run/summary.json").exists()
 
 
 def test_exact_faults_of_batches_are_read_from_chunks(tmp_path):

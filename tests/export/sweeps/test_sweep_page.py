@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import run_cli
+from command_line import read_page, run_successfully
 from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
 
@@ -46,8 +46,7 @@ def folders(tmp_path_factory):
     found = {}
     for kind, (scene, words) in KINDS.items():
         found[kind] = root / kind.replace(" ", "_")
-        done = run_cli("sweep", root / f"{scene}.toml", *words, "-o", found[kind])
-        assert done.code == 0, done.err
+        run_successfully("sweep", root / f"{scene}.toml", *words, "-o", found[kind])
     return found
 
 
@@ -110,7 +109,7 @@ def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     assert (
         f"{row['value'] * 1e6:.3g} urad before contact fraction changes by 5 %" in answer.verdict[1]
     )
-    text = (folders["patch"] / "report.html").read_text("utf-8")
+    text = read_page(folders["patch"])
     assert "How far the key may go" in text and "contact fraction" in text
     values = answer.data["pressure_peak"].values
     assert f"{values[-1] / 1e6:.4g} MPa" in answer.verdict[0]
@@ -123,7 +122,7 @@ def test_exact_page_of_two_sweeps_shows_measures_of_each(folders, tmp_path):
     with h5py.File(path, "r+") as file:
         file["loop_area"][...] = np.nan
     page = tmp_path / "both.html"
-    assert run_cli("report", tmp_path / "random", folders["one key"], "-o", page).code == 0
+    run_successfully("report", tmp_path / "random", folders["one key"], "-o", page)
 
     drawn = {name: [trace["name"] for trace in traces] for name, traces in read_menu(page).items()}
     assert drawn["relative displacement amplitude"] == ["random", "one_key"]
@@ -139,7 +138,7 @@ def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):
     """A sweep of a single case says that this case settled; once the sentence began with "All 1 cases"."""
     scene = folders["one key"].parent / "rig.toml"
     out = tmp_path / "out"
-    assert run_cli("sweep", scene, "--over", "friction.static=0.35", "-o", out).code == 0
+    run_successfully("sweep", scene, "--over", "friction.static=0.35", "-o", out)
     assert store.read(out).verdict == (
         "Only one case has a result, so that no change is known.",
         "The only case settled and meets the tolerance.",

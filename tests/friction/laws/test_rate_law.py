@@ -9,7 +9,7 @@ from patchfem import plan, run
 from patchfem.core import Outcome
 from patchfem.friction.laws.tanh import TanhLaw
 
-LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
+LIMIT, MASS, OMEGA = 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
 LAW = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
 RIG = (
     LAW

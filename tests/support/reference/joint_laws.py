@@ -7,7 +7,7 @@ from patchfem.scene.joint_laws import JOINT_LAWS
 
 from .keys import FOLDER, format_table
 
-FILE: Path = FOLDER / "guide" / "friction.md"
+FILE: Path = FOLDER / "guide/friction.md"
 BEGIN = "<!-- joint laws -->\n"
 END = "<!-- end -->"
 HEAD = ("you know", "you want", "law and its keys", "what it gives, and its limits")

@@ -11,7 +11,7 @@ from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.keys.tables import Interface
 from patchfem.scene.keys.types import Key, list_keys
 
-FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
+FOLDER = Path(__file__).parents[3] / "patchfem/scene"
 FILE = FOLDER / "README.md"
 TABLE_NAMES = {
     "Friction": "friction",
@@ -203,7 +203,7 @@ def iterate_bounds() -> Iterator[tuple]:
 class Equations:
     """Table of the equations of all effects, in the page of the theory."""
 
-    FILE = FOLDER.parents[1] / "studies" / "site" / "theory.md"
+    FILE = FOLDER.parents[1] / "studies/site/theory.md"
     BEGIN, END = "<!-- effects -->\n", "<!-- end -->"
 
     @classmethod

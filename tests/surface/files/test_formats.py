@@ -9,11 +9,10 @@ import zipfile
 import numpy as np
 import pytest
 import surfaces as write
-from scipy.io import savemat
 from surfaces import assert_scan_equal, read_content
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Profile, read_surface
+from patchfem.surface import Profile
 
 Z = write.draw_scan()
 HOLES = np.where(np.arange(24).reshape(4, 6) % 5 == 2, np.nan, Z)
@@ -236,24 +235,3 @@ def test_refuses_scan_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
     )
     with pytest.raises(PatchfemError, match=r"b.x3p: more than 1024 MiB after it is unpacked; exp"):
         read_content(tmp_path, data, "b.x3p")
-
-
-def test_exact_mat_files_of_scipy_agree(tmp_path):
-    """MAT files of SciPy give the written columns in all numeric classes; other variables are ignored."""
-    for kind in ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"):
-        table = np.column_stack([np.arange(20), np.arange(20) % 3]).astype(kind)
-        savemat(
-            tmp_path / "a.mat",
-            {
-                "table": table,
-                "text": "abc",
-                "cells": np.array([1, "a"], object),
-                "waves": np.ones((9, 2)) * 1j,
-                "pair": {"x": 1.0},
-            },
-            do_compression=kind != "f8",
-        )
-        found = read_surface(tmp_path / "a.mat", UM)
-        assert found.x == pytest.approx(np.arange(20) * 1e-6) and found.z == pytest.approx(
-            np.arange(20) % 3 * 1e-6
-        )
