@@ -21,6 +21,9 @@ RESIDUAL_FACTOR = 10.0  # largest residual at a point, relative to the tolerance
 MIN_ARC_STEP = 1e-7  # smallest step of the arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
 MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
+SAME_CURVE_TOL = (
+    0.05  # distance from an earlier step, relative to its length, at which a curve has closed
+)
 RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
 
 
@@ -100,8 +103,9 @@ class CurvePath:
 
     - points: list of PathPoint
     - folds: parameters at the folds, from a cubic between neighbouring points
-    - ended: "end" at the bound in the first direction; "start" if the curve returned to the other bound; "points" after the
-      largest number of points; "step" if no step was short enough
+    - ended: "end" at the bound in the first direction; "start" if the curve returned to the other bound; "loop" if it has
+      closed; "points" after the largest number of points; "step" if no step was short enough; "cost" if the equations
+      raised NotConverged, because they have been evaluated for too long
     """
 
     points: list[PathPoint]
@@ -168,7 +172,11 @@ def follow_curve(
         point = points[-1]
         unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
         tangent = point.find_tangent(tangent, unit)
-        taken = _take_step(curve, point, step * tangent, unit, settings.tolerance)
+        try:
+            taken = _take_step(curve, point, step * tangent, unit, settings.tolerance)
+        except NotConverged:
+            ended = "cost"
+            break
         if taken is None:
             step /= 2
             if step < MIN_ARC_STEP:
@@ -187,8 +195,12 @@ def follow_curve(
             ended = "end" if (bound == high) == forward else "start"
             break
 
+        is_closed = _is_on_curve(after, points, tangent, unit)
         points.append(after)
         folds += _find_folds(points[-2:], tangent, unit, step)
+        if is_closed:
+            ended = "loop"
+            break
         step = min(step * _step_factor(n_steps), settings.max_step)
     return CurvePath(points, tuple(folds), ended)
 
@@ -309,6 +321,23 @@ def _take_step(
     taken = (corrected[0].w - point.w) / unit
     is_along = float(taken @ tangent) > MIN_STEP_COSINE * float(np.linalg.norm(taken))
     return corrected if is_along else None
+
+
+def _is_on_curve(point: PathPoint, points: list[PathPoint], direction, unit) -> bool:
+    """Return whether a point lies on an earlier step between the points of a curve, along which the curve goes again.
+
+    `direction` (N + 1,) is that of the last step, and the distances are scaled by `unit` (N + 1,).
+    """
+    places = np.array([other.w for other in points]) / unit
+    starts = places[:-2]
+    steps = np.diff(places[:-1], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    to_point = point.w / unit - starts
+    along = np.sum(to_point * steps, axis=1) / lengths
+    across = np.linalg.norm(to_point - (along / lengths)[:, None] * steps, axis=1)
+    is_between = (along >= 0) & (along <= lengths) & (across < SAME_CURVE_TOL * lengths)
+    is_parallel = steps @ direction > MIN_STEP_COSINE * lengths
+    return bool((is_between & is_parallel).any())
 
 
 def _find_folds(points: list[PathPoint], tangent, unit, length: float) -> list[float]:

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
+from ..core import NotConverged
 from .cases import Case, make_arrays
 from .laws import LAWS, masing
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State
-from .runs import Motion, run_case
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State, Status
+from .runs import MESSAGES, Motion, run_case
 
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 
@@ -42,6 +43,9 @@ N_GROWTH_CYCLES = (
 )
 MIN_SIZE_RATIO = (
     1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
+)
+SEARCH_STEPS_RATIO = (
+    3.0  # steps of the search for a periodic motion beside them, relative to theirs
 )
 # Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
 # are used again. The ratio is about the relative change of the derivatives.
@@ -84,6 +88,7 @@ def find_periodic_motion(
     n_first: int = N_FIRST_CYCLES,
     start: State | None = None,
     has_kinks: bool = False,
+    is_undamped: bool = False,
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -98,15 +103,65 @@ def find_periodic_motion(
     has_kinks : bool
         Whether a law has many elements, so that a change of MAX_KINKED_CHANGE counts as none. The derivatives of the
         map are then those between two kinks; stability and error follow from N_CHECKED periods of the motion itself.
+    is_undamped : bool
+        Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
+        because the periods of a growing motion would lead nowhere.
+
+    Raises
+    ------
+    NotConverged
+        If the search needs too many steps.
     """
+    growth = _measure_growth(case) if is_undamped and start is None else None
     shooting = Shooting(case)
     if start is not None:
         shooting.state = start
+    if growth is None or not growth.size:
+        motion = _search(shooting, n_first, MAX_RELAXED, has_kinks=has_kinks)
+    else:
+        # A growing motion leads nowhere, so that the search beside it is short.
+        shooting.limit_steps(SEARCH_STEPS_RATIO * growth.n_steps)
+        try:
+            motion = _search(shooting, n_first, N_RELAXED, has_kinks=has_kinks)
+        except NotConverged:
+            shooting = Shooting(case)
+            before = shooting.state
+            shooting.relax(1)
+            change = shooting.measure_change(before)
+            run = run_case(shooting.case)
+            motion = PeriodicMotion(run, change, np.inf, 0.0, np.zeros(0), shooting.period, 1)
+
+    # A periodic motion far beyond the growing one is never reached.
+    has_converged = motion.change < motion.tolerance
+    largest = np.abs(motion.multipliers).max(initial=0.0)
+    if has_converged and largest <= 1 - UNDAMPED_TOL:
+        return motion
+    growth = growth or _measure_growth(case)
+    size = shooting.find_size(motion.run.final) if has_converged else np.inf
+    return motion._replace(grows=bool(growth.size and size > MIN_SIZE_RATIO * growth.size))
+
+
+def _search(
+    shooting: "Shooting", n_first: int, max_relaxed: int, *, has_kinks: bool
+) -> PeriodicMotion:
+    """Return the motion with the smallest change over a period, and its multipliers.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        Map of a period and the state from which the search begins.
+    n_first : int
+        Number of first cycles.
+    max_relaxed : int
+        Largest number of cycles after a correction that did not help.
+    has_kinks : bool
+        As in `find_periodic_motion`.
+    """
     shooting.relax(n_first - 1)
-    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    tolerance = MAX_CHANGE * float(shooting.case.rig.settings[Setting.RTOL])
     if has_kinks:
         tolerance = max(tolerance, MAX_KINKED_CHANGE)
-    before, change = shooting.converge(tolerance)
+    before, change = shooting.converge(tolerance, max_relaxed)
     if has_kinks:
         multipliers, error = shooting.check(before, tolerance)
     else:
@@ -122,38 +177,33 @@ def find_periodic_motion(
 
     # The measures are those of a period from there on.
     run = run_case(shooting.case, start=before)
-    largest = np.abs(multipliers).max(initial=0.0)
-    has_converged = change < tolerance
-    may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
-    size = np.abs(before.y[: 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
     return PeriodicMotion(
-        run,
-        change,
-        error,
-        tolerance,
-        multipliers,
-        shooting.period,
-        shooting.n_periods,
-        grows=may_grow and _grows_for_ever(case, size),
+        run, change, error, tolerance, multipliers, shooting.period, shooting.n_periods
     )
 
 
-def _grows_for_ever(case: Case, size: float) -> bool:
-    """Return whether the motion from the start of a case increases by similar amounts in equal times.
+class _Growth(NamedTuple):
+    """Motion from the start of a case that may grow for ever.
 
-    `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
-    does not come near; inf if none was found.
+    - size: largest coordinate or velocity after some time, 0 if the motion does not grow for ever
+    - n_steps: steps of the engine up to there
     """
+
+    size: float
+    n_steps: float
+
+
+def _measure_growth(case: Case) -> _Growth:
+    """Return whether the motion from the start of a case increases by similar amounts in equal times, and its size."""
     shooting = Shooting(case)
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
-        sizes.append(float(np.abs(shooting.state.y[: 2 * case.rig.modes.shape[1]]).max()))
+        sizes.append(shooting.find_size(shooting.state))
     first, second = np.diff(sizes)
     is_moving = sizes[0] > case.rig.scales[0]
-    is_far = size > MIN_SIZE_RATIO * sizes[-1]
     is_growing = first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first
-    return bool(is_moving and is_far and is_growing)
+    return _Growth(sizes[-1] if is_moving and is_growing else 0.0, shooting.n_steps)
 
 
 class Shooting:
@@ -170,18 +220,43 @@ class Shooting:
         self.state = make_arrays(case)[0]
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
+        self.n_steps = 0.0
         self.map: _Map | None = None
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
+    def limit_steps(self, max_steps: float) -> None:
+        """Set the largest number of steps of all periods."""
+        settings = self.case.rig.settings.copy()
+        settings[Setting.MAX_STEPS] = max_steps
+        self.case = replace(self.case, rig=self.case.rig._replace(settings=settings))
+
+    def find_size(self, state: State) -> float:
+        """Return the largest coordinate or velocity of the modes in a state."""
+        return float(np.abs(state.y[: 2 * self.case.rig.modes.shape[1]]).max())
+
     def advance(self, state: State) -> State:
-        """Return the state a period after another one, whose clock starts at 0."""
+        """Return the state a period after another one, whose clock starts at 0.
+
+        Raises
+        ------
+        NotConverged
+            If all periods of the search take more than `Setting.MAX_STEPS` steps.
+        """
         state = copy_state(state)
+        settings = self.case.rig.settings
         state.clock[:] = 0.0
-        state.clock[Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
+        state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
+        state.clock[Clock.N_STEPS] = self.n_steps
         self.record = make_arrays(self.case)[1]
         compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, self.record)
         self.n_periods += 1
+        self.n_steps = state.clock[Clock.N_STEPS]
+        if self.n_steps > settings[Setting.MAX_STEPS]:
+            cause = MESSAGES[Status.TOO_MANY_STEPS].format(steps=settings[Setting.MAX_STEPS])
+            raise NotConverged(
+                f'no periodic motion was found: {cause}, or accuracy.method = "auto"'
+            )
         return state
 
     def relax(self, count: int) -> None:
@@ -189,8 +264,10 @@ class Shooting:
         for _ in range(count):
             self.state = self.advance(self.state)
 
-    def converge(self, tolerance: float) -> tuple[State, float]:
+    def converge(self, tolerance: float, max_relaxed: int) -> tuple[State, float]:
         """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
+
+        Up to `max_relaxed` periods without a correction follow one that did not help.
 
         Returns
         -------
@@ -226,7 +303,7 @@ class Shooting:
                     helps = False
             if not helps:
                 self.relax(n_relaxed)
-                n_relaxed = min(2 * n_relaxed, MAX_RELAXED)
+                n_relaxed = min(2 * n_relaxed, max_relaxed)
                 self.map = None
                 best = np.inf
         if best < np.inf and change > MAX_REMAINDER * best:

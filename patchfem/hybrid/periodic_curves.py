@@ -37,6 +37,7 @@ from .periodic import (
 from .records import Face, Memory, Probe, Setting, State
 from .runs import run_case
 
+MAX_STEPS = 6e6  # steps of the engine over all periods of a curve, which take about a minute
 N_FIRST = 2  # periods in which the laws take the memory of the loop of a motion from another map
 
 
@@ -120,6 +121,7 @@ class PeriodEquations:
     def __init__(self, make_case: Callable[[float], Case], start: CurveStart, *, has_kinks: bool):
         self.make_case = make_case
         self.start = start
+        self.n_steps = 0.0
         shooting = self._make_shooting(start.parameter)
         shooting.state = start.state
         shooting.relax(N_FIRST)
@@ -138,7 +140,10 @@ class PeriodEquations:
 
     def _make_shooting(self, parameter: float) -> _LoopShooting:
         """Return the map of a period at a value of the parameter."""
-        return _LoopShooting(self.make_case(float(parameter)))
+        shooting = _LoopShooting(self.make_case(float(parameter)))
+        shooting.limit_steps(MAX_STEPS)
+        shooting.n_steps = self.n_steps
+        return shooting
 
     def _advance(self, x, parameter: float) -> tuple[_LoopShooting, State]:
         """Return the map with the state after a period, and the state before it, with the memory that belongs to it.
@@ -153,6 +158,7 @@ class PeriodEquations:
             packed[self.reversals.columns] += self.reversals.predict(w)
         before = unpack_state(self.before, packed)
         shooting.state = shooting.advance(before)
+        self.n_steps = shooting.n_steps
 
         # In another regime the reversal points are those that the period has left.
         regime = [Memory.DIRECTION, Memory.CONTACT]
@@ -216,6 +222,7 @@ class PeriodEquations:
             columns[~is_motion], whole_gain, own, by_motion, np.append(x, parameter), left
         )
         motion = self._describe(shooting, before, change)
+        self.n_steps = shooting.n_steps
         return PathEquations(jacobian, slope, motion, motion.change)
 
     def _describe(self, shooting: _LoopShooting, before: State, change) -> PeriodicMotion:
@@ -283,7 +290,8 @@ class PeriodEquations:
         return None if found is None else found[0]
 
     def restart(self, point: PathPoint) -> None:
-        """Begin the next correction at a point of the curve."""
+        """Begin the next correction at a point of the curve, with a new count of steps."""
+        self.n_steps = 0.0
         self.before = copy_state(point.equations.details.run.final)
         self.reversals = None
         self.differentiate(point.w[:-1], point.w[-1])

@@ -8,10 +8,10 @@ from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 
 from patchfem.core import G_N, NotConverged, SineDrive
-from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid import cases, drives, periodic_curves, runs
 from patchfem.hybrid.continuation import Curve, PathEquations, PathSettings, follow_curve
 from patchfem.hybrid.laws import masing
-from patchfem.hybrid.periodic import find_periodic_motion
+from patchfem.hybrid.periodic import Shooting, find_periodic_motion
 from patchfem.hybrid.periodic_curves import CurveStart, PeriodEquations
 from patchfem.hybrid.records import LawNumbers
 
@@ -88,6 +88,39 @@ def test_exact_continuation_follows_circle_through_fold():
     back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), False, PathSettings(0.05, 0.05))
     x, p = np.array([point.w for point in back.points]).T
     assert back.ended == "end" and (np.diff(p) < 0).all() and (x > 0).all()
+
+
+def test_continuation_ends_where_curve_closes():
+    """A circle within the bounds ends after one turn of 2 pi, with a fold at each side."""
+    circle = Curve(
+        lambda x, p: np.array([x[0] ** 2 + p**2 - 1]),
+        lambda x, p: PathEquations(np.array([[2 * x[0]]]), np.array([2 * p])),
+    )
+    path = follow_curve(circle, [0.6], 0.8, (-2.0, 2.0), True, PathSettings(0.01, 0.02))
+    assert path.ended == "loop" and path.folds == pytest.approx((1.0, -1.0), abs=1e-6)
+    x, p = np.array([point.w for point in path.points]).T
+    turned = np.unwrap(np.arctan2(x, p))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2 * np.pi, abs=0.1)
+
+
+def test_continuation_ends_with_count_of_steps():
+    """A curve whose motions take too many steps ends before its bound, and a search for one motion is refused."""
+    ends = (2 * np.pi * 100, 2 * np.pi * 130)
+    first = CurveStart(find_periodic_motion(make_sine_case(ends[0])).run.final, ends[0])
+    equations = PeriodEquations(make_sine_case, first, has_kinks=False)
+    equations.n_steps = periodic_curves.MAX_STEPS - 5e3
+    path = equations.follow(ends, STEPS)
+    assert path.ended == "cost" and 1 < len(path.points) and path.points[-1].w[-1] < ends[1]
+
+    shooting = Shooting(make_sine_case(ends[0]))
+    shooting.limit_steps(100)
+    with pytest.raises(NotConverged, match=r"needs more than 1e\+02 steps"):
+        shooting.relax(10)
+
+
+def make_sine_case(omega: float) -> cases.Case:
+    """Return the case of a period of the rig with a cubic spring at a frequency [rad/s]."""
+    return make_case(RIG, DUFFING, SineDrive(LEVEL, omega))
 
 
 def test_refuses_start_without_nearby_curve():

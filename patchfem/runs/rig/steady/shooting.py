@@ -60,12 +60,14 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 # steps along this curve
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
-LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.02)
+LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
 # Reasons why a curve ends before the last frequency, by the value of `CurvePath.ended`
 REASONS_OF_END = {
     "start": "it turns back to its first frequency",
+    "loop": "it is closed",
     "points": "it has too many points",
     "step": "no neighbouring motion was found there",
+    "cost": "its motions take too many steps, because a law or a mode is much faster than the drive",
 }
 
 
@@ -114,7 +116,11 @@ class ShootingFinder:
         case = self.make_case(drive)
         n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
         motion = periodic.find_periodic_motion(
-            case, start=guess, n_first=n_first, has_kinks=self.joints.has_kinks
+            case,
+            start=guess,
+            n_first=n_first,
+            has_kinks=self.joints.has_kinks,
+            is_undamped=self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL,
         )
         if motion.grows:
             return motion
