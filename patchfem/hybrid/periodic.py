@@ -24,12 +24,12 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after the first one that did not help, and twice as many after the next
 MAX_RELAXED = 200  # largest number of these cycles
-MAX_FORCE_RATIO = (
-    1.1  # largest force at a reversal point after a correction, relative to the friction limit
-)
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
 MAX_KINKED_CHANGE = 1e-6
+# Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds; corrections
+# are exact to MAX_KINKED_CHANGE.
+MAX_FORCE_RATIO = 1 + 10 * MAX_KINKED_CHANGE
 N_CHECKED = 10  # periods that such a motion is followed
 CHECK_FACTOR = 10.0  # largest distance after these periods, relative to the change of a period that counts as none
 # Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
@@ -209,8 +209,6 @@ def _measure_growth(case: Case) -> _Growth:
 class Shooting:
     """State of a motion at the start of a period, and its map."""
 
-    remembers_loop_alone = False  # whether the reversal points are those of the loop of a period
-
     def __init__(self, case: Case):
         settings = case.rig.settings
         self.period = float(settings[Setting.PERIOD])
@@ -369,18 +367,28 @@ class Shooting:
         columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
-    def _columns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop."""
-        start = pack_state(before, self.n)
-        is_unknown = pack_state(self.state, self.n) != start
+    def pack(self, state: State) -> np.ndarray:
+        """Return the n states of the motion and the reversal points in one array (k,)."""
+        return np.append(state.y[: self.n], state.memory[:, Memory.STACK :])
+
+    def unpack(self, state: State, packed) -> State:
+        """Return a copy of a state with the values of `pack`."""
+        state = copy_state(state)
+        stack = state.memory[:, Memory.STACK :]
+        state.y[: self.n] = packed[: self.n]
+        stack[:] = packed[self.n :].reshape(stack.shape)
+        return state
+
+    def find_columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state: what a period changes."""
+        is_unknown = self.pack(self.state) != self.pack(before)
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
 
-        # A periodic motion leaves the reversal points of its loop as they were, but they move with it. The many points of
-        # the past beside them do not.
-        is_used = (find_used(before) & find_used(self.state)).ravel()
-        if self.remembers_loop_alone:
-            is_unknown[self.n :] = is_used & (start[self.n :] != 0)
-        is_unknown[self.n :] &= is_used
+        # Reversal points count if their number is the same.
+        counts = before.memory[:, Memory.COUNT, None]
+        is_used = np.arange(before.memory.shape[1] - Memory.STACK) < 2 * counts
+        is_used &= counts == self.state.memory[:, Memory.COUNT, None]
+        is_unknown[self.n :] &= is_used.ravel()
         return np.flatnonzero(is_unknown)
 
     def differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
@@ -388,29 +396,23 @@ class Shooting:
 
         The derivatives of the last correction are used again as long as `map` has them.
         """
-        columns = self._columns(before)
-        start = pack_state(before, self.n)
-        end = pack_state(self.state, self.n)
+        columns = self.find_columns(before)
+        start = self.pack(before)
+        end = self.pack(self.state)
         if self.map is None or not np.array_equal(self.map.columns, columns):
             scale = np.append(self.scales(), np.abs(start[self.n :]))[columns]
             slopes = np.empty((columns.size, columns.size))
             for k, column in enumerate(columns):
                 packed = start.copy()
                 packed[column] += self.difference * scale[k]
-                slopes[:, k] = self.find_change(unpack_state(before, packed), end)[columns]
+                slopes[:, k] = self.find_change(self.unpack(before, packed), end)[columns]
                 slopes[:, k] /= self.difference * scale
             self.map = _Map(columns, slopes, scale)
         return self.map, (end - start)[columns] / self.map.scale
 
     def find_change(self, state: State, end) -> np.ndarray:
-        """Return the change of the packed state after a period from that of another motion, `end`.
-
-        A reversal point that only one of both motions remembers does not count, because it is not passed again.
-        """
-        after = self.advance(state)
-        change = pack_state(after, self.n) - end
-        change[self.n :][~find_used(after).ravel()] = 0.0
-        return change
+        """Return the change of the packed state after a period from that of another motion, `end`."""
+        return self.pack(self.advance(state)) - end
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
@@ -427,10 +429,10 @@ class Shooting:
         Regimes are those at the end of the period, where the motion has brought them.
         """
         period_map, change = self.differentiate(before)
-        packed = pack_state(self.state, self.n)
+        packed = self.pack(self.state)
         step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
-        packed[period_map.columns] = pack_state(before, self.n)[period_map.columns] + step
-        self.state = unpack_state(self.state, packed)
+        packed[period_map.columns] = self.pack(before)[period_map.columns] + step
+        self.state = self.unpack(self.state, packed)
 
 
 class _Map(NamedTuple):
@@ -458,39 +460,3 @@ def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
 def copy_state(state: State) -> State:
     """Return an independent copy of a state."""
     return State(*(array.copy() for array in state))
-
-
-def pack_state(state: State, n: int) -> np.ndarray:
-    """Return the first n states of the motion and the reversal points in one array (k,), the last of them at its end."""
-    return np.append(state.y[:n], _align(state.memory, 1)[:, Memory.STACK :])
-
-
-def unpack_state(state: State, packed) -> State:
-    """Return a copy of a state with the values of `pack_state`."""
-    state = copy_state(state)
-    memory = _align(state.memory, 1)
-    stack = memory[:, Memory.STACK :]
-    n = packed.size - stack.size
-    state.y[:n] = packed[:n]
-    stack[:] = packed[n:].reshape(stack.shape)
-    state.memory[:] = _align(memory, -1)
-    return state
-
-
-def _align(memory, direction: int) -> np.ndarray:
-    """Return memories (M, k) whose last reversal points are in the last columns (direction 1), or as they were (-1)."""
-    aligned = memory.copy()
-    stacks = aligned[:, Memory.STACK :]
-    for row, stack in zip(memory, stacks):
-        stack[:] = np.roll(stack, -2 * direction * int(row[Memory.COUNT]))
-    return aligned
-
-
-def find_used(state: State) -> np.ndarray:
-    """Return which entries (M, k) of the aligned stacks of `pack_state` the motion depends on.
-
-    It does not depend on the first of more than two reversal points, where it would meet the curve of first loading again.
-    """
-    count = state.memory[:, Memory.COUNT, None]
-    size = state.memory.shape[1] - Memory.STACK
-    return np.arange(size) >= size - 2 * count + 2 * (count > 2)

@@ -30,9 +30,6 @@ from .periodic import (
     PeriodicMotion,
     Shooting,
     copy_state,
-    find_used,
-    pack_state,
-    unpack_state,
 )
 from .records import Face, Memory, Probe, Setting, State
 from .runs import run_case
@@ -59,8 +56,6 @@ class _LoopShooting(Shooting):
     motion, because its reversals neither exceed those of the period before nor fall short of them.
     """
 
-    remembers_loop_alone = True
-
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0."""
         faces = self.case.rig.faces
@@ -72,6 +67,38 @@ class _LoopShooting(Shooting):
             masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
         return end
 
+    def pack(self, state: State) -> np.ndarray:
+        """Return the n states of the motion and the reversal points in one array (k,), the last of them at its end."""
+        return np.append(state.y[: self.n], _align(state.memory, 1)[:, Memory.STACK :])
+
+    def unpack(self, state: State, packed) -> State:
+        """Return a copy of a state with the values of `pack`."""
+        aligned = state._replace(memory=_align(state.memory, 1))
+        state = super().unpack(aligned, packed)
+        return state._replace(memory=_align(state.memory, -1))
+
+    def find_columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop.
+
+        A periodic motion leaves the reversal points of its loop as they were, but they move with it.
+        """
+        start = self.pack(before)
+        is_unknown = self.pack(self.state) != start
+        is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
+        is_used = _find_used(before) & _find_used(self.state)
+        is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
+        return np.flatnonzero(is_unknown)
+
+    def find_change(self, state: State, end) -> np.ndarray:
+        """Return the change of the packed state after a period from that of another motion, `end`.
+
+        A reversal point that only one of both motions remembers does not count, because it is not passed again.
+        """
+        after = self.advance(state)
+        change = self.pack(after) - end
+        change[self.n :][~_find_used(after).ravel()] = 0.0
+        return change
+
     def load_loops(self, state: State) -> State:
         """Return a copy of a state with the forces that belong to the reversal points of its loops."""
         state = copy_state(state)
@@ -80,6 +107,25 @@ class _LoopShooting(Shooting):
         for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
             masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
         return state
+
+
+def _align(memory, direction: int) -> np.ndarray:
+    """Return memories (M, k) whose last reversal points are in the last columns (direction 1), or as they were (-1)."""
+    aligned = memory.copy()
+    stacks = aligned[:, Memory.STACK :]
+    for row, stack in zip(memory, stacks):
+        stack[:] = np.roll(stack, -2 * direction * int(row[Memory.COUNT]))
+    return aligned
+
+
+def _find_used(state: State) -> np.ndarray:
+    """Return which entries (M, k) of the aligned stacks the motion depends on.
+
+    It does not depend on the first of more than two reversal points, where it would meet the curve of first loading again.
+    """
+    count = state.memory[:, Memory.COUNT, None]
+    size = state.memory.shape[1] - Memory.STACK
+    return np.arange(size) >= size - 2 * count + 2 * (count > 2)
 
 
 class Reversals(NamedTuple):
@@ -152,11 +198,11 @@ class PeriodEquations:
         """
         shooting = self._make_shooting(parameter)
         w = np.append(x, parameter)
-        packed = pack_state(self.before, self.n)
+        packed = shooting.pack(self.before)
         packed[: self.n] = x * self.scale
         if self.reversals is not None:
             packed[self.reversals.columns] += self.reversals.predict(w)
-        before = unpack_state(self.before, packed)
+        before = shooting.unpack(self.before, packed)
         shooting.state = shooting.advance(before)
         self.n_steps = shooting.n_steps
 
@@ -164,8 +210,8 @@ class PeriodEquations:
         regime = [Memory.DIRECTION, Memory.CONTACT]
         is_same = np.array_equal(shooting.state.memory[:, regime], before.memory[:, regime])
         if self.reversals is not None and is_same:
-            change = pack_state(shooting.state, self.n) - packed
-            change[self.n :][~find_used(shooting.state).ravel()] = 0.0
+            change = shooting.pack(shooting.state) - packed
+            change[self.n :][~_find_used(shooting.state).ravel()] = 0.0
             change = change[self.reversals.columns]
             self.reversals = self.reversals._replace(w=w, change=change)
             self.before = before
@@ -191,7 +237,7 @@ class PeriodEquations:
 
         # Derivatives by the parameter, all in units of the curve.
         step = shooting.difference * parameter
-        end = pack_state(shooting.state, self.n)
+        end = shooting.pack(shooting.state)
         other = self._make_shooting(parameter + step).find_change(before, end)
         by_parameter = other[columns] / linear.scale / step
         unit = linear.scale.copy()
@@ -216,7 +262,7 @@ class PeriodEquations:
         by_motion[:, np.append(places, self.n)] = -own @ matrix[~is_motion][:, is_kept]
         whole_gain = np.zeros((self.n, own.shape[0]))
         whole_gain[places] = gain
-        left = (end - pack_state(before, self.n))[columns[~is_motion]]
+        left = (end - shooting.pack(before))[columns[~is_motion]]
         self.before = before
         self.reversals = Reversals(
             columns[~is_motion], whole_gain, own, by_motion, np.append(x, parameter), left
