@@ -113,9 +113,9 @@ class CurvePath:
     ended: str
 
 
-def _solve(matrix, b) -> np.ndarray:
+def _solve(matrix, right_side) -> np.ndarray:
     """Return the least-squares solution of a linear system, which may be singular."""
-    return np.linalg.lstsq(matrix, b, rcond=RANK_TOL)[0]
+    return np.linalg.lstsq(matrix, right_side, rcond=RANK_TOL)[0]
 
 
 def follow_curve(
@@ -123,8 +123,9 @@ def follow_curve(
     x,
     p: float,
     bounds: tuple[float, float],
-    forward: bool = True,
     settings: PathSettings | None = None,
+    *,
+    forward: bool = True,
 ) -> CurvePath:
     """Trace a solution curve of r(x, p) = 0 within bounds of the parameter.
 
@@ -138,10 +139,10 @@ def follow_curve(
         Parameter of the first point, whose unknowns are corrected first.
     bounds : tuple
         Lowest and highest p; the last point lies on one of them.
-    forward : bool, optional
-        Whether p increases at first.
     settings : PathSettings, optional
         Tolerance and steps along the curve.
+    forward : bool, optional
+        Whether p increases at first.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def follow_curve(
     unit = np.full(w.size, float(np.linalg.norm(x)) or 1.0)
     unit[-1] = high - low
     along = np.append(np.zeros(w.size - 1), 1.0)
-    first = correct_at(curve, PathPoint(w, curve.differentiate(w[:-1], p)), w, settings.tolerance)
+    first = find_point(curve, PathPoint(w, curve.differentiate(w[:-1], p)), w, settings.tolerance)
     if first is None:
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
@@ -190,7 +191,7 @@ def follow_curve(
         if not low <= w[-1] <= high:
             bound = high if w[-1] > high else low
             guess = point.w + (bound - point.w[-1]) / (w[-1] - point.w[-1]) * (w - point.w)
-            last = correct_at(curve, point, np.append(guess[:-1], bound), settings.tolerance)
+            last = find_point(curve, point, np.append(guess[:-1], bound), settings.tolerance)
             points += [last] * (last is not None)
             ended = "end" if (bound == high) == forward else "start"
             break
@@ -212,8 +213,22 @@ def _step_factor(n_steps: int) -> float:
     return 1.1 if n_steps <= 7 else 0.6
 
 
+class Guess(NamedTuple):
+    """Guess of a point of a curve.
+
+    - w (N + 1,): guess of unknowns and parameter
+    - row (N + 1,): direction in scaled units in which no correction goes: the tangent, or the parameter, which then keeps
+      its value
+    - unit (N + 1,): scale of each entry of w
+    """
+
+    w: np.ndarray
+    row: np.ndarray
+    unit: np.ndarray
+
+
 def correct_point(
-    curve: Curve, point: PathPoint, w, row, unit, tolerance: float, *, max_step: float = np.inf
+    curve: Curve, point: PathPoint, guess: Guess, tolerance: float, *, max_step: float = np.inf
 ) -> tuple[PathPoint, int] | None:
     """Correct a guess, and again with the derivatives at the point found until its own residual has vanished.
 
@@ -226,12 +241,8 @@ def correct_point(
         Equations of the curve.
     point : PathPoint
         Point near the guess.
-    w : (N + 1,) array
-        Guess of unknowns and parameter.
-    row : (N + 1,) array
-        Direction in scaled units in which no correction goes: the tangent, or the parameter, which then keeps its value.
-    unit : (N + 1,) array
-        Scale of each entry of w.
+    guess : Guess
+        Guess that is corrected.
     tolerance : float
         Relative change of the unknowns at which the method has converged.
     max_step : float
@@ -243,22 +254,25 @@ def correct_point(
         Corrected point, and number of steps; None without convergence.
     """
     for _ in range(MAX_CORRECTIONS):
-        found = _correct_by_broyden(curve, point.border(row, unit), w, unit, tolerance, max_step)
+        matrix = point.border(guess.row, guess.unit)
+        found = _correct_by_broyden(curve, matrix, guess, tolerance, max_step)
         if found is not None:
-            w = found[0]
-        point = PathPoint(w, curve.differentiate(w[:-1], w[-1]))
+            guess = guess._replace(w=found[0])
+        point = PathPoint(guess.w, curve.differentiate(guess.w[:-1], guess.w[-1]))
         if found is not None and point.equations.residual <= RESIDUAL_FACTOR * tolerance:
             return point, found[1]
     return None
 
 
 def _correct_by_broyden(
-    curve: Curve, matrix, w, unit, tolerance: float, max_step: float
+    curve: Curve, matrix, guess: Guess, tolerance: float, max_step: float
 ) -> tuple[np.ndarray, int] | None:
     """Return the corrected guess (N + 1,) and the number of steps of Broyden's method, or None without convergence.
 
     `matrix` (N + 1, N + 1) are the scaled derivatives with which it begins; the others are as in `correct_point`.
     """
+    w = guess.w
+    unit = guess.unit
     step = None
     for count in range(1, MAX_NEWTON_STEPS + 1):
         residual = np.append(curve.find_residual(w[:-1], w[-1]) / unit[0], 0.0)
@@ -280,15 +294,23 @@ def _correct_by_broyden(
     return None
 
 
-def correct_at(curve: Curve, point: PathPoint, w, tolerance: float) -> PathPoint | None:
-    """Return the point of a curve with the parameter of a guess w (N + 1,), or None without convergence.
+def find_point(curve: Curve, point: PathPoint, w, tolerance: float) -> PathPoint | None:
+    """Return the point of a curve with the parameter of a guess, or None without convergence.
 
-    `curve` has the equations, `point` is near the guess, and `tolerance` is the relative change of the unknowns at which
-    the correction ends.
+    Parameters
+    ----------
+    curve : Curve
+        Equations of the curve.
+    point : PathPoint
+        Point near the guess.
+    w : (N + 1,) array
+        Guess of the unknowns, and the parameter.
+    tolerance : float
+        Relative change of the unknowns at which the correction ends.
     """
     along = np.append(np.zeros(w.size - 1), 1.0)
     unit = np.append(np.full(w.size - 1, float(np.linalg.norm(w[:-1])) or 1.0), abs(w[-1]) or 1.0)
-    corrected = correct_point(curve, point, w, along, unit, tolerance)
+    corrected = correct_point(curve, point, Guess(w, along, unit), tolerance)
     if corrected is None:
         return None
     found = corrected[0]
@@ -314,8 +336,8 @@ def _take_step(
         Relative change of the motion at which a correction ends.
     """
     tangent = step / np.linalg.norm(step)
-    guess = point.w + unit * step
-    corrected = correct_point(curve, point, guess, tangent, unit, tolerance, max_step=1.0)
+    guess = Guess(point.w + unit * step, tangent, unit)
+    corrected = correct_point(curve, point, guess, tolerance, max_step=1.0)
     if corrected is None:
         return None
     taken = (corrected[0].w - point.w) / unit

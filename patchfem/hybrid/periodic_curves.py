@@ -14,11 +14,12 @@ from .cases import Case
 from .continuation import (
     Curve,
     CurvePath,
+    Guess,
     PathEquations,
     PathPoint,
     PathSettings,
-    correct_at,
     correct_point,
+    find_point,
     follow_curve,
 )
 from .laws import masing
@@ -303,13 +304,20 @@ class PeriodEquations:
     def follow(
         self, bounds: tuple[float, float], settings: PathSettings, *, forward: bool = True
     ) -> CurvePath:
-        """Follow the curve from its start within bounds of the parameter, which increases at first if `forward`.
+        """Follow the curve from its start. The details of a point are its `PeriodicMotion`.
 
-        The details of a point are its `PeriodicMotion`. The tolerance of `settings` is replaced by that of the map.
+        Parameters
+        ----------
+        bounds : tuple
+            Lowest and highest value of the parameter.
+        settings : PathSettings
+            Steps along the curve; its tolerance is replaced by that of the map.
+        forward : bool
+            Whether the parameter increases at first.
         """
         settings = settings._replace(tolerance=self.tolerance)
         x = self.before.y[: self.n] / self.scale
-        return follow_curve(self.curve, x, self.start.parameter, bounds, forward, settings)
+        return follow_curve(self.curve, x, self.start.parameter, bounds, settings, forward=forward)
 
     def find_between(
         self, first: PathPoint, second: PathPoint, fraction: float, width: float
@@ -330,9 +338,9 @@ class PeriodEquations:
         unit = find_unit(first, second, width)
         step = (second.w - first.w) / unit
         tangent = step / np.linalg.norm(step)
-        guess = first.w + fraction * (second.w - first.w)
+        guess = Guess(first.w + fraction * (second.w - first.w), tangent, unit)
         self.restart(first)
-        found = correct_point(self.curve, first, guess, tangent, unit, self.tolerance)
+        found = correct_point(self.curve, first, guess, self.tolerance)
         return None if found is None else found[0]
 
     def restart(self, point: PathPoint) -> None:
@@ -346,13 +354,14 @@ class PeriodEquations:
         """Return the points at which a path passes a value of the parameter, in their order."""
         found = []
         for first, second in zip(path.points[:-1], path.points[1:]):
-            before, after = first.w[-1], second.w[-1]
+            before = first.w[-1]
+            after = second.w[-1]
             if (before > parameter) == (after > parameter):
                 continue
             guess = first.w + (parameter - before) / (after - before) * (second.w - first.w)
             guess[-1] = parameter
             self.restart(first)
-            point = correct_at(self.curve, first, guess, self.tolerance)
+            point = find_point(self.curve, first, guess, self.tolerance)
             found += [point] * (point is not None)
         return found
 
@@ -360,12 +369,25 @@ class PeriodEquations:
 def find_unit(first: PathPoint, second: PathPoint, width: float) -> np.ndarray:
     """Return the sizes (N + 1,) by which the difference of two points of a curve is divided.
 
-    `width` is the change of the parameter that counts as 1.
+    Parameters
+    ----------
+    first, second : PathPoint
+        Points of the curve.
+    width : float
+        Change of the parameter that counts as 1.
     """
     size = max(float(np.linalg.norm(point.w[:-1])) for point in (first, second)) or 1.0
     return np.append(np.full(first.w.size - 1, size), width)
 
 
 def measure_distance(first: PathPoint, second: PathPoint, width: float) -> float:
-    """Return the distance between two points of a curve in scaled unknowns and parameter; `width` as in `find_unit`."""
+    """Return the distance between two points of a curve in scaled unknowns and parameter.
+
+    Parameters
+    ----------
+    first, second : PathPoint
+        Points of the curve.
+    width : float
+        Change of the parameter that counts as 1.
+    """
     return float(np.linalg.norm((second.w - first.w) / find_unit(first, second, width)))

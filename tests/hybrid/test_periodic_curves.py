@@ -79,13 +79,13 @@ def test_exact_continuation_follows_circle_through_fold():
         lambda x, p: np.array([x[0] ** 2 + p**2 - 1]),
         lambda x, p: PathEquations(np.array([[2 * x[0]]]), np.array([2 * p])),
     )
-    path = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), True, PathSettings(0.05, 0.05))
+    path = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), PathSettings(0.05, 0.05))
     x, p = np.array([point.w for point in path.points]).T
     assert path.ended == "start" and p[-1] == -0.5
     assert x[-1] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
     assert x**2 + p**2 == pytest.approx(np.ones(p.size), abs=1e-8)
     assert path.folds == (pytest.approx(1.0, abs=1e-8),)
-    back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), False, PathSettings(0.05, 0.05))
+    back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), PathSettings(0.05, 0.05), forward=False)
     x, p = np.array([point.w for point in back.points]).T
     assert back.ended == "end" and (np.diff(p) < 0).all() and (x > 0).all()
 
@@ -96,7 +96,7 @@ def test_continuation_ends_where_curve_closes():
         lambda x, p: np.array([x[0] ** 2 + p**2 - 1]),
         lambda x, p: PathEquations(np.array([[2 * x[0]]]), np.array([2 * p])),
     )
-    path = follow_curve(circle, [0.6], 0.8, (-2.0, 2.0), True, PathSettings(0.01, 0.02))
+    path = follow_curve(circle, [0.6], 0.8, (-2.0, 2.0), PathSettings(0.01, 0.02))
     assert path.ended == "loop" and path.folds == pytest.approx((1.0, -1.0), abs=1e-6)
     x, p = np.array([point.w for point in path.points]).T
     turned = np.unwrap(np.arctan2(x, p))

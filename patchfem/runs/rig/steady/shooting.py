@@ -13,10 +13,10 @@ import numpy as np
 from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....dynamics.curve_points import sample_adaptively
-from ....formatting import format_length, format_quantity
+from ....formatting import format_length
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
-from ....hybrid.continuation import CurvePath, PathPoint, PathSettings
+from ....hybrid.continuation import PathPoint, PathSettings
 from ....hybrid.laws import is_rigid, masing
 from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
 from ....hybrid.records import Probe, Status, Window
@@ -31,23 +31,22 @@ from ..joints import make_joints
 from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
-    HARMONIC_ROUND_OFF,
     INTERPOLATION_TOL,
+    SENSED_COLUMNS,
     CurvePoint,
     ObservedMotion,
     ResponseCurve,
     describe_instability,
+    estimate_point_errors,
+    note_end_of_curve,
 )
 
-# Relative error of the measures of an event-driven motion, which has round-off only.
-EXACT_RELATIVE_ERROR = 1e-9
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
-SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental")  # what sensors see
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
@@ -61,14 +60,6 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
-# Reasons why a curve ends before the last frequency, by the value of `CurvePath.ended`
-REASONS_OF_END = {
-    "start": "it turns back to its first frequency",
-    "loop": "it is closed",
-    "points": "it has too many points",
-    "step": "no neighbouring motion was found there",
-    "cost": "its motions take too many steps, because a law or a mode is much faster than the drive",
-}
 
 
 class ShootingFinder:
@@ -444,7 +435,9 @@ class ShootingFinder:
         path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
         points = [self._make_curve_point(point) for point in path.points]
         folds = tuple(fold / (2 * np.pi) for fold in path.folds)
-        return ResponseCurve(points, folds, tuple(_note_end_of_curve(points, path, drive.high)))
+        return ResponseCurve(
+            points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
+        )
 
     def _make_curve_point(self, point: PathPoint) -> CurvePoint:
         """Return a point of a response curve that has been followed."""
@@ -521,28 +514,3 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
     return motion.error + STEPS_ERROR * RTOL
-
-
-def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
-    """Return the errors of the measures of a point of a response curve from the relative error of the motion.
-
-    The ratio of two harmonics has the error of the first.
-    """
-    scale = EXACT_RELATIVE_ERROR + relative
-    errors = {name: scale * abs(value) for name, value in values.items()}
-    if "acceleration_distortion" in errors:
-        errors["acceleration_distortion"] += HARMONIC_ROUND_OFF + relative
-    return errors
-
-
-def _note_end_of_curve(points: list[CurvePoint], path: CurvePath, last: float) -> list[str]:
-    """Return a note if a curve of `points` ends before the last frequency [Hz] of the sweep, else an empty list."""
-    if path.ended == "end":
-        return []
-    frequencies = [point.drive.omega / (2 * np.pi) for point in points]
-    reached = min(frequencies, key=lambda frequency: abs(frequency - last))
-    return [
-        f"the curve of steady motions reaches {format_quantity(reached, 'Hz', 4)} and not the end of the sweep at "
-        f"{format_quantity(last, 'Hz', 4)}: {REASONS_OF_END[path.ended]}; the largest motion is that of this part, so "
-        "change drive.from or drive.to"
-    ]
