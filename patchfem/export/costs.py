@@ -98,6 +98,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         chosen = find_best_run(runs, tolerance)
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE else []
+    # each tolerance has its own advice, but only the best value of a setting
+    advised = rows[: len(runs)] if knob == TOLERANCE else [row]
+    notes = [f"{_describe_miss(one)}: {text}." for one in advised for text in one.run.remedies]
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(
@@ -105,8 +108,8 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         title=model.source.title,
         verdict=tuple(sentences[:4]),
         quantities=_make_quantities(row, main, tolerance),
-        data=_make_data(rows, main, tolerance),
-        remarks=Remarks(notes=tuple(f"With {chosen.words}: {text}." for text in chosen.remedies)),
+        data=_make_data(rows, main),
+        remarks=Remarks(notes=tuple(notes)),
         details=details,
         origin=make_origin(model.source, "cost"),
     )
@@ -130,12 +133,14 @@ def describe_run(row: Row) -> JsonObject:
 
 
 def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
-    """Return sentences on the scene as it is, the smallest tolerance that is met, and the advice of a run that misses."""
+    """Return sentences on the scene as it is and on the smallest tolerance that is met."""
     run = row.run
     error = ""
     if row.worst.name:
         name = row.worst.name.replace("_", " ")
-        error = f", with a largest error of {format_number(row.worst.fraction, 2)} in {name}"
+        error = (
+            f", with a largest relative error of {format_number(row.worst.fraction, 2)} in {name}"
+        )
     sentences = [
         f"At its tolerance {run.tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and "
         f"{SCENE_JUDGEMENTS[row.judgement]}{error}."
@@ -145,20 +150,22 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
     if met:
         best = min(met, key=lambda one: one.tolerance)
         seconds = format_number(best.seconds, 2)
-        sentences.append(f"The smallest tolerance that is met is {best.label}, in {seconds} CPU s.")
+        sentences.append(
+            f"Of the tolerances of this table, the smallest that is met is {best.label}, in {seconds} CPU s."
+        )
     elif any(one.judgement is Judgement.UNKNOWN for one in rows):
         sentences.append("No run is known to meet its tolerance.")
     else:
         sentences.append("No run meets its tolerance.")
+    return sentences
 
-    # the last advice belongs to the smallest tolerance that is missed
-    advice = []
-    for one in rows:
-        if one.judgement is Judgement.MISSES:
-            advice += [
-                f"For the tolerance {one.run.tolerance:g}: {text}." for text in one.run.remedies
-            ]
-    return sentences + advice[-1:]
+
+def _describe_miss(row: Row) -> str:
+    """Return the run for which an advice holds and, if it has a single one, the measure that misses the tolerance."""
+    measure = ""
+    if len(row.run.remedies) == 1 and row.judgement is Judgement.MISSES:
+        measure = f", {row.worst.name.replace('_', ' ')} misses the tolerance"
+    return f"With {row.run.words}{measure}"
 
 
 def _find_main_measure(runs: list[Cost]) -> str:
@@ -187,11 +194,10 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
     return out
 
 
-def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
+def _make_data(rows: list[Row], main: str) -> Variables:
     """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too.
 
-    `rows` are runs with their judgements, `main` is the name of the main measure, and `tolerance` the relative one of
-    the scene.
+    `rows` are runs with their judgements, and `main` is the name of the main measure.
     """
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}
@@ -205,6 +211,7 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
 
     # an exact run has no place on a logarithmic axis
     columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
+    columns["tolerance"] = ([run.tolerance for run in runs], "1")
     columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
@@ -217,9 +224,4 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
     has_several = rows[0].knob != rows[-1].knob
     texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
     data["result"] = encode("run", texts)
-    seconds = data["seconds"].values
-    ends = {
-        "allowed_seconds": ([seconds.min(), seconds.max()], "s"),
-        "allowed_error": ([tolerance, tolerance], "1"),
-    }
-    return data | make_columns("end", ends)
+    return data

@@ -99,16 +99,19 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
     assert answer.verdict[:2] == (
         "At its tolerance 0.001 the scene takes 1 CPU s and does not have an error estimate of every measure, with a "
-        "largest error of 0.0001 in a.",
-        "The smallest tolerance that is met is 4, in 1 CPU s.",
+        "largest relative error of 0.0001 in a.",
+        "Of the tolerances of this table, the smallest that is met is 4, in 1 CPU s.",
     )
     entries = answer.details["tolerance"]["runs"]
     assert [entry["meets_tolerance"] for entry in entries] == [True, False, True, False]
     for known in runs[:1] + runs[2:]:
         forget_errors(known, "b")
     runs[-1].measures["b"] = Measure(2.0, "1", 2e-3)
+    runs[-1] = replace(runs[-1], remedies=("use it",))
     answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
-    assert answer.verdict[1] == "No run is known to meet its tolerance."
+    assert answer.verdict[1:] == ("No run is known to meet its tolerance.",)
+    # the advice of a tolerance other than that of the scene
+    assert answer.remarks.notes == ("With a knob at 5, b misses the tolerance: use it.",)
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,7 @@ def _find_x(data: Variables, chart: Chart) -> str:
 
 
 def _as_floats(variable: Variable) -> np.ndarray:
-    """Return the values of a variable as floats, with the mean over strips."""
+    """Return the values of a variable as floats, averaged over its dimension `strip` if it has one."""
     values = np.asarray(variable.values, float)
     return values.mean(axis=variable.dims.index("strip")) if "strip" in variable.dims else values
 
@@ -211,7 +211,7 @@ def _make_curves(
         keep = np.flatnonzero(np.isfinite(row)) if first == "case" else thin(row)
         parts = (row, *(np.atleast_2d(band)[number] for band in bands))
         curves.append(Curve(label, x[keep], *(one[keep] * axes[1].scale for one in parts)))
-        if chart.by in data and not first and name in chart.y:
+        if chart.by in data and not first and name == chart.y.split()[0]:
             return _split_by_code(curves[0], data[chart.by], keep, chart.style != "points")
     return [curve for curve in curves if curve.x.size]
 

@@ -31,7 +31,7 @@ class Chart:
     log : str
         Logarithmic axes: "", "x", "y" or "xy". "auto" decides by the values, also for the other axis of "x auto".
     by : str
-        Variable of codes that colour the points.
+        Variable of codes that colour the points of the first variable.
     marks : str
         Variables whose values are vertical lines.
     lines : str
@@ -446,14 +446,14 @@ COST = (
     Chart(
         "Error against time",
         "seconds",
-        "largest_error",
+        "largest_error tolerance",
         "points",
         log="xy",
         by="result",
-        lines="allowed_error@allowed_seconds",
         x_label="CPU time",
-        y_label="error of the worst measure",
-        caption="Largest relative error of any measure in each run. The line is the tolerance of the scene.",
+        y_label="largest relative error",
+        caption="Largest relative error of any measure in each run, and the tolerance of this run at the same CPU time. A "
+        "run meets its tolerance if its error is below it.",
     ),
     Chart(
         "Value against time",
