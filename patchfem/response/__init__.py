@@ -65,7 +65,6 @@ PUBLIC = {
     "measures": (
         "MAX_RESTING_SLIDE_RANGE",
         "compute_ledger_measures",
-        "compute_peak",
         "compute_step_harmonic",
         "energy_balance",
         "measure_half_range",
@@ -121,7 +120,6 @@ PUBLIC = {
         "slip_period",
     ),
     "spectrum": (
-        "find_acceleration_harmonics",
         "read_instrument",
         "make_acceleration_measures",
     ),

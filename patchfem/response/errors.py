@@ -144,7 +144,7 @@ def convergence_errors(
 
 
 def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
-    """Estimate the error of each measure from a run with more harmonics, modes or bond strips.
+    """Estimate the error of each measure from a run with more modes or bond strips.
 
     The finer run has twice as many of them, and the coarser run half as many. The truncation error of
     the Fourier series of a friction force with corners is of second order. Where the change to the

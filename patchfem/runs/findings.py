@@ -7,11 +7,10 @@ the allowed one therefore needs a resolution that is finer by the factor `excess
 """
 
 from collections.abc import Callable, Mapping
-from math import ceil, floor, log2, log10, pi
+from math import ceil, floor, log2, log10
 from typing import NamedTuple
 
 from ..core import Measure
-from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
@@ -29,8 +28,6 @@ MAX_FIXED_STEP_HALVINGS = 4
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
 MAX_PROPOSED_STRIPS = 64
-# Measures from samples, whose error does not depend on the number of harmonics.
-SAMPLED_MEASURES = ("stick_fraction", "slip_start_phase")
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
 ELEMENT_SIZE_KEY = "contact.element_size"
@@ -252,10 +249,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     if name == rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
-    harmonics = missed.result.settings.harmonics
-    if harmonics is None or name.startswith(SAMPLED_MEASURES):
-        return NO_ADVICE
-    return notes.advise_harmonics(harmonics, _count_friction_harmonics(missed))
+    return NO_ADVICE
 
 
 def _advise_steps(missed: Missed) -> Advice | None:
@@ -324,15 +318,3 @@ ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
     "modes": _advise_shear_modes,
     "bonds": _advise_bond_sum,
 }
-
-
-def _count_friction_harmonics(missed: Missed) -> float:
-    """Return the number of harmonics that a velocity-dependent friction force needs.
-
-    It is the largest slip velocity divided by the reference speed of the law; 0 for other laws.
-    """
-    law = missed.model.friction
-    slip = missed.measures.get("slip_amplitude")
-    if law is None or slip is None or not law_has_trait(law.law, "creeps"):
-        return 0.0
-    return 2 * pi / missed.result.motion.period * slip.value / law.reference_speed

@@ -21,8 +21,6 @@ BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide [bytes]
 # Per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 BYTES_PER_MODE_PAIR = 125.0
 BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive [bytes]
-# Per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
-BYTES_PER_HARMONIC_PAIR = 94.0
 HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
@@ -100,7 +98,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
 
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
-    """Return the contributions of modes, drive, histories and harmonic balance of a rig; a list of bonds is limited.
+    """Return the contributions of modes, drive and histories of a rig; a list of bonds is limited.
 
     `has_steps` tells whether the scene sets the steps per cycle.
     """
@@ -116,9 +114,7 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
         MemoryPart(BYTES_PER_DRIVE_ROW * n_rows, f"{n_rows} rows of the drive", shorter),
     ]
     if engines.ENGINES[plan.engine].finds_periodic_motion:
-        harmonics = model.accuracy.harmonics or 0
-        size = BYTES_PER_HARMONIC_PAIR * (2.0 * harmonics * max(1, n_interfaces)) ** 2
-        return [*parts, MemoryPart(size, f"{harmonics} harmonics", "lower accuracy.harmonics")]
+        return parts
 
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = numerics.choose_numerics(model)

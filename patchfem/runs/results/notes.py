@@ -14,7 +14,7 @@ from ...effects import law_has_trait
 from ...formatting import format_length
 from ...friction.bonds import parameters
 from .patch_rows import Measures
-from .result import Advice, Settings
+from .result import Settings
 
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
@@ -26,10 +26,6 @@ MAX_BOND_FORMING_SLIP_RATIO = 0.3
 # Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
 MIN_REPORTED_FORCE_EXCESS_RATIO = 1e-3
 MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
-PROPOSED_HARMONICS_FACTOR = 4  # Ratio of the proposed to the present number of harmonics.
-MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning proposes.
-# Largest number of harmonics that a warning proposes for a steep friction law.
-MAX_PROPOSED_HARMONICS = 500
 
 
 class LawFacts(NamedTuple):
@@ -148,9 +144,7 @@ def _warn_of_work_check(facts: LawFacts) -> Iterator[str]:
     # One more halving of the time step is proposed, because in a motion with stick the difference
     # of the two works is of second order in the step only on average.
     halvings = 1 + ceil(log2(ratio) / 2)
-    if facts.settings.harmonics:
-        remedy = advise_harmonics(facts.settings.harmonics).text
-    elif steps and halvings > MAX_PROPOSED_HALVINGS:
+    if steps and halvings > MAX_PROPOSED_HALVINGS:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     elif steps:
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
@@ -238,14 +232,3 @@ def find_bonds(model):
     friction = model.friction
     has_bonds = friction is not None and law_has_trait(friction.law, "bonds")
     return model.bonds if has_bonds else None
-
-
-def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
-    """Return the advice to use more harmonics in the harmonic balance.
-
-    At least MIN_PROPOSED_HARMONICS are proposed, because the convergence of a balance with few
-    harmonics is not known. n_law_harmonics: number of harmonics that the friction law needs.
-    """
-    n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
-    n_proposed = max(PROPOSED_HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
-    return Advice.set_key("accuracy.harmonics", n_proposed)

@@ -145,7 +145,7 @@ class Settings(NamedTuple):
 
     - engine: name of the engine.
     - map: "shooting" if the steady motion was found by Newton's method on the map of a period.
-    - steps_per_cycle, harmonics: resolution in time.
+    - steps_per_cycle: resolution in time.
     - shear_modes, elements: number of shear modes or of parallel elements of the pieces.
     - quadrature: summation method for bonds.
     - window_cycles: cycles of the window.
@@ -154,7 +154,6 @@ class Settings(NamedTuple):
     engine: str | None = None
     map: str | None = None
     steps_per_cycle: int | None = None
-    harmonics: int | None = None
     shear_modes: int | None = None
     elements: int | None = None
     quadrature: str | None = None

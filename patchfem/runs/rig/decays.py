@@ -28,7 +28,6 @@ from ...slip.mesh_correction import ERROR_TO_SPREAD_CHANGE, spread_elements
 from ..patch import faces
 from . import joints, numerics
 from .solution import Solution
-from .steady import balance
 
 CONTACTS_WITHOUT_STATIC_CURVE = (
     "the contact slides on grooves",
@@ -39,6 +38,7 @@ UNKNOWN_LOOP_REASON = (
     "the hysteresis loop of this friction law is not known without a computation in time"
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
+N_LOOP_SAMPLES = 4096  # samples of a cycle of a static loop without a closed form
 MAX_DECAY_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
 # Number of amplitudes per decade at which the mesh error is computed.
 MESH_AMPLITUDES_PER_DECADE = 16
@@ -257,7 +257,7 @@ def estimate_decay_mesh_errors(
             fine,
             make_laws_on_coarse_meshes(model, coarse, stiffer),
             lambda laws: compute_static_curve(
-                laws.modes, laws, mode_index, amplitudes, balance.BALANCE_SAMPLES_PER_CYCLE
+                laws.modes, laws, mode_index, amplitudes, N_LOOP_SAMPLES
             )[1:3],
         )
     except NotConverged as reason:

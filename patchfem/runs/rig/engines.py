@@ -72,17 +72,16 @@ def find_obstacle_of_map(name: str, model: Model) -> str:
     return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
-def choose_steady_method(model: Model) -> str:
-    """Return the engine whose method computes the steady motion of a model: "hybrid" for shooting, or "harmonic".
+def may_fold(model: Model) -> bool:
+    """Return whether a response curve of a model may turn back over frequency, so that it is followed along its arc length.
 
-    Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
-    forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
-    `harmonics`.
+    With Coulomb friction, elastic-plastic elements and grooves there is one steady motion at each frequency.
     """
-    is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
-    if model.accuracy.harmonics is None:
-        is_shot |= not find_obstacle_of_map("piecewise", model)
-    return "hybrid" if is_shot else "harmonic"
+    return bool(
+        model.grooves is None
+        and find_obstacle_of_map("exact", model)
+        and find_obstacle_of_map("piecewise", model)
+    )
 
 
 # ---- comparison runs
@@ -273,8 +272,6 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     with the errors that its finder knows by measure.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
-    if choose_steady_method(model) == "harmonic":
-        return [own]
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
 
 
@@ -311,10 +308,9 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:
-        used = choose_steady_method(model)
+        used = "hybrid"
     reasons = {
         "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
-        "harmonics": "if the steady motion is found by the exact solution from event to event",
     }
     sentences = []
     for key in list_fixed_settings(model.accuracy):
