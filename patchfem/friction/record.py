@@ -3,18 +3,25 @@
 from importlib import import_module
 from math import inf
 
+import numpy as np
+
 from ..effects import LAWS, law_has_trait
 from .protocol import SteadyLoop
 
+MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
+
 
 def make_law(friction, load: float = 1.0):
-    """Return the friction law defined by the keys of a [friction] table, all of which must be given.
+    """Return the friction law defined by the keys of a [friction] table, per newton of load.
+
+    All engines take their numbers from the attributes of this law. Laws with bonds have no such function, because their
+    rest speed follows from the motion (`model.law.make_bond_parameters`).
 
     Parameters
     ----------
     friction : table
-        Keys in SI units.
-    load : float
+        Keys in SI units; floats, or arrays (c,) of the values of c contacts.
+    load : float or (c,) array
         Load [N] on the whole contact, to which a stiffness in the table refers.
 
     Returns
@@ -22,6 +29,7 @@ def make_law(friction, load: float = 1.0):
     object
         A law as in `protocol`.
     """
+    load = np.maximum(load, MIN_LOAD)
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
 
 

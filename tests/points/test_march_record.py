@@ -7,17 +7,18 @@ from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
-from patchfem.friction import Bonds, Coulomb
-from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.points import checkpoint
-from patchfem.points import time_march as engine
-from patchfem.points.contacts import (
+from patchfem.friction import Bonds
+from patchfem.points import (
+    March,
+    checkpoint,
+    laws,
     make_bond_contact,
     make_contact,
     make_parallel_contact,
     make_pressed_contact,
+    march,
 )
-from patchfem.points.time_march import March, march
+from patchfem.points import time_march as engine
 from patchfem.slip.shear_modes import shear_modes
 
 from .test_march_loads import reduce_to_shear_modes
@@ -32,7 +33,7 @@ STEPS = 80
 
 def make_tanh_contact(rows=ROW[None]):
     """Return the contact of 20 N tanh(v/(5 mm/s))."""
-    return make_contact([TanhLaw(20.0, 5e-3).element(1.0)], rows)
+    return make_contact([laws.make_tanh(20.0, 5e-3)], rows)
 
 
 def make_compliance(count, scale=1.0):
@@ -66,7 +67,7 @@ def make_pitching_contact(basis):
 
 CASES = {
     "tanh": lambda: (BASIS, make_tanh_contact()),
-    "coulomb": lambda: (BASIS, make_contact([Coulomb(16.0, 20.0).element(1.0)], ROW[None])),
+    "coulomb": lambda: (BASIS, make_contact([laws.make_coulomb(20.0, 16.0)], ROW[None])),
     "elements": lambda: (
         BASIS,
         make_parallel_contact([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6], ROW),

@@ -141,7 +141,7 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
 def from_keys(friction, load: float) -> BoucWen:
     """Return the Bouc-Wen law defined by a [friction] table, for a load N [N] on the whole contact.
 
-    The bond length is mu N/stiffness; a load of 0 counts as 1 N.
+    The bond length is mu N/stiffness.
     """
-    length = friction.static * (load or 1.0) / friction.stiffness
+    length = friction.static * load / friction.stiffness
     return BoucWen(friction.static, length, friction.exponent, friction.shape)

@@ -41,23 +41,29 @@ class Sliders(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Iwan:
-    """Iwan model of a contact: parallel sliders, whose forces are per newton of normal load.
-
-    - stiffness (t,): [1/m]
-    - yield_displacement (t,): [m]
-    - density (3,): phi_max [m], at which all sliders slip, chi + 1 and beta
+    """Iwan model of a contact, whose forces are per newton of normal load.
 
     All points of a contact have the same relative displacement and the same stretches.
+
+    - static: slip force F_S [1]
+    - stiffness: K_T [1/m]
+    - chi, beta: exponent of the micro-slip, and weight of the last slider
     """
 
-    stiffness: np.ndarray
-    yield_displacement: np.ndarray
-    density: tuple[float, float, float]
+    static: float
+    stiffness: float
+    chi: float
+    beta: float
+
+    @property
+    def phi_max(self) -> float:
+        """Displacement [m] at which all sliders slip."""
+        return max_yield_displacement(self.static, self.stiffness, self.chi, self.beta)
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: parallel elements, and the density which they represent."""
-        element = parallel_element(self.stiffness * load, self.yield_displacement)
-        return element._replace(density=self.density)
+        """Return the Element under a constant load [N]: parallel elements that represent the density."""
+        cells = slider_cells(self.static * load, self.stiffness * load, self.chi, self.beta)
+        return parallel_element(*cells)
 
 
 def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:
@@ -127,14 +133,9 @@ def _unit_sliders(chi: float, beta: float) -> Sliders:
 def from_keys(friction, load: float) -> Iwan:
     """Return the Iwan law defined by a [friction] table, for a load N [N] on the whole contact.
 
-    The stiffness [N/m] of the table is that under this load; a load of 0 counts as 1 N.
+    The stiffness [N/m] of the table is that under this load.
     """
-    stiffness = friction.stiffness / (load or 1.0)
-    chi = friction.chi
-    beta = friction.beta
-    phi_max = max_yield_displacement(friction.static, stiffness, chi, beta)
-    cells = slider_cells(friction.static, stiffness, chi, beta)
-    return Iwan(*cells, (phi_max, chi + 1, beta))
+    return Iwan(friction.static, friction.stiffness / load, friction.chi, friction.beta)
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:

@@ -75,18 +75,15 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the law of a constant load [N].
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.bouc_wen.BoucWen
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    length = friction.static * load / friction.stiffness
-    numbers = friction.static, length, friction.exponent, friction.shape
+    numbers = law.static, law.length, law.exponent, law.shape
     return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,))

@@ -83,17 +83,14 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
-    """Return Coulomb's law; without a kinetic coefficient it is the static one.
+def from_law(law, load):
+    """Return the numbers of Coulomb's law.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.coulomb.Coulomb
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    return LawNumbers("coulomb", (friction.static, kinetic))
+    return LawNumbers("coulomb", (law.static, law.kinetic))

@@ -81,22 +81,15 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the law of a constant load [N], to which stiffness and damping refer.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.lugre.LuGre
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    stiffness = friction.stiffness / load
-    numbers = (
-        friction.static, kinetic, stiffness, friction.stribeck_speed,
-        friction.micro_damping / load, friction.viscous / load,
-    )  # fmt: skip
-    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * friction.static / stiffness,))
+    numbers = (law.static, law.kinetic, law.stiffness, law.speed, law.micro_damping, law.viscous)
+    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * law.static / law.stiffness,))

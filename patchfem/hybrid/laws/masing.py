@@ -282,26 +282,18 @@ def has_many_elements(law: LawNumbers) -> bool:
     return law.law == "masing" and law.numbers[4] > 1
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.elastic_plastic.ElasticPlastic or friction.laws.iwan.Iwan
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    limit = friction.static * load
-    if friction.law == "iwan":
-        from ...friction.laws.iwan import max_yield_displacement
-
-        chi = friction.chi
-        beta = friction.beta
-        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
-        numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
-        return LawNumbers("masing", numbers, length=limit / friction.stiffness)
-    length = friction.bond_length or limit / friction.stiffness
-    return from_elements([limit / length], [length])
+    limit = law.static * load
+    if hasattr(law, "chi"):
+        numbers = (law.chi, law.beta, limit, law.phi_max, 1, 0.0, law.phi_max, 0.0, limit)
+        return LawNumbers("masing", numbers, length=law.static / law.stiffness)
+    return from_elements([limit / law.length], [law.length])

@@ -113,17 +113,14 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the elastic-plastic law of a load that varies around `load` [N].
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.elastic_plastic.ElasticPlastic
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    length = friction.bond_length or friction.static * load / friction.stiffness
-    return LawNumbers("pressed_springs", (friction.static, length), (0.0, load), (load, load))
+    return LawNumbers("pressed_springs", (law.static, law.length), (0.0, load), (load, load))

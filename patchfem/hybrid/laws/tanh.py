@@ -68,16 +68,14 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
-    """Return the rate law.
+def from_law(law, load):
+    """Return the numbers of the rate law.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.tanh.TanhLaw
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    return LawNumbers("tanh", (friction.static, friction.reference_speed))
+    return LawNumbers("tanh", (law.static, law.speed))

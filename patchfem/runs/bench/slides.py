@@ -15,6 +15,7 @@ from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import contacts, slides
+from ...points.laws import make_point_law
 from ...slip import fields
 from ..patch import jenkins_elements
 from . import averaged_law, shear
@@ -369,5 +370,5 @@ def _make_contact(task: SlideTask):
         return contacts.make_parallel_contact(*springs, row), jenkins_set
 
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
-    element = make_law(friction, load).element(load)
-    return contacts.make_contact([element], [row]), None
+    law = make_point_law(friction.law, make_law(friction, load), load)
+    return contacts.make_contact([law], [row]), None

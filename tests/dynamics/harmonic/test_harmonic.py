@@ -29,7 +29,7 @@ from patchfem.dynamics.harmonic.equations import HarmonicBalance
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.series import evaluate_series, pack_harmonics, unpack_harmonics
 from patchfem.dynamics.harmonic.slides import make_slides
-from patchfem.friction import Bonds, Coulomb, points_element
+from patchfem.friction import Bonds, Coulomb
 from patchfem.friction.laws.elastic_plastic import parallel_element
 
 DRIVE = SineDrive(1.0, 1.0)
@@ -301,7 +301,7 @@ def test_refuses_laws_that_cannot_be_balanced():
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_steady_motion(modes, DRIVE, Coulomb(1.0, 1.0).element(1.0))
     with pytest.raises(PatchfemError, match="a constant bond length"):
-        find_steady_motion(modes, DRIVE, points_element(GROWING, 1.0))
+        find_steady_motion(modes, DRIVE, GROWING.element(1.0))
     with pytest.raises(PatchfemError, match="on at least one interface"):
         LawGroup(modes, [])
     with pytest.raises(PatchfemError, match="no mode moves"):
