@@ -62,5 +62,7 @@ def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:
     -------
     SteadyLoop or None
     """
-    loop_from_keys = getattr(import_module(LAWS[friction.law].module), "loop_from_keys", None)
-    return None if loop_from_keys is None else loop_from_keys(friction, load, amplitude)
+    if law_has_trait(friction.law, "bonds") or law_has_trait(friction.law, "averaged"):
+        return None
+    find_loop = getattr(make_law(friction, load), "steady_loop", None)
+    return None if find_loop is None else find_loop(load, amplitude)

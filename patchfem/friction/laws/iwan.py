@@ -65,6 +65,23 @@ class Iwan:
         cells = slider_cells(self.static * load, self.stiffness * load, self.chi, self.beta)
         return parallel_element(*cells)
 
+    def steady_loop(self, load: float, amplitude) -> SteadyLoop:
+        """Return the steady loops of the continuous density under a load [N] at amplitudes [m], by Masing's rule.
+
+        The curve of first loading is Segalman's eq. 22.
+        """
+        limit = self.static * load
+        phi_max = self.phi_max
+        order = self.chi + 1
+        scale = limit / (self.beta + order / (order + 1))
+        x = np.minimum(amplitude / phi_max, 1.0)
+        force = scale * ((self.beta + 1) * x - x ** (order + 1) / (order + 1))
+
+        # By Masing's rule, a loop has 8 times the work of first loading, minus the area of its diagonal.
+        work = (self.beta + 1) * x**2 / 2 - x ** (order + 2) / ((order + 1) * (order + 2))
+        work = scale * phi_max * work + limit * np.maximum(amplitude - phi_max, 0.0)
+        return SteadyLoop(force, 8 * work - 4 * amplitude * force)
+
 
 def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:
     """Return phi_max = F_S (1 + beta)/(K_T (beta + (chi + 1)/(chi + 2))), at which all sliders slip.
@@ -136,35 +153,3 @@ def from_keys(friction, load: float) -> Iwan:
     The stiffness [N/m] of the table is that under this load.
     """
     return Iwan(friction.static, friction.stiffness / load, friction.chi, friction.beta)
-
-
-def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loops of the continuous Iwan law (not divided into cells) by Masing's rule.
-
-    The curve of first loading is Segalman's eq. 22.
-
-    Parameters
-    ----------
-    friction : table
-        Keys of [friction] in SI units.
-    load : float
-        Load [N].
-    amplitude : float or array
-        Amplitudes [m] of the relative displacement.
-
-    Returns
-    -------
-    SteadyLoop
-    """
-    chi = friction.chi
-    beta = friction.beta
-    limit = friction.static * load
-    phi_max = max_yield_displacement(limit, friction.stiffness, chi, beta)
-    scale = limit / (beta + (chi + 1) / (chi + 2))
-    x = np.minimum(amplitude / phi_max, 1.0)
-    force = scale * ((beta + 1) * x - x ** (chi + 2) / (chi + 2))
-    # By Masing's rule, a loop has 8 times the work of first loading, minus the area of its
-    # diagonal.
-    work = (beta + 1) * x**2 / 2 - x ** (chi + 3) / ((chi + 2) * (chi + 3))
-    work = scale * phi_max * work + limit * np.maximum(amplitude - phi_max, 0.0)
-    return SteadyLoop(force, 8 * work - 4 * amplitude * force)
