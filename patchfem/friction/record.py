@@ -5,10 +5,9 @@ from math import inf
 
 import numpy as np
 
+from ..core import MIN_LOAD
 from ..effects import LAWS, law_has_trait
 from .protocol import SteadyLoop
-
-MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
 
 def make_law(friction, load: float = 1.0):

@@ -130,23 +130,6 @@ def make_contact(laws, rows, springs=(), scale: float = 0.0, length: float = 0.0
     return Contact([*point_sets, *springs], limit or scale, length)
 
 
-def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact:
-    """Return parallel elastic-plastic elements on one interface.
-
-    Parameters
-    ----------
-    stiffness, yield_slide : (t,) array
-        Stiffnesses [N/m] and slides at which the elements yield [m].
-    row : (n,) array
-        Slide per modal coordinate.
-    elements : slip.shear_modes.JenkinsSet, optional
-        Elements of a patch.
-    """
-    limits = np.multiply(stiffness, yield_slide)
-    points = PointSet(make_jenkins(limits, np.asarray(yield_slide, float)), row)
-    return Contact([points], float(limits.sum()), elements=elements)
-
-
 def make_cubic_spring(stiffness: float, row) -> PointSet:
     """Return a spring whose force is k_3 q^3 on a port with the displacement q.
 

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..exceptions import PatchfemError
+from ..core import MIN_LOAD, PatchfemError
 from ..friction.bonds.parameters import Bonds, growth_numbers
-from ..friction.record import MIN_LOAD
 from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
@@ -66,6 +65,17 @@ def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
         Normal load [N].
     """
     return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
+
+
+def make_elements(stiffness, yield_slide) -> PointLaw:
+    """Return t parallel elastic-plastic elements, a point each.
+
+    Parameters
+    ----------
+    stiffness, yield_slide : (t,) array
+        Stiffnesses [N/m] and slides at which the elements yield [m].
+    """
+    return make_jenkins(np.multiply(stiffness, yield_slide), np.asarray(yield_slide, float))
 
 
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:

@@ -69,12 +69,14 @@ WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS]
-NUMBER = -6  # column of the number of the step in a row of a record; the columns of `Energy` follow
+NUMBER = (
+    -4
+)  # column of the number of the step in a row of a record; the first three of `Energy` follow
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 class Energy(IntEnum):
-    """Columns of a row of a record after the number of the step: sums over all steps up to it [J].
+    """Sums of a record over all steps [J]. The first three are also columns of its rows, after the number of the step.
 
     - WORK: friction work, by mean forces of the steps
     - DISSIPATED, CREATED: work that is not stored, where it is above 0 and where it is below
@@ -699,11 +701,10 @@ class March:
             self.kernels, self.system, (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
         )
 
-    def find_ledger(self, row) -> dict[str, float]:
-        """Return energies [J] and counters by name at a row of a record, whose sample is that of the present state."""
+    def find_ledger(self, sample, energies) -> dict[str, float]:
+        """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""
         n = 2 * self.modes.omega.size
         totals = self.system.totals
-        energies = row[NUMBER + 1 :]
         friction = float(energies[Energy.WORK])
 
         # Friction dissipates its work less the change of the energy stored in the interface.
@@ -711,10 +712,10 @@ class March:
             "work_in": float(totals[Total.WORK_IN]),
             "viscous": float(totals[Total.VISCOUS]),
             "power": float(totals[Total.POWER]),
-            "friction": friction - float(row[n + Sample.ENERGY] - self.first_energy),
+            "friction": friction - float(sample[n + Sample.ENERGY] - self.first_energy),
             "peak_stored": float(totals[Total.STORED]),
             "iterations": float(totals[Total.ITERATIONS]),
-            "stored": self.find_stored_energy(row),
+            "stored": self.find_stored_energy(sample),
             "booked": friction,
             "sampled": float(energies[Energy.SAMPLED]),
             "passed": float(energies[Energy.PASSED]),
@@ -999,14 +1000,14 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
 class Record:
     """Samples of a march: all of the window at its end, and some of each earlier cycle.
 
-    A row is a sample, the number of its step and the energies up to it (`Energy`).
+    A row is a sample, the number of its step and friction work, dissipated and created energy up to it [J].
 
     - run, n_steps, n_window: March, its number of steps, and that of the window
     - keeps_samples: whether rows from before the window are kept
     - early: rows (k, w) from before the last parts, at equal distances
     - last, recent: rows of the last part, and of the last parts, which contain the window
     - extremes, phasors: of the output in each cycle
-    - energies (5,): energies up to the last sample [J], see `Energy`
+    - energies (5,), change (5,): sums up to the last sample, and over the last part [J], see `Energy`
     - snapshots: of the last cycle
     - stride: distance of the samples of earlier cycles
     - before: state and memory at the end of the part before the last, if both have whole cycles, or (0,) without such a
@@ -1024,6 +1025,7 @@ class Record:
         self.extremes = []
         self.phasors = []
         self.energies = np.zeros(len(Energy))
+        self.change = np.zeros(len(Energy))
         self.snapshots = []
         self.before = np.zeros(0)
         # The distance of early samples divides a cycle, so that each one begins with a sample.
@@ -1053,8 +1055,9 @@ class Record:
         steps = np.stack([works, losses + created, created, sampled, np.abs(works)], axis=1)
         energies = self.energies + np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
         numbers = first + np.arange(count + 1.0)[:, None]
-        self.last = np.hstack([samples, numbers, energies])
+        self.last = np.hstack([samples, numbers, energies[:, : Energy.SAMPLED]])
         self._keep(self.last)
+        self.change = energies[-1] - self.energies
         self.energies = energies[-1]
         self.snapshots = list(snapshots)
 
@@ -1098,7 +1101,7 @@ class Record:
         change[NUMBER:] = self.last[-1, NUMBER:] - self.last[0, NUMBER:]
         for k in range(1, count + 1):
             self._keep(self.last + k * change)
-        self.energies = self.energies + count * change[NUMBER + 1 :]
+        self.energies = self.energies + count * self.change
         self.extremes += count * self.extremes[-n_cycles:]
         self.phasors += count * self.phasors[-n_cycles:]
 
@@ -1124,7 +1127,7 @@ class Record:
             float(window_rows[:, n + Sample.WORK].sum()),
             np.array(self.extremes),
             np.array(self.phasors),
-            run.find_ledger(self.last[-1]),
+            run.find_ledger(self.last[-1], self.energies),
             run.outcome,
             run.message,
             (run.done + run.shift) / run.steps,
@@ -1172,7 +1175,7 @@ def make_histories(run: March, rows) -> Response:
     run : March
         March that was run.
     rows : (k, w) array
-        Samples, then the number of the step and the energies up to it (`Energy`).
+        Rows of a record (`Record`).
     """
     modes = run.modes
     contact = run.contact
@@ -1192,7 +1195,7 @@ def make_histories(run: March, rows) -> Response:
     pull = forces @ port_rows
     energies = rows[:, NUMBER + 1 :].T
     stored = rows[:, 2 * n + Sample.ENERGY]
-    extra = {"ledger": np.insert(energies[: Energy.SAMPLED], Energy.DISSIPATED, stored, axis=0)}
+    extra = {"ledger": np.insert(energies, Energy.DISSIPATED, stored, axis=0)}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
     if contact.sets is not None or contact.load is not None:
         extra |= dict(zip(PRESS_COLUMNS, press.T))

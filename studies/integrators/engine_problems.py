@@ -161,9 +161,9 @@ def march(one: Problem, steps: int) -> np.ndarray:
     """Integrate by time stepping with `steps` per cycle."""
     if one.elements is None:
         law = laws.make_coulomb(one.limit, one.limit)
-        contact = contacts.make_contact([law], one.modes.interfaces)
     else:
-        contact = contacts.make_parallel_contact(*one.elements, one.modes.slide)
+        law = laws.make_elements(*one.elements)
+    contact = contacts.make_contact([law], one.modes.interfaces)
     found = time_march.march(
         one.modes, one.drive, contact, one.cycles, steps, window=one.last, start=one.start
     )

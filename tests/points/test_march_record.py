@@ -14,7 +14,6 @@ from patchfem.points import (
     laws,
     make_bond_contact,
     make_contact,
-    make_parallel_contact,
     make_pressed_contact,
     march,
 )
@@ -70,7 +69,7 @@ CASES = {
     "coulomb": lambda: (BASIS, make_contact([laws.make_coulomb(20.0, 16.0)], ROW[None])),
     "elements": lambda: (
         BASIS,
-        make_parallel_contact([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6], ROW),
+        make_contact([laws.make_elements([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6])], [ROW]),
     ),
     "bonds": lambda: (BASIS, make_bond_contact(Bonds(0.4, 1e-6), 50.0, ROW)),
     "bonds behind shear modes": lambda: (BASIS, make_compliant_contact()),
@@ -127,7 +126,7 @@ def test_exact_beats_and_slow_growth_are_not_repeated(monkeypatch):
 @pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (40, 0.8)])
 def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     """A march that keeps no early samples has the same last cycles, amplitudes and energies, also if it ends early."""
-    contact = make_parallel_contact([2e5, 1e5], [1e-6, 2e-6], ROW)
+    contact = make_contact([laws.make_elements([2e5, 1e5], [1e-6, 2e-6])], [ROW])
     basis = make_one_mode(OMEGA, 0.003, 1.0)
     if np.isfinite(travel):
         travel *= march(basis, DRIVE, contact, cycles, 40, window=2).extremes.max()

@@ -18,8 +18,7 @@ VARYING_LAW_OF_NAME that under a load that varies.
 
 from importlib import import_module
 
-from ...core import PatchfemError
-from ...friction.record import MIN_LOAD
+from ...core import MIN_LOAD, PatchfemError
 from ..records import LawNumbers
 
 LAWS = (

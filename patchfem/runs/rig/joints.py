@@ -25,7 +25,7 @@ from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...points import contacts
-from ...points.laws import PointLaw, make_jenkins, make_point_law
+from ...points import laws as point_laws
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
@@ -66,11 +66,11 @@ class Joint(NamedTuple):
             return elastic_plastic.parallel_element(self.stiffness, self.yields)
         return self.make_law().element(self.load.mean)
 
-    def make_point_law(self) -> PointLaw:
+    def make_point_law(self) -> point_laws.PointLaw:
         """Return the law under its mean load in the form of the march."""
         if self.stiffness is not None:
-            return make_jenkins(self.stiffness * self.yields, self.yields)
-        return make_point_law(self.law.law, self.make_law(), self.load.mean)
+            return point_laws.make_elements(self.stiffness, self.yields)
+        return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law in the form of the engine `hybrid`."""
