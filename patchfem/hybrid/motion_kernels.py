@@ -1,4 +1,8 @@
-"""Rates of the state of a motion: modes, drive, friction, work and slip (compiled)."""
+"""Rates of the state of a motion: modes, drive, friction, work and slip (compiled).
+
+`rig` is a `records.Rig` and `state` a `records.State`, whose rows are named by enumerations of `records`: `Clock` for values
+of the run, `Memory` and `Face` for each interface, `Mode` and `Piece` for modes and pieces of the drive.
+"""
 
 import numpy as np
 
@@ -117,7 +121,7 @@ def look(rig, state, i, t, y):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     """
     n = rig.modes.shape[1]
     face = rig.faces[i]
@@ -153,7 +157,7 @@ def look(rig, state, i, t, y):
 
 @njit(**NJIT_KERNEL)
 def find_rates(rig, state, t, y, rates):
-    """Write the rates of the state y at a time t, and forces and slip rates into the memory.
+    """Write the rates of the state y at a time t; FORCE [N] and SLIP_RATE [m/s] of each interface go to `state.memory`.
 
     Parameters
     ----------
@@ -164,9 +168,9 @@ def find_rates(rig, state, t, y, rates):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     rates : (n,) array
-        Rates, which are written.
+        Rates of the entries of `records.State.y` per second, which are written.
     """
     n = rig.modes.shape[1]
     n_faces = rig.faces.shape[0]
@@ -231,9 +235,9 @@ def add_friction(rig, state, i, t, y, rates):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     rates : (n,) array
-        Rates, which are written.
+        Rates of the entries of `records.State.y` per second, which are written.
     """
     n = rig.modes.shape[1]
     memory = state.memory[i]

@@ -16,6 +16,8 @@ import numpy as np
 
 from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
+from ...friction.bonds.parameters import Bonds
+from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
 from ...points.case_kernels import TICKS
@@ -212,12 +214,15 @@ def _list_numbers(model: Model) -> tuple:
     """Return the parameters, law, memory, reference stiffness and scales of a model."""
     rig, friction = model.rig, model.friction
     load = model.point.load
-    law = make_point_law(friction, load)
+    # Bonds of a batch do not grow.
+    has_bonds = law_has_trait(friction.law, "bonds")
+    law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
+    point_law = make_point_law(friction.law, law, load)
     cycles = int(rig.drive.cycles)
 
     # Stiffness during stick: friction limit / bond length for laws with a length.
     stiffness = 0.0
-    if friction.law == "elastic-plastic" or law_has_trait(friction.law, "bonds"):
+    if friction.law == "elastic-plastic" or has_bonds:
         stiffness = friction.static * load / friction.bond_length
     elif friction.law not in ("coulomb", "tanh"):
         stiffness = friction.stiffness
@@ -225,8 +230,8 @@ def _list_numbers(model: Model) -> tuple:
     # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
-        *law.numbers,
-        *law.memory,
+        *point_law.numbers,
+        *point_law.memory,
         rig.first_mode.stiffness,
         model.accuracy.tolerance,
         rig.displacement_scale,

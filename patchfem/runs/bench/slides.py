@@ -15,6 +15,7 @@ from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import contacts, slides
+from ...points.laws import make_elements, make_point_law
 from ...slip import fields
 from ..patch import jenkins_elements
 from . import averaged_law, shear
@@ -375,9 +376,9 @@ def _make_contact(task: SlideTask):
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
-        springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        return contacts.make_parallel_contact(*springs, row), jenkins_set
+        law = make_elements(jenkins_set.stiffness, jenkins_set.yield_displacement)
+        return contacts.make_contact([law], [row]), jenkins_set
 
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
-    element = make_law(friction, load).element(load)
-    return contacts.make_contact([element], [row]), None
+    law = make_point_law(friction.law, make_law(friction, load), load)
+    return contacts.make_contact([law], [row]), None

@@ -16,7 +16,7 @@ from ...dynamics.harmonic import forces
 from ...dynamics.harmonic import laws as balance_laws
 from ...effects import law_has_trait
 from ...friction import protocol, record
-from ...friction.laws import elastic_plastic, stretch
+from ...friction.laws import elastic_plastic
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load
 from ...hybrid.laws.grooves import make_grooves
@@ -25,6 +25,7 @@ from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...points import contacts
+from ...points import laws as point_laws
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
@@ -53,22 +54,30 @@ class Joint(NamedTuple):
     yields: np.ndarray | None = None
     reduction: shear_modes.JenkinsSet | None = None
 
+    def make_law(self):
+        """Return the law of an interface that slips as a whole, per newton of load, or the parameters of its bonds."""
+        if law_has_trait(self.law.law, "bonds"):
+            return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
+        return record.make_law(self.law, self.load.mean)
+
     def make_element(self) -> protocol.Element:
-        """Return the law under its mean load in the form of the march and of harmonic balance."""
+        """Return the law under its mean load in the form of harmonic balance."""
         if self.stiffness is not None:
             return elastic_plastic.parallel_element(self.stiffness, self.yields)
-        load = self.load.mean
-        if law_has_trait(self.law.law, "bonds"):
-            return stretch.points_element(
-                make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED), load
-            )
-        return record.make_law(self.law, load).element(load)
+        return self.make_law().element(self.load.mean)
+
+    def make_point_law(self) -> point_laws.PointLaw:
+        """Return the law under its mean load in the form of the march."""
+        if self.stiffness is not None:
+            return point_laws.make_elements(self.stiffness, self.yields)
+        return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law in the form of the engine `hybrid`."""
         if self.stiffness is not None:
             return from_elements(self.stiffness, self.yields)
-        return hybrid_laws.make_law(self.law, self.load.mean, self.speed, varies=self.load.varies)
+        load = self.load
+        return hybrid_laws.make_law(self.law.law, self.make_law(), load.mean, varies=load.varies)
 
     def list_elements(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stiffness [N/m] and yield displacement [m] (e,) of parallel elements; empty for other laws."""
@@ -269,9 +278,10 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
             return replace(contact, point_sets=[*contact.point_sets, *springs])
 
     joints = list_joints(model, patch, numerics.meshed)
-    elements = [joint.make_element() for joint in joints]
+    laws = [joint.make_point_law() for joint in joints]
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    contact = contacts.make_contact(elements, rows[: len(joints)], springs, scale)
+    length = joints[0].make_element().length if joints else 0.0
+    contact = contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 

@@ -23,7 +23,7 @@ from patchfem.dynamics.harmonic.equations import HarmonicBalance
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.series import evaluate_series, pack_harmonics, unpack_harmonics
 from patchfem.dynamics.harmonic.slides import make_slides
-from patchfem.friction import Bonds, Coulomb, points_element
+from patchfem.friction import Bonds, Coulomb
 
 GROWING = Bonds(0.3, 1e-6, ratio=0.5, rest_growth=1.0, slip_growth=1e-7)
 
@@ -179,7 +179,7 @@ def test_refuses_laws_that_cannot_be_balanced():
     with pytest.raises(PatchfemError, match="rigid friction"):
         LawGroup(modes, Coulomb(1.0, 1.0).element(1.0))
     with pytest.raises(PatchfemError, match="a constant bond length"):
-        LawGroup(modes, points_element(GROWING, 1.0))
+        LawGroup(modes, GROWING.element(1.0))
     with pytest.raises(PatchfemError, match="on at least one interface"):
         LawGroup(modes, [])
     with pytest.raises(PatchfemError, match="no mode moves"):
