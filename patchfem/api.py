@@ -464,8 +464,8 @@ def _save(make_answer: Callable[[Path], Any], out: str | Path) -> Any:
     """
     with Folder(Path(out)) as folder:
         answer = make_answer(folder.path)
-        store.write(answer, folder.path)
-        page.write_page(folder.path)
+        store.write_answer(answer, folder.path)
+        page.write_report(folder.path)
     return answer
 
 
@@ -968,7 +968,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(page.write_report(_require_paths(folders, "report"), target))
+    return Path(page.write_report(*_require_paths(folders, "report"), out=target))
 
 
 def export(

@@ -84,7 +84,7 @@ def _report_complete_run(target: Path, output: Output) -> None:
         print_message(
             f"{target}: this run is already complete; to run it again, leave out --resume"
         )
-    answer = store.read(target)
+    answer = store.read_answer(target)
     if output.json_:
         print(json.dumps(store.make_summary(answer), ensure_ascii=False), flush=True)
     _end_run(answer, output.quiet)
@@ -110,7 +110,7 @@ def _report_missing_page(fault: BaseException, target: Path) -> None:
     if isinstance(fault, KeyboardInterrupt):
         reason = "interrupted while the page was drawn"
     elif isinstance(fault, MemoryError):
-        reason = f"{target / store.PAGE}: out of memory"
+        reason = f"{target / store.PAGE_FILE}: out of memory"
     elif isinstance(fault, core.PatchfemError | OSError):
         reason = str(fault)
     else:

@@ -140,9 +140,9 @@ def save(make_answer: Callable[[Path], "Answer"], output: Output) -> "Answer":
         versions = {"versions": runs.list_versions()}
         origin = versions | answer.origin | {"command": describe_command()}
         answer = replace(answer, origin=origin)
-        store.write(answer, folder.path)
+        store.write_answer(answer, folder.path)
         if not output.no_page:
-            page.write_page(folder.path)
+            page.write_report(folder.path)
     present(answer, output)
     return answer
 

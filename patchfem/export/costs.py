@@ -23,21 +23,21 @@ from .answer import (
     Quantity,
     Remarks,
     Variables,
-    encode,
+    encode_texts,
     make_columns,
     to_plain,
 )
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
-RUN_COLUMNS = {
+COST_FILE_COLUMNS = {
     "label": ("setting", ""),
     "seconds": ("seconds", "s"),
     "wall_seconds": ("wall_seconds", "s"),
     "timings": ("timings", ""),
 }
 # Words for the judgement of the scene as it is.
-SCENE_JUDGEMENTS = {
+SCENE_JUDGEMENT_WORDS = {
     Judgement.MEETS: "meets the tolerance",
     Judgement.MISSES: "misses the tolerance",
     Judgement.UNKNOWN: "does not have an error estimate of every measure",
@@ -143,7 +143,7 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
         )
     sentences = [
         f"At its tolerance {run.tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and "
-        f"{SCENE_JUDGEMENTS[row.judgement]}{error}."
+        f"{SCENE_JUDGEMENT_WORDS[row.judgement]}{error}."
     ]
 
     met = [one.run for one in rows if one.judgement is Judgement.MEETS]
@@ -171,7 +171,7 @@ def _describe_miss(row: Row) -> str:
 def _find_main_measure(runs: list[Cost]) -> str:
     """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
     names = find_measures_with_error(runs)
-    names = [name for name in quantities.KEY if name in names] or names
+    names = [name for name in quantities.KEY_QUANTITY_NAMES if name in names] or names
     return rate_run(runs[0], names, runs[0].tolerance).name or names[0]
 
 
@@ -201,7 +201,7 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     """
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}
-    for attribute, (name, unit) in RUN_COLUMNS.items():
+    for attribute, (name, unit) in COST_FILE_COLUMNS.items():
         columns[name] = ([getattr(run, attribute) for run in runs], unit)
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
@@ -223,5 +223,5 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     # a colour for each varied setting and for runs that miss the tolerance
     has_several = rows[0].knob != rows[-1].knob
     texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
-    data["result"] = encode("run", texts)
+    data["result"] = encode_texts("run", texts)
     return data

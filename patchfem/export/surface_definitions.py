@@ -6,12 +6,12 @@ from ..surface.roughness.parameters import PROFILE_DEFINITIONS, WAVES_DEFINITION
 from .answer import Definition
 
 # names in a track -> names in compare.json and in the answer
-TRACK_NAMES = {"depth_mean": "track_depth"}
+RENAMED_TRACK_QUANTITIES = {"depth_mean": "track_depth"}
 
 
 def name_in_track(name: str) -> str:
     """Return the name in an answer of a quantity of a track."""
-    return TRACK_NAMES.get(name, f"track_{name}")
+    return RENAMED_TRACK_QUANTITIES.get(name, f"track_{name}")
 
 
 def _collect_definitions() -> dict[str, Definition]:
@@ -29,7 +29,7 @@ def _collect_definitions() -> dict[str, Definition]:
 SURFACE_QUANTITIES = _collect_definitions()
 
 
-def find(name: str) -> Definition | None:
+def find_surface_definition(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none.
 
     Quantities of a track have the names of those of a whole comparison behind "track_".

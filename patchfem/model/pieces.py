@@ -7,7 +7,7 @@ from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
 from ..mesh import pieces as piece_meshes
-from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
+from ..mesh.grid import ROW_HEIGHT_GROWTH, TensorGrid, compute_row_scale, make_graded_grid
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
 from .source import name_key
@@ -43,10 +43,10 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     """Generate the grid of a piece of a patch with a flat interface."""
-    grid = graded_grid(
+    grid = make_graded_grid(
         patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
     )
-    growth = 1 + ROW_SLOPE * row_scale(grid.x.size - 1)
+    growth = 1 + ROW_HEIGHT_GROWTH * compute_row_scale(grid.x.size - 1)
     return extend_grid(patch, piece, grid, growth)
 
 

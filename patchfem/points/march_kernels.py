@@ -26,7 +26,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
-from ..contact.set_arrays import PRESENT_SLOT, REFERENCE_LOAD, REFERENCE_MOMENT
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
 from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
@@ -403,7 +403,7 @@ def write_residual(system, level, h):
         slides = moves[Port.SLIDE]
         normal.path_mean(
             system.sets,
-            system.sets.counters[PRESENT_SLOT],
+            system.sets.counters[PRESENT_SLOT_INDEX],
             slides[heave],
             slides[pitch],
             increments[heave],
@@ -694,12 +694,12 @@ def find_loads(system, row, fraction, is_solved):
         pitch = int(ports.contact[1])
         h = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
         t = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -h, t)
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -h, t)
         if slot < 0:
             return -1.0
         normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD]
+            system.sets.reference[REFERENCE_LOAD_INDEX]
             - normal.compute_energy(system.sets, slot, h, t)[1],
             0.0,
         )
@@ -781,7 +781,7 @@ def find_holds(system, state, drive):
         pitch = int(ports.contact[1])
         h = sum_products(ports.rows[heave], state[:n])
         t = sum_products(ports.rows[pitch], state[:n])
-        energy = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
+        energy = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], h, t)
         ports.vector[heave] += energy[1]
         ports.vector[pitch] += energy[2]
 
@@ -939,7 +939,7 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    if is_any_held and system.sets.counters[PRESENT_SLOT] >= 0:
+    if is_any_held and system.sets.counters[PRESENT_SLOT_INDEX] >= 0:
         return_ports_to_rest(system)
         rest += energy - find_motion_energy(system)
         if ports.contact[0] >= 0:
@@ -1112,8 +1112,8 @@ def find_motion_energy(system):
     if heave >= 0:
         up = sum_products(ports.rows[heave], state[:n])
         turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -up, turn)
-        system.sets.counters[PRESENT_SLOT] = slot
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
+        system.sets.counters[PRESENT_SLOT_INDEX] = slot
         if slot >= 0:
             energy += normal.compute_energy(system.sets, slot, up, turn)[0]
     return energy
@@ -1157,7 +1157,7 @@ def press_at_rest(system):
     points = system.points
     values = points.values
     n = system.state.shape[1] // 2
-    if system.sets.counters[PRESENT_SLOT] < 0:
+    if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
         return  # the march ends without a contact set
 
     for i in range(2):
@@ -1200,7 +1200,7 @@ def try_step(system, level, row, begin, end, drive):
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
         halved. Then the motion has not advanced. True after a step, and also if no contact set was found, in which case
-        the counter `PRESENT_SLOT` is -1.
+        the counter `PRESENT_SLOT_INDEX` is -1.
     """
     points = system.points
     shear = points.shear
@@ -1234,7 +1234,7 @@ def try_step(system, level, row, begin, end, drive):
         if options.has_loads:
             change = find_loads(system, row, end, count > 0)
             if change < 0:
-                system.sets.counters[PRESENT_SLOT] = -1
+                system.sets.counters[PRESENT_SLOT_INDEX] = -1
                 return True
             if count > 0 and change <= LOAD_RESIDUAL:
                 break
@@ -1378,10 +1378,10 @@ def write_sample(system, row, sample):
     if heave >= 0:
         h = ports.values[Port.SLIDE, heave]
         t = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
+        contact = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], h, t)
         reference = system.sets.reference
-        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
-        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
+        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - contact[1], 0.0)
+        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - contact[2]
         sample[size + Sample.CONTACT_ENERGY] = contact[0]
         sample[size + Sample.HEAVE] = h
         sample[size + Sample.PITCH] = t
@@ -1447,7 +1447,7 @@ def march(system, steps, samples):
             if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
                 level += 1
                 continue
-            if system.sets.counters[PRESENT_SLOT] < 0:
+            if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
                 return i, NO_CONTACT_SET
             if system.totals[Total.IS_FULL] > 0:
                 return i, LISTS_FULL

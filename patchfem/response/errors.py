@@ -2,7 +2,7 @@
 
 In a run that is coarser by a factor `ratio` (in steps, elements, cells of a density, harmonics, modes
 or the tolerance of a step), a measure changes by ratio**p - 1 times its error, where p is the order of
-convergence. The error estimate is therefore SAFETY_FACTOR times the change divided by ratio**p - 1
+convergence. The error estimate is therefore ERROR_SAFETY_FACTOR times the change divided by ratio**p - 1
 (Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three
 runs with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed
 order depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md
@@ -15,35 +15,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import ErrorCauses, Measure
+from ..core import Measure
 from .measures import Measures, Values
 from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
-SAFETY_FACTOR = 3.0
-MIN_ORDER = 1.0  # Lowest order of convergence in an estimate.
+ERROR_SAFETY_FACTOR = 3.0
+MIN_CONVERGENCE_ORDER = 1.0  # Lowest order of convergence in an estimate.
 # Highest order of convergence in an estimate, which is the order of the numerical methods.
-MAX_ORDER = 2.0
+MAX_CONVERGENCE_ORDER = 2.0
 # Largest plausible ratio of two successive changes (order 4); beyond it, the last change is accidentally
 # small.
-MAX_CHANGE_RATIO = 16.0
-# Lowest observed order of convergence at which an error is assumed to decrease with the step size.
-MIN_OBSERVED_ORDER = 0.5
+MAX_PLAUSIBLE_CHANGE_RATIO = 16.0
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
 MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 # Measures that are errors of the solution, so that their own error is their value.
 ERROR_MEASURES = select_names("error")
-PHASES = select_names("phase")  # Angles modulo pi.
+PHASE_MEASURES = select_names("phase")  # Angles modulo pi.
 # Round-off error of the mean position of a motion, relative to its amplitude.
-MEAN_ROUND_OFF = 1e-13
+MEAN_POSITION_ROUND_OFF = 1e-13
 
 
 def signed_change(fine: Values, coarse: Values) -> Values:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
-    for name in PHASES:
+    for name in PHASE_MEASURES:
         if name in changes:
             changes[name] = (changes[name] + np.pi / 2) % np.pi - np.pi / 2
     return changes
@@ -54,18 +52,20 @@ def absolute_change(fine: Values, coarse: Values) -> Values:
     return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
 
 
-def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float = MIN_ORDER):
+def convergence_error(
+    change, *coarser_changes, ratio: float = 2.0, order: float = MIN_CONVERGENCE_ORDER
+):
     """Estimate the error of a value from its changes between successive runs.
 
-    The estimate is SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
+    The estimate is ERROR_SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
     errors of a run and of the next coarser one.
 
     - Two runs (one change): growth = ratio**order.
-    - Three runs: growth is the ratio of the two changes, at most 2**MAX_ORDER, if it lies between
-      ratio**order and MAX_CHANGE_RATIO. The change counts as at least 2**-MAX_ORDER of the previous
+    - Three runs: growth is the ratio of the two changes, at most 2**MAX_CONVERGENCE_ORDER, if it lies between
+      ratio**order and MAX_PLAUSIBLE_CHANGE_RATIO. The change counts as at least 2**-MAX_CONVERGENCE_ORDER of the previous
       one, so that a change that is small by accident does not give a small error.
     - More runs: the estimate without the finest run is an upper limit if its interval contains the
-      value; the error is assumed to decrease by at most 2**MAX_ORDER from run to run.
+      value; the error is assumed to decrease by at most 2**MAX_CONVERGENCE_ORDER from run to run.
 
     Parameters
     ----------
@@ -91,20 +91,23 @@ def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float
         previous = coarser_changes[0]
         with np.errstate(divide="ignore", invalid="ignore"):
             observed = np.divide(previous, change)
-        shows_order = (observed > growth) & (observed <= MAX_CHANGE_RATIO)
-        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_ORDER), growth)
-        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_ORDER)
-    error = (SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
+        shows_order = (observed > growth) & (observed <= MAX_PLAUSIBLE_CHANGE_RATIO)
+        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_CONVERGENCE_ORDER), growth)
+        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_CONVERGENCE_ORDER)
+    error = (ERROR_SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
     if len(coarser_changes) > 1:
         coarser_error = convergence_error(*coarser_changes, ratio=ratio, order=order)
         if abs(change) <= coarser_error:  # the value lies in the error interval of the coarser run
             error = min(error, coarser_error)
-        error = max(error, coarser_error / 2**MAX_ORDER)
+        error = max(error, coarser_error / 2**MAX_CONVERGENCE_ORDER)
     return error
 
 
 def convergence_errors(
-    *values: Values, ratio: float = 2.0, order: float = MIN_ORDER, steps: int | None = None
+    *values: Values,
+    ratio: float = 2.0,
+    order: float = MIN_CONVERGENCE_ORDER,
+    steps: int | None = None,
 ) -> Values:
     """Estimate the error of each measure from two or more successive runs (`convergence_error`).
 
@@ -141,12 +144,12 @@ def convergence_errors(
 
 
 def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
-    """Estimate the error of each measure from a run with more harmonics, modes or bond strips.
+    """Estimate the error of each measure from a run with more modes or bond strips.
 
     The finer run has twice as many of them, and the coarser run half as many. The truncation error of
     the Fourier series of a friction force with corners is of second order. Where the change to the
     finer run is small by accident, the error is that of the change from the coarser run, reduced by
-    2**MAX_ORDER.
+    2**MAX_CONVERGENCE_ORDER.
 
     Parameters
     ----------
@@ -160,11 +163,11 @@ def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     dict
         Errors by name.
     """
-    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_ORDER)
+    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_CONVERGENCE_ORDER)
     for run in coarser:
-        for name, error in convergence_errors(values, run, order=MAX_ORDER).items():
+        for name, error in convergence_errors(values, run, order=MAX_CONVERGENCE_ORDER).items():
             if name in errors:
-                errors[name] = np.maximum(errors[name], error / 2.0**MAX_ORDER)
+                errors[name] = np.maximum(errors[name], error / 2.0**MAX_CONVERGENCE_ORDER)
     return errors
 
 
@@ -198,7 +201,7 @@ class FrictionScale(NamedTuple):
     cycle_work: float
 
 
-def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Values:
+def friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
     The error of a measure is `fraction` times a reference value: the friction limit, the bond
@@ -211,9 +214,14 @@ def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Va
         Values of the measures by name.
     fraction : float
         Error of the friction force relative to the friction limit [1].
-    scale : FrictionScale
-        Reference values of force, length and work.
+    law
+        Law with its coefficient of static friction and its bond length [m].
+    load : float
+        Largest normal load [N].
+    works : (2,)
+        Sums of the absolute friction work in the whole run and in a cycle [J].
     """
+    scale = FrictionScale(law.static, law.static * load, law.bond_length, *works)
     errors = {}
     for name, value in values.items():
         find_scale = find_definition(name).friction_scale
@@ -222,42 +230,8 @@ def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Va
     return errors
 
 
-def observed_orders(*values: Values) -> Values:
-    """Return the observed order of convergence of each measure with the time step, at most 2.
-
-    Parameters
-    ----------
-    *values : dict
-        Measures by name of three runs, with all, a half and a quarter of the steps; with fewer runs, the
-        result is empty.
-
-    Returns
-    -------
-    dict
-        Orders by name, without measures whose order is below MIN_OBSERVED_ORDER, because more steps
-        may not make these more accurate, or that are missing in a run.
-    """
-    if len(values) < 3:
-        return {}
-    fine, half, quarter = values
-    last_changes = absolute_change(fine, half)
-    previous_changes = absolute_change(half, quarter)
-    orders = {}
-    for name in last_changes:
-        if last_changes[name] > 0 and previous_changes.get(name, 0.0) > 0:
-            order = float(np.log2(previous_changes[name] / last_changes[name]))
-            if order >= MIN_OBSERVED_ORDER:
-                orders[name] = min(order, MAX_ORDER)
-    return orders
-
-
 def add_errors(
-    values: Values,
-    errors=(),
-    step_values=(),
-    *,
-    min_relative_error: float = 0.0,
-    size: float = np.inf,
+    values: Values, errors=(), *, min_relative_error: float = 0.0, size: float = np.inf
 ) -> Measures:
     """Return the measures with given values, with total errors from their errors by source.
 
@@ -270,8 +244,6 @@ def add_errors(
         Values by name.
     errors : sequence of (str, dict)
         Error sources with errors by name (`coarser.estimate_errors`).
-    step_values : sequence of dict
-        Values of the runs with decreasing numbers of time steps, from fine to coarse.
     min_relative_error : float
         Relative error that is added [1].
     size : float
@@ -279,18 +251,18 @@ def add_errors(
     """
     measures = {}
     amplitude = values.get(AMPLITUDE, 0.0)
-    for name, causes in split_errors(values, errors, step_values).items():
+    for name, parts in split_errors(values, errors).items():
         value = float(values[name])
-        error = total_error(name, value, causes.parts.values(), min_relative_error, amplitude)
+        error = total_error(name, value, parts.values(), min_relative_error, amplitude)
         floor = float(error_floor(name, size))
         measures[name] = Measure(
-            value, find_definition(name).unit, float(error), floor, causes=causes
+            value, find_definition(name).unit, float(error), floor, parts=parts
         )
     return measures
 
 
-def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCauses]:
-    """Return the contributions to the error of each measure, and its order of convergence.
+def split_errors(values: Values, errors) -> dict[str, Values]:
+    """Return the contributions to the error of each measure by source.
 
     If a measure is missing in a coarse run, its error is its absolute value.
 
@@ -300,17 +272,14 @@ def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCause
         Values by name.
     errors : sequence of (str, dict)
         Error sources with errors by name (`coarser.estimate_errors`).
-    step_values : sequence of dict
-        Values of the runs with decreasing numbers of time steps, from fine to coarse.
     """
-    orders = observed_orders(*step_values)
-    causes = {}
+    parts_by_name = {}
     for name, value in values.items():
         parts = {}
-        for cause, errors_by_name in errors:
-            parts[cause] = parts.get(cause, 0.0) + errors_by_name.get(name, abs(value))
-        causes[name] = ErrorCauses(parts, orders.get(name))
-    return causes
+        for source, errors_by_name in errors:
+            parts[source] = parts.get(source, 0.0) + errors_by_name.get(name, abs(value))
+        parts_by_name[name] = parts
+    return parts_by_name
 
 
 def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Measures:
@@ -353,10 +322,10 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * min_relative_error
-    if name in PHASES:  # a phase modulo pi has an error of at most pi/2
+    if name in PHASE_MEASURES:  # a phase modulo pi has an error of at most pi/2
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))
     if name == "drift_per_cycle":  # a difference of mean values has their round-off
-        return error + max(MEAN_ROUND_OFF, min_relative_error) * np.abs(size)
+        return error + max(MEAN_POSITION_ROUND_OFF, min_relative_error) * np.abs(size)
     return error

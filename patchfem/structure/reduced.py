@@ -19,7 +19,7 @@ from scipy.linalg import cholesky, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
-from ..effects import MAX_COORDINATES
+from ..effects import MAX_RIG_COORDINATES
 from ..elasticity.lapack import use_one_blas_thread
 from ..elasticity.sparse_factor import SparseFactor, ZeroEnergyMotion
 from . import masses, matrices
@@ -245,7 +245,7 @@ def _compute_lowest_modes(
         squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
         order = np.argsort(squares)
         return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]
-    if n > MAX_COORDINATES:
+    if n > MAX_RIG_COORDINATES:
         raise PatchfemError(
             f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer modes",
             "structure.reduced.modes",

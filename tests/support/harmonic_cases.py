@@ -1,4 +1,4 @@
-"""Structures and a simple time march for tests of harmonic balance."""
+"""Structures for tests of harmonic balance."""
 
 import numpy as np
 from modal_bases import make_modal_basis

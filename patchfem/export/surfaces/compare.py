@@ -22,10 +22,11 @@ from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
 from .sentences import to_answers
-from .variables import band, make_variables, maps
+from .variables import make_band, make_maps, make_variables
 
 SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
-STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
+# Meanings of the codes of the variable `state`
+WEAR_STATES = ("not used", "unworn", "worn", "grown")
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
     "worn_depth_within",
@@ -113,12 +114,12 @@ def compare_with_scene(
 
 def make_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces."""
-    words = sentences.describe(comparison)
+    words = sentences.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
     track = comparison.track
 
-    answer = build(
+    answer = build_answer(
         sources=[surface.source for surface in surfaces],
         words=words._replace(notes=(*words.notes, *file_notes)),
         values=comparison.values,
@@ -142,7 +143,7 @@ def make_answer(comparison: Comparison) -> Answer:
     return answer
 
 
-def build(
+def build_answer(
     *,
     sources: list[str],
     words: sentences.Words,
@@ -216,7 +217,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
-        content["reason"] = sentences.REASONS[_explain_no_roughness(comparison)]
+        content["reason"] = sentences.MISSING_VALUE_REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
 
 
@@ -236,14 +237,14 @@ def _make_data(comparison: Comparison) -> Variables:
         return _make_separate(comparison)
     heights = (curves.before, curves.after)
     if comparison.is_areal:
-        data = maps(
+        data = make_maps(
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
         data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
+        data |= make_band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
-        data["state"] = Variable(("x",), state, "", "state of each height", STATES)
+        data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 

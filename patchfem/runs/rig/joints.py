@@ -32,14 +32,14 @@ from ..patch import faces, jenkins_elements
 from . import bond_lists, strips
 from .numerics import Numerics
 
-STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
+MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
 class Joint(NamedTuple):
     """Interface of a rig with its law and load.
 
     - law: effective keys of the friction law.
-    - load: normal load.
+    - load: normal load, which may oscillate (`hybrid.cases.Load`).
     - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
     - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips
       part by part, or None for an interface that slips as a whole.
@@ -120,24 +120,26 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = _find_rigid_law(model.friction, model, patch)
+        law = _replace_averaged_law(model.friction, model, patch)
         return [Joint(law, load, speed, *parts) for load, parts in _list_patch_parts(model, patch)]
 
     joints = []
-    for k, own in enumerate(friction.interfaces):
-        load = _make_point_load(model.point) if own.load is None else Load(own.load)
+    for k, interface in enumerate(friction.interfaces):
+        load = interface.load
+        load = _make_point_load(model.point) if load is None else Load(load)
         parts = ()
-        if own.partial_slip:
-            parts = faces.make_patch_elements(own, model.accuracy.tolerance, k in meshed)
-        law = _find_rigid_law(own.numbers, model, patch)
+        if interface.partial_slip:
+            parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
+        law = _replace_averaged_law(interface.numbers, model, patch)
         joints.append(Joint(law, load, speed, *parts))
     return joints
 
 
-def _find_rigid_law(law, model: Model, patch):
-    """Return the law of an interface.
+def _replace_averaged_law(law, model: Model, patch):
+    """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
-    A law that averages the pressure is Coulomb's law on a rigid block.
+    On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
+    coefficient of `law`. `patch` is the solved patch with the pressure, or None for a single point.
     """
     if not law_has_trait(law.law, "averaged"):
         return law
@@ -160,7 +162,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     if not model.partial_slip:
         if not slide_apart:
             return [(load, ())]
-        return [(Load(float(one)), ()) for one in strips.compute_strip_loads(patch)]
+        return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
     length = record.make_law(model.friction, load.mean).element(load.mean).length
@@ -232,7 +234,7 @@ def _find_stick_tolerance(joints, laws) -> float:
             lengths.append(keys.bond_length)
         elif keys.stiffness:
             lengths.append(keys.static * joint.load.mean / keys.stiffness)
-    return STUCK_SLIP * min(lengths, default=0.0)
+    return MAX_STUCK_SLIP_RATIO * min(lengths, default=0.0)
 
 
 # ---- march and harmonic balance

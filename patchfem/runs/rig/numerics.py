@@ -12,7 +12,7 @@ from ...effects import law_has_trait
 from ...hybrid import cases
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
-from .costs import MARCH_SETTINGS, steps_per_cycle
+from .costs import steps_per_cycle
 from .engines import HYBRID, MARCH, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
@@ -20,8 +20,8 @@ from .engines import HYBRID, MARCH, choose_engine
 WHOLE_CYCLE_TOL = 1e-6
 # Number of decay times after which a transient is neglected; its mean square is then reduced to
 # e^-6.
-N_DECAY_TIMES = 3.0
-MIN_RUN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+N_TRANSIENT_DECAY_TIMES = 3.0
+MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,6 @@ class Numerics:
     - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
-    - pinned: names of settings that the scene fixes.
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window; coarse runs may omit them.
     - local: largest relative error per step of the engine `hybrid`.
@@ -47,7 +46,6 @@ class Numerics:
     cycles: float
     window: int
     shear_modes: int | None
-    pinned: frozenset
     choice: object = None
     whole: bool = True
     local: float = 0.0
@@ -92,7 +90,7 @@ def choose_numerics(model: Model) -> Numerics:
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * drive.signal.period
-        start = min(cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
+        start = min(cycles / 4, N_TRANSIENT_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
 
     beat_cycles = count_repeat_cycles(drive.signal) or 0.0
@@ -103,9 +101,8 @@ def choose_numerics(model: Model) -> Numerics:
 
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
-    pinned = frozenset(key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None)
-    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes, pinned)
+        steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / cycles)))
+    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes)
 
     if engine is HYBRID:
         # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.

@@ -6,8 +6,8 @@ Each coarse run is solved only once.
 
 from dataclasses import replace
 
-from ...response.coarser import ComparisonRuns, SourceErrors, StepRun, estimate_errors
-from ..results.result import N_FRAMES, RunInputs
+from ...response.coarser import ComparisonRuns, SourceErrors, estimate_errors
+from ..results.result import N_INTERFACE_FRAMES, RunInputs
 from . import event_to_event, march
 from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
@@ -64,7 +64,11 @@ class Runner:
         """Solve the rig with the given settings, and with all fields."""
         has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
         return self._solve(
-            self.model, numerics, self.inputs.patch, N_FRAMES * has_fields, self.inputs.say
+            self.model,
+            numerics,
+            self.inputs.patch,
+            N_INTERFACE_FRAMES * has_fields,
+            self.inputs.say,
         )
 
     def _solve_coarse_run(self, numerics: Numerics) -> Solution:
@@ -112,24 +116,3 @@ class Runner:
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
         return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
-
-    def list_step_runs(
-        self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns
-    ) -> list[StepRun]:
-        """Return a StepRun of the run and of each run with fewer steps, from fine to coarse.
-
-        If no coarse run has fewer steps, the list contains only the run itself.
-
-        Parameters
-        ----------
-        numerics : Numerics
-            Settings of the run.
-        solution : Solution
-            Solution of the run.
-        time_runs : list of CoarserRuns
-            Runs that are coarser in time, which are already solved.
-        """
-        pairs = [(numerics, solution)]
-        if time_runs and time_runs[0].source == "steps":
-            pairs += [(run, self.solutions[run]) for run in time_runs[0].runs]
-        return [StepRun(settings.steps, run.seconds, run.values) for settings, run in pairs]

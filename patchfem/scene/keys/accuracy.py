@@ -6,7 +6,7 @@ from .types import Fraction, Table, key, number, optional, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
-# Largest number of harmonics or shear modes; more make the dense matrices too large.
+# Largest number of shear modes; more make the dense matrices too large.
 MAX_HARMONICS_OR_SHEAR_MODES = 10_000
 
 
@@ -41,10 +41,6 @@ class Accuracy(Table):
     merge: optional(
         Fraction,
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
-    )
-    harmonics: optional(
-        whole_number(1, MAX_HARMONICS_OR_SHEAR_MODES),
-        "number of harmonics in the harmonic balance; default: set by the tolerance",
     )
     shear_modes: optional(
         whole_number(1, MAX_HARMONICS_OR_SHEAR_MODES),

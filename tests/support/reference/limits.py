@@ -3,7 +3,7 @@
 from importlib import import_module
 
 from patchfem.effects import LAWS, REMEDIES, join_words, name_laws_with_key
-from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
+from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_REPORTED_NORMAL_COUPLING_RATIO
 from patchfem.scene import loads
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
@@ -45,7 +45,9 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "surface.files.content.MAX_SURFACE_FILE_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.files.table.MAX_COORDINATE": "length of a trace [m]",
     "model.slide.MAX_BENCH_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
-    "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
+    "runs.rig.costs.MAX_MARCH_STEPS_PER_CYCLE": (
+        "steps per cycle of a time integration, if the tolerance determines the steps"
+    ),
     "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
@@ -67,7 +69,7 @@ The line of action of the load is assumed not to shift along x when a tall piece
 **No friction in the static patch.** The pressure is computed without shear stress at the interface. If both pieces have
 the same elastic constants, shear stress does not change the pressure. For pieces of different materials, the effect of
 shear stress on the pressure is neglected in runs with motion; a note appears if this coupling exceeds
-{100 * MIN_COUPLING_RATIO:g} % of the compliance.
+{100 * MIN_REPORTED_NORMAL_COUPLING_RATIO:g} % of the compliance.
 
 **Quasi-static pieces.** The pieces have no mass, so waves in the pieces are neglected. Only the modes of the rig have
 inertia.
