@@ -21,13 +21,7 @@ from .records import (
     RequestedChannel,
     select_channels,
 )
-from .tables import (
-    MAX_QUOTED_LINE_CHARACTERS,
-    NUMBER_PATTERN,
-    has_decimal_comma,
-    parse_number,
-    read_text,
-)
+from .tables import MAX_LINE_CHARACTERS, NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
 from .units import CHANNEL_UNITS
 
 RECORD_EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
@@ -119,7 +113,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     if len(names) > MAX_TABLE_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-            f"needed, not '{shorten(table.header, MAX_QUOTED_LINE_CHARACTERS)}'"
+            f"needed, not '{shorten(table.header, MAX_LINE_CHARACTERS)}'"
         )
     columns = [name.lower().replace(" ", "_") for name in names]
     channels = []

@@ -12,9 +12,8 @@ from .damage import list_some, shorten
 from .tables import require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
-MAX_RECORD_FILE_BYTES = (
-    512 * 2**20
-)  # largest size of a file of records or of a MATLAB file in bytes
+# Largest size of a file of records or of a MATLAB file in bytes
+MAX_RECORD_FILE_BYTES = 512 * 2**20
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 MAX_TABLE_BYTES = 64 * 2**20  # largest size of a text file in bytes
-MAX_QUOTED_LINE_CHARACTERS = 80  # largest number of characters of a quoted line
+MAX_LINE_CHARACTERS = 80  # largest number of characters of a quoted line
 MAX_SI_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 # Pattern of a number in a table
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -83,10 +83,10 @@ class TextTable(NamedTuple):
                 continue
             cells = split_cells(f"{self.path}:{number}", line, self.separator)
             if len(cells) != len(self.names):
-                columns = shorten(", ".join(self.names), 3 * MAX_QUOTED_LINE_CHARACTERS)
+                columns = shorten(", ".join(self.names), 3 * MAX_LINE_CHARACTERS)
                 raise PatchfemError(
                     f"{self.path}:{number}: the number of cells must be {len(self.names)} ({columns}), not "
-                    f"{len(cells)} as in '{shorten(line, MAX_QUOTED_LINE_CHARACTERS)}'"
+                    f"{len(cells)} as in '{shorten(line, MAX_LINE_CHARACTERS)}'"
                 )
             yield number, cells
 
@@ -169,7 +169,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     names = table.names
     expected = (
         f"{table.path}:1: a header like `{form.example}` is needed, not "
-        f"'{shorten(table.header, MAX_QUOTED_LINE_CHARACTERS)}'"
+        f"'{shorten(table.header, MAX_LINE_CHARACTERS)}'"
     )
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")

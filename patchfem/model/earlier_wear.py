@@ -38,15 +38,7 @@ MIN_GAP_DIFFERENCE = 1e-12  # difference between gaps [m] below which it is roun
 # Largest relative difference between the lengths of one interface on two meshes.
 MAX_LENGTH_DIFFERENCE = 1e-6
 # Exceptions of h5py, json and tomllib for a file of another kind.
-FOREIGN_FILE_ERRORS = (
-    OSError,
-    KeyError,
-    ValueError,
-    TypeError,
-    IndexError,
-    RuntimeError,
-    AttributeError,
-)
+FOREIGN_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -156,7 +148,7 @@ def read_end_state(path: Path) -> EarlierWear:
             )
         has_strips = "strips" in earlier.scene["contact"]
         is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
-    except FOREIGN_FILE_ERRORS:
+    except FOREIGN_ERRORS:
         raise PatchfemError(
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
             WEAR_START_KEY,

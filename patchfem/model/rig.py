@@ -328,10 +328,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
 
 
 def _build(
-    scene,
-    unbonded_modes: ModalBasis,
-    interfaces: tuple[InterfaceLaw, ...],
-    joint: float | None = None,
+    scene, unbonded: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
 ) -> Rig:
     """Build the rig of a scene from its modes without the spring of the bonded joint.
 
@@ -339,7 +336,7 @@ def _build(
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    unbonded_modes : ModalBasis
+    unbonded : ModalBasis
         Modes without the spring of the bonded joint.
     interfaces : tuple of InterfaceLaw
         Friction laws of the interfaces, or () without friction.
@@ -350,7 +347,7 @@ def _build(
     -------
     Rig
     """
-    modes = build_modes(scene, unbonded_modes)
+    modes = build_modes(scene, unbonded)
     friction = RigFriction(
         interfaces=interfaces,
         names=tuple(make_interface_names(scene.structure)),
@@ -363,7 +360,7 @@ def _build(
         start=build_start(scene, modes),
         friction=friction,
         springs=_build_springs(scene.structure, modes),
-        first_mode=_build_first_mode(scene, unbonded_modes, modes),
+        first_mode=_build_first_mode(scene, unbonded, modes),
         structure=_build_structure(scene, modes, joint),
     )
 
@@ -421,38 +418,37 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     return RigSprings(stiffness, interlock, cubic, travel)
 
 
-def _build_first_mode(scene, unbonded_modes: ModalBasis, modes: ModalBasis) -> FirstMode:
+def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMode:
     """Build the record of the first elastic mode of a scene.
 
-    `unbonded_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
+    `unbonded` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
     structure = scene.structure
-    slide = (
-        unbonded_modes.interfaces[0] if len(unbonded_modes.interfaces) else unbonded_modes.output
-    )
-    elastic = np.flatnonzero(unbonded_modes.omega > 0)
+    interfaces = unbonded.interfaces
+    slide = interfaces[0] if len(interfaces) else unbonded.output
+    elastic = np.flatnonzero(unbonded.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-    frequency = float(unbonded_modes.omega[first]) / (2 * np.pi)
+    frequency = float(unbonded.omega[first]) / (2 * np.pi)
 
     # The mass at the output is that of this mode, or of all coordinates if the mode does not move the output.
     mass = structure.moving_mass
     if mass is None or not (structure.mode or structure.file):
-        squared = np.square(unbonded_modes.output)
+        squared = np.square(unbonded.output)
         total = max(float(squared.sum()), 1e-300)
         moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
-        mass = float(unbonded_modes.mass / (squared[first] if moves_output else total))
+        mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
     if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
-        contact_mass = float(unbonded_modes.mass / slide[first] ** 2)
+        contact_mass = float(unbonded.mass / slide[first] ** 2)
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.
-    own_from_modes = np.eye(slide.size)
-    if modes is not unbonded_modes and modes.shapes is not None:
-        own_from_modes = modes.shapes
-        if unbonded_modes.shapes is not None:
-            own_from_modes = np.linalg.lstsq(unbonded_modes.shapes, modes.shapes, rcond=None)[0]
+    unbonded_from_modes = np.eye(slide.size)
+    if modes is not unbonded and modes.shapes is not None:
+        unbonded_from_modes = modes.shapes
+        if unbonded.shapes is not None:
+            unbonded_from_modes = np.linalg.lstsq(unbonded.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
-    return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
+    return FirstMode(frequency, mass, contact_mass, (slide[:, None] * unbonded_from_modes)[order])
 
 
 def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:

@@ -23,7 +23,7 @@ from .source import name_key
 _build_listed_modes = memoize(listed_modes.build_basis)
 
 
-def build_modes(scene, unbonded_modes: ModalBasis | None = None) -> ModalBasis:
+def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
     """Build the modes of a rig, including the linear spring of the bonded joint.
 
     The field `base` is the participation of the drive. Of a moving base it is the participation of
@@ -35,7 +35,7 @@ def build_modes(scene, unbonded_modes: ModalBasis | None = None) -> ModalBasis:
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    unbonded_modes : ModalBasis, optional
+    unbonded : ModalBasis, optional
         Result of `build_modes_without_bond`, if it is known.
 
     Returns
@@ -47,7 +47,7 @@ def build_modes(scene, unbonded_modes: ModalBasis | None = None) -> ModalBasis:
     PatchfemError
         If a file lacks something, or if a bonded spring has no single interface to act on.
     """
-    modes = build_modes_without_bond(scene) if unbonded_modes is None else unbonded_modes
+    modes = build_modes_without_bond(scene) if unbonded is None else unbonded
     # A mode that yaws the patch gives each strip its own displacement, which is that at its middle.
     if needs_strip_displacements(scene):
         count = scene.contact.strips.count

@@ -26,11 +26,8 @@ from .reader import is_toml, read_set_value
 from .suggestions import require_key
 
 # keys of a length and of a force whose values `read_positive_values` reads, with an example
-DISPLACEMENT_KEY = "drive.displacement"
-POSITIVE_KEYS = {
-    "length": (DISPLACEMENT_KEY, "1 um..1 mm:9"),
-    "force": ("drive.force", "1 N..100 N:9"),
-}
+LENGTH_KEY = "drive.displacement"
+POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
 # Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
 MAX_RANGE_VALUES = 10_000_000
 # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.

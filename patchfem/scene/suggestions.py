@@ -191,7 +191,7 @@ def _suggest_name(
     # is complete in general, so that a needed key is proposed to --set only if no other one is needed.
     word = key.lower()
     words = set(word.split("_"))
-    needed = lacking if len(lacking) == 1 or not is_set else ()
+    needed = () if is_set and len(lacking) > 1 else lacking
     return next(
         chain(
             _list_similar(key, fitting),

@@ -83,7 +83,7 @@ def count_beat_cycles(frequencies) -> float:
     fractions = [f.limit_denominator(MAX_FREQUENCY_DENOMINATOR) or f for f in exact]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]
-    return float(fractions[0] * denominator / gcd(*numerators))
+    return numerators[0] / gcd(*numerators)
 
 
 def _build_tones(drive: DriveKeys) -> TonesRecord:

@@ -30,7 +30,7 @@ END_MARGIN_OVER_HALF_PATCH = 0.1
 MAX_COEFFICIENT_RATIO = 2.0
 # Largest relative coefficient of the search, so that a message can propose one
 MAX_SEARCHED_COEFFICIENT_RATIO = 1e4
-MAX_WORN_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
+MAX_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
 # Depth at the ends of the computed wear relative to its largest depth
 WORN_END_DEPTH_FRACTION = 0.05
 # Increase of the sum of squares, in variances, of an equally good position
@@ -291,10 +291,7 @@ def _require_similar(width: float | None, bins: Bins, history: WearHistory, best
         )
     computed = history.average(bins.edges, best)
     worn = bins.width * float((computed > WORN_END_DEPTH_FRACTION * computed.max()).sum())
-    if (
-        width is not None
-        and not worn / MAX_WORN_WIDTH_RATIO <= width <= MAX_WORN_WIDTH_RATIO * worn
-    ):
+    if width is not None and not worn / MAX_WIDTH_RATIO <= width <= MAX_WIDTH_RATIO * worn:
         raise PatchfemError(
             f"compare --predicted: the measured track is {format_length(width, 3)} wide, and the computed wear of "
             f"{history.source} {format_length(worn, 3)}; this run is not that of the measured contact"

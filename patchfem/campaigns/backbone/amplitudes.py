@@ -66,9 +66,9 @@ def _default_slides(joint: JointMode) -> tuple[float, float]:
     deflection = joint.deflection if joint.friction_limit else 0.0
     if 0 < stiffness < np.inf or not deflection:
         slip = joint.slip_displacement
-        return MIN_AMPLITUDE_OVER_GROSS_SLIP * slip, MAX_AMPLITUDE_OVER_GROSS_SLIP * max(
-            slip, deflection
-        )
+        high = MAX_AMPLITUDE_OVER_GROSS_SLIP * max(slip, deflection)
+        return MIN_AMPLITUDE_OVER_GROSS_SLIP * slip, high
+    # Rigid friction has no slip amplitude, so that the range begins above the static deflection by friction.
     return MIN_AMPLITUDE_OVER_DEFLECTION * deflection, MAX_AMPLITUDE_OVER_GROSS_SLIP**2 * deflection
 
 
@@ -78,11 +78,14 @@ def _max_amplitude(joint: JointMode) -> float:
     travel = springs.travel / TRAVEL_OVER_MAX_AMPLITUDE
     if not springs.cubic:
         return travel
+    # The cubic spring at the output u = o q resists the mode q as much as its stiffness, |k3| u^3 o = k q, at
+    # u = sqrt(k/|k3|)/o.
     output = abs(joint.modes.output[joint.mode]) or joint.reach
-    doubling = np.sqrt(joint.spring / abs(springs.cubic)) / output
+    limit = np.sqrt(joint.spring / abs(springs.cubic)) / output
+    factor = MAX_AMPLITUDE_OVER_HARDENING_LIMIT
     if springs.cubic < 0:
-        return min(travel, doubling * MAX_AMPLITUDE_OVER_SOFTENING_LIMIT)
-    return min(travel, doubling * MAX_AMPLITUDE_OVER_HARDENING_LIMIT)
+        factor = MAX_AMPLITUDE_OVER_SOFTENING_LIMIT
+    return min(travel, factor * limit)
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:

@@ -222,12 +222,12 @@ def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> boo
     output : (n,) array
         Displacement of the output per modal coordinate.
     """
+    # The part of the motion under the force that has the shape of the free motion (projection on it)
     part = free * np.vdot(free, forced) / np.vdot(free, free)
     energy = np.vdot(part, part).real / np.vdot(forced, forced).real
     whole = output @ forced
-    return energy >= MIN_MODE_ENERGY_FRACTION and abs(
-        output @ part - whole
-    ) <= MAX_OUTPUT_MOTION_DEVIATION * abs(whole)
+    max_deviation = MAX_OUTPUT_MOTION_DEVIATION * abs(whole)
+    return energy >= MIN_MODE_ENERGY_FRACTION and abs(output @ part - whole) <= max_deviation
 
 
 def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:

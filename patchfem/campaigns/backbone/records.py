@@ -46,8 +46,10 @@ class Curve(NamedTuple):
 
     def interpolate(self, amplitudes) -> dict[str, np.ndarray]:
         """Interpolate the values linearly at amplitudes (k,) [m]; return a dict by name."""
-        columns = {name: getattr(self, name) for name in CURVE_QUANTITIES}
-        return {name: np.interp(amplitudes, self.amplitude, columns[name]) for name in columns}
+        values = {}
+        for name in CURVE_QUANTITIES:
+            values[name] = np.interp(amplitudes, self.amplitude, getattr(self, name))
+        return values
 
 
 def make_curve(amplitude, values, errors) -> Curve:

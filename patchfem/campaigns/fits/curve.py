@@ -52,7 +52,7 @@ N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 SLOPE_STEP_IN_HALF_WIDTHS = 0.1
 # Ratio by which the fitted curve goes beyond the measured amplitudes on both sides
-FITTED_CURVE_EXTENSION_RATIO = 3.0
+CURVE_EXTENSION_RATIO = 3.0
 
 
 class MeasuredCurve(NamedTuple):
@@ -489,10 +489,7 @@ def extrapolate_curve(
     advice : str
         Sentence on a further measurement, or "".
     """
-    ends = curves.amplitude[[0, -1]] * [
-        1 / FITTED_CURVE_EXTENSION_RATIO,
-        FITTED_CURVE_EXTENSION_RATIO,
-    ]
+    ends = curves.amplitude[[0, -1]] * [1 / CURVE_EXTENSION_RATIO, CURVE_EXTENSION_RATIO]
     amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
 
     def compute(values) -> np.ndarray:

@@ -34,9 +34,9 @@ MAX_STEP_CHANGE_OVER_TOLERANCE = 0.1
 # Ratio of the rest speed of growing bonds to the largest measured speed.
 REST_SPEED_FRACTION = 1e-3
 # Smallest fraction of independent rows for which no warning about correlation is issued.
-MIN_INDEPENDENT_ROW_FRACTION = 0.6
+MIN_INDEPENDENT_FRACTION = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
-MIN_RMS_OVER_PEAK_FORCE = 1e-6
+MIN_RMS_OVER_PEAK = 1e-6
 # Largest ratio of the force in the first row to the peak force for a record that begins at rest.
 MAX_FIRST_FORCE_OVER_PEAK_FORCE = 0.2
 
@@ -377,10 +377,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     warnings = []
 
     # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
-    if (
-        fitted.rms > MIN_RMS_OVER_PEAK_FORCE * peak
-        and n_independent < MIN_INDEPENDENT_ROW_FRACTION * n_used
-    ):
+    if fitted.rms > MIN_RMS_OVER_PEAK * peak and n_independent < MIN_INDEPENDENT_FRACTION * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
             f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "

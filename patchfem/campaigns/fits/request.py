@@ -16,18 +16,12 @@ from .options import FitOptions
 from .problem import Listener, parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
-# options of each kind of fit
-OPTIONS_BY_KIND_OF_FIT = {
-    "loop": ("hold",),
-    "rows": ("hold", "leave_out", "starts"),
-    "curve": ("starts",),
-    "wear": (),
+# Kinds of fit that have each option, and to what they fit keys, for the message
+FITS_WITH_OPTION = {
+    "hold": ("loop rows", "a loop under a prescribed slide or rows of a rig"),
+    "leave_out": ("rows", "rows of a rig"),
+    "starts": ("rows curve", "rows of a rig or frequency and damping of a rig against amplitude"),
 }
-NEEDED_INPUT_BY_OPTION = {
-    "hold": "a loop under a prescribed slide or rows of a rig",
-    "leave_out": "rows of a rig",
-    "starts": "rows of a rig or frequency and damping of a rig against amplitude",
-}  # what is fitted with an option
 
 
 def fit_measurement(
@@ -75,7 +69,7 @@ def fit_measurement(
 
 
 def choose_kind(scene: Scene, to: str) -> str:
-    """Return the kind of fit, a key of OPTIONS_BY_KIND_OF_FIT, that the tables of a scene and the measured file ask for.
+    """Return the kind of fit, "wear", "loop", "rows" or "curve", that the scene and the measured file ask for.
 
     Raises PatchfemError for a table whose header belongs to no kind of fit.
     """
@@ -102,9 +96,9 @@ def choose_kind(scene: Scene, to: str) -> str:
 
 
 def check_options(kind: str, options: FitOptions) -> None:
-    """Raise PatchfemError if an option is invalid or does not belong to `kind`, a key of OPTIONS_BY_KIND_OF_FIT."""
-    for name, target in NEEDED_INPUT_BY_OPTION.items():
-        if getattr(options, name) and name not in OPTIONS_BY_KIND_OF_FIT[kind]:
+    """Raise PatchfemError if an option is invalid or does not belong to `kind` of fit, such as "rows"."""
+    for name, (kinds, target) in FITS_WITH_OPTION.items():
+        if getattr(options, name) and kind not in kinds.split():
             raise PatchfemError(
                 f"--{name.replace('_', '-')} applies only to fits to {target}; leave this option out"
             )

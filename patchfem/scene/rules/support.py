@@ -44,11 +44,8 @@ from .view import ViewValue, wrap_value
 
 # Features of the whole scene: their rows are tried once, also where no law could be read.
 SCENE_FEATURES = ("wear", "structure.measured=stuck", "sensor apart from the output")
-SINGLE_BOND_SUMS = (
-    "direct",
-    "truncated",
-    "merged",
-)  # methods of accuracy.quadrature that sum single bonds
+# Methods of accuracy.quadrature that sum single bonds
+SINGLE_BOND_SUMS = ("direct", "truncated", "merged")
 
 
 class Joint(TableFacts):
