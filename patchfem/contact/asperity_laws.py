@@ -165,14 +165,14 @@ def peak_integral(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     # Below h = -8 the series of the moments
     depth = np.where(h < -8, -h, 8.0)
-    moment_3_2 = _moment(1.5, depth)
-    moment_1_2 = _moment(0.5, depth)
+    moment_3_2 = _compute_moment(1.5, depth)
+    moment_1_2 = _compute_moment(0.5, depth)
     return np.where(h < -8, 1.5 * np.log(depth) + np.log(moment_3_2), log), np.where(
         h < -8, 1.5 * moment_1_2 / moment_3_2 / depth, decay_rate
     )
 
 
-def _moment(n: float, a: np.ndarray) -> np.ndarray:
+def _compute_moment(n: float, a: np.ndarray) -> np.ndarray:
     """Return the expectation of (1 + z/a)^n for a standard normal variable z and large a.
 
     It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.

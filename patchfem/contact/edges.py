@@ -14,14 +14,14 @@ from .strip_compliance import StripCompliance
 
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
-MIN_RELATIVE_PRESSURE = 1e-13
+MIN_CONTACT_PRESSURE_RATIO = 1e-13
 # Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
-MIN_PRESSURE_FRACTION = 1e-287
-# Largest ratio of first-row height to cell length for which `edge_offset` was measured
+MIN_EDGE_PRESSURE_RATIO = 1e-287
+# Largest ratio of first-row height to cell length for which `compute_edge_offset` was measured
 MAX_CELL_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
 # triangles and quadrilaterals with aspects 0.3 to 2.4, within 0.03
-QUADRATIC_OFFSET = 0.345
+QUADRATIC_EDGE_OFFSET_FRACTION = 0.345
 
 
 class ContactEdge(NamedTuple):
@@ -40,7 +40,7 @@ class ContactEdge(NamedTuple):
     position: float
 
 
-def edge_offset(
+def compute_edge_offset(
     inner, outer, fraction, row_height: float | None = None, *, is_quadratic: bool = False
 ):
     """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
@@ -65,7 +65,7 @@ def edge_offset(
     """
     cell = (1 - fraction) * inner + fraction * outer
     if is_quadratic:
-        return QUADRATIC_OFFSET * cell
+        return QUADRATIC_EDGE_OFFSET_FRACTION * cell
     aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_CELL_ASPECT)
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
 
@@ -164,7 +164,7 @@ def find_edges(
         `inner` and `outer` are the lengths [m] of the cells before and beyond the node. An asperity layer reduces the
         offset by its part of the compliance, because it has its edge at the node itself.
         """
-        offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
+        offset = compute_edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
         return (
             offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
         )
@@ -252,7 +252,9 @@ def find_pressure_edges(x, pressure, threshold: float) -> list[ContactEdge]:
         By increasing x.
     """
     with np.errstate(divide="ignore"):
-        height = np.log(np.maximum(pressure, MIN_PRESSURE_FRACTION * threshold)) - np.log(threshold)
+        height = np.log(np.maximum(pressure, MIN_EDGE_PRESSURE_RATIO * threshold)) - np.log(
+            threshold
+        )
     edges = []
     for node, side in _find_ends(pressure > threshold):
         cell_fraction = height[node] / (height[node] - height[node + side])

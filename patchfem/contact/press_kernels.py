@@ -17,18 +17,18 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import (
-    N_STORED,
-    OLDEST_SLOT,
-    PRESENT_SLOT,
-    REFERENCE_ENERGY,
-    REFERENCE_LOAD,
-    REFERENCE_MOMENT,
-    REFERENCE_OPENING,
+    MAX_OPENING_INDEX,
+    OLDEST_SLOT_INDEX,
+    PRESENT_SLOT_INDEX,
+    REFERENCE_ENERGY_INDEX,
+    REFERENCE_LOAD_INDEX,
+    REFERENCE_MOMENT_INDEX,
+    STORED_COUNT_INDEX,
     EnergyTerm,
 )
 
 # Fast-math flags with which the compiler vectorizes loops that search for a minimum
-FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
+FASTMATH_MINIMUM_SEARCH_FLAGS = FASTMATH_FLAGS | {"nnan", "nsz"}
 # Largest number of sets for which all violating nodes are exchanged at once; beyond it the
 # exchanges may cycle
 N_BLOCK_EXCHANGES = 12
@@ -222,16 +222,16 @@ def take_slot(sets):
     """
     stored = sets.stored
     n_slots = stored.names.size
-    slot = sets.counters[N_STORED]
+    slot = sets.counters[STORED_COUNT_INDEX]
     if slot < n_slots:
-        sets.counters[N_STORED] += 1
+        sets.counters[STORED_COUNT_INDEX] += 1
         return slot
 
     # Every trial of a step starts from the present set, which is therefore kept
-    slot = sets.counters[OLDEST_SLOT]
-    if slot == sets.counters[PRESENT_SLOT]:
+    slot = sets.counters[OLDEST_SLOT_INDEX]
+    if slot == sets.counters[PRESENT_SLOT_INDEX]:
         slot = (slot + 1) % n_slots
-    sets.counters[OLDEST_SLOT] = (slot + 1) % n_slots
+    sets.counters[OLDEST_SLOT_INDEX] = (slot + 1) % n_slots
 
     # The set that the slot holds leaves the chain of its hash
     bucket = stored.names[slot] & (stored.heads.size - 1)
@@ -271,9 +271,9 @@ def store_set(sets, name):
     # Energy beyond that of the reference state and the work of its forces: E - E0 - N0 d + M0 t
     energy = stored.energy[slot]
     energy[:] = 0.0
-    energy[EnergyTerm.CONSTANT] = -sets.reference[REFERENCE_ENERGY]
-    energy[EnergyTerm.BY_D] = -sets.reference[REFERENCE_LOAD]
-    energy[EnergyTerm.BY_T] = sets.reference[REFERENCE_MOMENT]
+    energy[EnergyTerm.CONSTANT] = -sets.reference[REFERENCE_ENERGY_INDEX]
+    energy[EnergyTerm.BY_D] = -sets.reference[REFERENCE_LOAD_INDEX]
+    energy[EnergyTerm.BY_T] = sets.reference[REFERENCE_MOMENT_INDEX]
 
     # Unknowns of every node. The forces f = constant + by_d d + by_t t give E = -f . (opening - d + x t)/2, of which
     # each coefficient is a sum over the nodes in contact, since C is symmetric.
@@ -359,7 +359,7 @@ def find_stored(sets, name):
     return slot
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM_SEARCH_FLAGS, **NJIT_NO_REFCOUNT)
 def check_contact_conditions(sets, slot, d, t):
     """Check whether a set meets the contact conditions at a rigid displacement (d, t).
 
@@ -400,7 +400,7 @@ def check_contact_conditions(sets, slot, d, t):
 
     min_force = -CONDITION_ROUND_OFF * scale
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
-    min_gap = -CONDITION_ROUND_OFF * (sets.reference[REFERENCE_OPENING] + abs(d) + abs(t) * arm)
+    min_gap = -CONDITION_ROUND_OFF * (sets.reference[MAX_OPENING_INDEX] + abs(d) + abs(t) * arm)
     holds = smallest_force >= min_force and smallest_gap >= min_gap
     return holds, ContactBounds(min_force, min_gap)
 
@@ -561,6 +561,6 @@ def press_state(sets, slot, d, t, force):
     for i in range(force.size):
         value = unknowns[slot, 0, i] + unknowns[slot, 1, i] * d + unknowns[slot, 2, i] * t
         force[i] = max(value, 0.0) if sets.stored.in_contact[slot, i] else 0.0
-    load = sets.reference[REFERENCE_LOAD] - energy.heave_slope
-    moment = sets.reference[REFERENCE_MOMENT] - energy.rotation_slope
+    load = sets.reference[REFERENCE_LOAD_INDEX] - energy.heave_slope
+    moment = sets.reference[REFERENCE_MOMENT_INDEX] - energy.rotation_slope
     return PressedState(load, moment, energy.value)

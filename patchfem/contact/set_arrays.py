@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-REFERENCE_LOAD = 0  # index into `SetArrays.reference` of the load of the reference state [N]
+REFERENCE_LOAD_INDEX = 0  # index into `SetArrays.reference` of the load of the reference state [N]
 # Index into `SetArrays.reference` of the moment of the reference state about x = 0 [N m]
-REFERENCE_MOMENT = 1
+REFERENCE_MOMENT_INDEX = 1
 # Index into `SetArrays.reference` of the elastic energy of the reference state [J]
-REFERENCE_ENERGY = 2
+REFERENCE_ENERGY_INDEX = 2
 # Index into `SetArrays.reference` of the largest magnitude of the openings [m]
-REFERENCE_OPENING = 3
-N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
-OLDEST_SLOT = 1  # index into `SetArrays.counters` of the slot that is replaced next
+MAX_OPENING_INDEX = 3
+STORED_COUNT_INDEX = 0  # index into `SetArrays.counters` of the number of stored sets
+OLDEST_SLOT_INDEX = 1  # index into `SetArrays.counters` of the slot that is replaced next
 # Index into `SetArrays.counters` of the slot of the present contact set, -1 if none is found
-PRESENT_SLOT = 2
+PRESENT_SLOT_INDEX = 2
 
 
 class EnergyTerm(IntEnum):
@@ -94,9 +94,9 @@ class SetArrays(NamedTuple):
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
-    - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
+    - reference (4,): properties of the reference state, from `REFERENCE_LOAD_INDEX` to `MAX_OPENING_INDEX`.
     - tableau, stored: see there.
-    - counters (3,): from `N_STORED` to `PRESENT_SLOT`.
+    - counters (3,): from `STORED_COUNT_INDEX` to `PRESENT_SLOT_INDEX`.
     """
 
     compliance: np.ndarray
@@ -126,7 +126,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
     x, opening : (m,) ndarray
         Positions, and openings of the reference state without forces [m].
     reference : (4,) sequence of float
-        Properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
+        Properties of the reference state, from `REFERENCE_LOAD_INDEX` to `MAX_OPENING_INDEX`.
     in_contact : (m,) bool ndarray
         Contact set of the reference state, the first target of the search.
     n_slots : int

@@ -15,12 +15,12 @@ from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
 MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
-DIRECTIONS = np.arange(2)  # numbers of the displacements of a node, along x and inward
+DISPLACEMENT_COMPONENTS = np.arange(2)  # numbers of the displacements of a node, along x and inward
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
 # Largest residual of a solution, relative to the largest load, that is not refined
-SAFE_RESIDUAL = 1e-8
+MAX_UNREFINED_RESIDUAL = 1e-8
 # Largest relative change of the displacements by one step of refinement; factors with a larger
 # change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
@@ -109,7 +109,7 @@ class Fronts:
         -------
         float
             Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
-            `SAFE_RESIDUAL`.
+            `MAX_UNREFINED_RESIDUAL`.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Fronts:
         load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
         u = self.solve(load)
         residual = load - self.compute_forces(u)
-        if np.abs(residual).max() <= SAFE_RESIDUAL * np.abs(load).max():
+        if np.abs(residual).max() <= MAX_UNREFINED_RESIDUAL * np.abs(load).max():
             return 0.0
         change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
         if not change <= MAX_REFINEMENT_CHANGE:
@@ -158,7 +158,7 @@ class _Stiffness(NamedTuple):
     matrix: np.ndarray
 
 
-def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
+def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
     """Halve cells at positions (t, 2) across the longer side of each part.
 
     Returns
@@ -190,7 +190,7 @@ def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
     return parts, leaves
 
 
-def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
+def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
@@ -215,7 +215,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """
     # A node is eliminated in the smallest part that contains all of its cells
     blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
-    parts, leaves = _dissect(positions)
+    parts, leaves = _bisect_cells(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
     position = np.empty(len(is_fixed) + 1, np.int64)
@@ -229,7 +229,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
                 terms = [stiffnesses.pop(half) for half in part.halves]
             else:
                 terms = _select_cells(blocks, leaves[part.first_leaf])
-            nodes = _unite([term.nodes for term in terms])
+            nodes = _merge_nodes([term.nodes for term in terms])
             is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
             own = nodes[is_own]
             boundary = nodes[~is_own]
@@ -296,7 +296,7 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
     return selected
 
 
-def _unite(parts) -> np.ndarray:
+def _merge_nodes(parts) -> np.ndarray:
     """Return the different nodes of several arrays of nodes, sorted.
 
     `np.unique` takes several times as long for few nodes.
@@ -340,7 +340,9 @@ def _add_stiffnesses(terms, order, position) -> np.ndarray:
 
 def _number_unknowns(nodes) -> np.ndarray:
     """Return the numbers (..., 2 k) of the unknowns of nodes (..., k), node by node along x and inward."""
-    return (2 * nodes[..., None] + DIRECTIONS).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
+    return (2 * nodes[..., None] + DISPLACEMENT_COMPONENTS).reshape(
+        *nodes.shape[:-1], 2 * nodes.shape[-1]
+    )
 
 
 def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:

@@ -151,6 +151,12 @@ def write_probes(rig, state, t, y, probes):
     if rig.settings[Setting.BASE_MOVES] > 0:
         probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
 
+    # A sliding interface that others hold has a velocity of round-off.
+    slowest = 0.0
+    for i in range(rig.faces.shape[0]):
+        if rests(state.memory[i]):
+            slowest = SAME_SPEED_TOL
+
     # Every interface; a law slips where the irreversible part of its velocity exceeds the elastic one.
     integrals = find_integrals(rig, y)
     for i in range(rig.faces.shape[0]):
@@ -164,7 +170,7 @@ def write_probes(rig, state, t, y, probes):
         if i == 0:
             probes[Probe.VELOCITY] = point.velocity
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
-        is_still = rests(memory) or point.velocity == 0
+        is_still = rests(memory) or abs(point.velocity) <= slowest * point.speed_scale
         probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
 
 

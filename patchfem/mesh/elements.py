@@ -90,19 +90,21 @@ def _square_rule(count: int) -> tuple[list, list]:
     return [(points[a], points[b]) for a, b in pairs], [weights[a] * weights[b] for a, b in pairs]
 
 
-_TRIANGLE = [(0, 0), (1, 0), (0, 1)]
-_SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+_TRIANGLE_CORNERS = [(0, 0), (1, 0), (0, 1)]
+_SQUARE_CORNERS = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 # Exact for polynomials of degree two
-_TRIANGLE_RULE = ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6, 1 / 6, 1 / 6])
-_LINEAR = [(0, 0), (1, 0), (0, 1)]
-_QUADRATIC = [*_LINEAR, (2, 0), (1, 1), (0, 2)]
-_SERENDIPITY = [*_QUADRATIC, (2, 1), (1, 2)]
+_TRIANGLE_QUADRATURE = ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6, 1 / 6, 1 / 6])
+_LINEAR_EXPONENTS = [(0, 0), (1, 0), (0, 1)]
+_QUADRATIC_EXPONENTS = [*_LINEAR_EXPONENTS, (2, 0), (1, 1), (0, 2)]
+_SERENDIPITY_EXPONENTS = [*_QUADRATIC_EXPONENTS, (2, 1), (1, 2)]
 
 # Elements by their names in meshio
 ELEMENTS = {
-    "triangle": _make_element(_TRIANGLE, _LINEAR, _TRIANGLE_RULE),
-    "quad": _make_element(_SQUARE, [*_LINEAR, (1, 1)], _square_rule(2)),
-    "triangle6": _make_element(_TRIANGLE, _QUADRATIC, _TRIANGLE_RULE),
-    "quad8": _make_element(_SQUARE, _SERENDIPITY, _square_rule(3)),
-    "quad9": _make_element(_SQUARE, [*_SERENDIPITY, (2, 2)], _square_rule(3), has_centre=True),
+    "triangle": _make_element(_TRIANGLE_CORNERS, _LINEAR_EXPONENTS, _TRIANGLE_QUADRATURE),
+    "quad": _make_element(_SQUARE_CORNERS, [*_LINEAR_EXPONENTS, (1, 1)], _square_rule(2)),
+    "triangle6": _make_element(_TRIANGLE_CORNERS, _QUADRATIC_EXPONENTS, _TRIANGLE_QUADRATURE),
+    "quad8": _make_element(_SQUARE_CORNERS, _SERENDIPITY_EXPONENTS, _square_rule(3)),
+    "quad9": _make_element(
+        _SQUARE_CORNERS, [*_SERENDIPITY_EXPONENTS, (2, 2)], _square_rule(3), has_centre=True
+    ),
 }

@@ -32,7 +32,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
-from ..contact.set_arrays import PRESENT_SLOT, REFERENCE_LOAD, REFERENCE_MOMENT
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
 from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
@@ -419,7 +419,7 @@ def write_residual(system, level, dt):
         slides = moves[Port.SLIDE]
         normal.path_mean(
             system.sets,
-            system.sets.counters[PRESENT_SLOT],
+            system.sets.counters[PRESENT_SLOT_INDEX],
             slides[heave],
             slides[pitch],
             increments[heave],
@@ -715,14 +715,14 @@ def find_loads(system, row, fraction, is_solved):
         pitch = int(ports.contact[1])
         up = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
         turn = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -up, turn)
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
         if slot < 0:
             return -1.0
         normal.press_state(
             system.sets, slot, -up, turn, values[Point.NODE_FORCE, : system.sets.x.size]
         )
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD]
+            system.sets.reference[REFERENCE_LOAD_INDEX]
             - normal.compute_energy(system.sets, slot, up, turn)[1],
             0.0,
         )
@@ -810,7 +810,9 @@ def find_holds(system, state, drive):
         pitch = int(ports.contact[1])
         up = sum_products(ports.rows[heave], state[:n])
         turn = sum_products(ports.rows[pitch], state[:n])
-        energy = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], up, turn)
+        energy = normal.compute_energy(
+            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
+        )
         ports.vector[heave] += energy[1]
         ports.vector[pitch] += energy[2]
 
@@ -975,7 +977,7 @@ def commit(system, dt):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    if is_any_held and system.sets.counters[PRESENT_SLOT] >= 0:
+    if is_any_held and system.sets.counters[PRESENT_SLOT_INDEX] >= 0:
         return_ports_to_rest(system)
         rest += energy - find_motion_energy(system)
         if ports.contact[0] >= 0:
@@ -1148,8 +1150,8 @@ def find_motion_energy(system):
     if heave >= 0:
         up = sum_products(ports.rows[heave], state[:n])
         turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -up, turn)
-        system.sets.counters[PRESENT_SLOT] = slot
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
+        system.sets.counters[PRESENT_SLOT_INDEX] = slot
         if slot >= 0:
             energy += normal.compute_energy(system.sets, slot, up, turn)[0]
     return energy
@@ -1193,7 +1195,7 @@ def press_at_rest(system):
     points = system.points
     values = points.values
     n = system.state.shape[1] // 2
-    if system.sets.counters[PRESENT_SLOT] < 0:
+    if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
         return  # the march ends without a contact set
 
     for i in range(2):
@@ -1236,7 +1238,7 @@ def try_step(system, level, row, begin, end, drive):
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
         halved. Then the motion has not advanced. True after a step, and also if no contact set was found, in which case
-        the counter `PRESENT_SLOT` is -1.
+        the counter `PRESENT_SLOT_INDEX` is -1.
     """
     points = system.points
     shear = points.shear
@@ -1270,7 +1272,7 @@ def try_step(system, level, row, begin, end, drive):
         if options.has_loads:
             change = find_loads(system, row, end, count > 0)
             if change < 0:
-                system.sets.counters[PRESENT_SLOT] = -1
+                system.sets.counters[PRESENT_SLOT_INDEX] = -1
                 return True
             if count > 0 and change <= LOAD_RESIDUAL:
                 break
@@ -1419,10 +1421,12 @@ def write_sample(system, row, sample):
     if heave >= 0:
         up = ports.values[Port.SLIDE, heave]
         turn = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], up, turn)
+        contact = normal.compute_energy(
+            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
+        )
         reference = system.sets.reference
-        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
-        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
+        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - contact[1], 0.0)
+        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - contact[2]
         sample[size + Sample.CONTACT_ENERGY] = contact[0]
         sample[size + Sample.HEAVE] = up
         sample[size + Sample.PITCH] = turn
@@ -1489,7 +1493,7 @@ def march(system, steps, samples):
             if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
                 level += 1
                 continue
-            if system.sets.counters[PRESENT_SLOT] < 0:
+            if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
                 return i, NO_CONTACT_SET
             if system.totals[Total.IS_FULL] > 0:
                 return i, LISTS_FULL

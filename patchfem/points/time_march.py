@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
-from ..contact.set_arrays import PRESENT_SLOT, hash_set, make_set_arrays
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
 from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
@@ -476,7 +476,7 @@ def _press_first(system: System, contact: Contact) -> None:
         float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
     )
     slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
-    system.sets.counters[PRESENT_SLOT] = slot
+    system.sets.counters[PRESENT_SLOT_INDEX] = slot
 
 
 def _climb_first(system: System, contact: Contact) -> None:

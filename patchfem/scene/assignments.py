@@ -26,8 +26,11 @@ from .reader import is_toml, read_set_value
 from .suggestions import require_key
 
 # keys of a length and of a force whose values `read_positive_values` reads, with an example
-LENGTH_KEY = "drive.displacement"
-POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
+DISPLACEMENT_KEY = "drive.displacement"
+POSITIVE_KEYS = {
+    "length": (DISPLACEMENT_KEY, "1 um..1 mm:9"),
+    "force": ("drive.force", "1 N..100 N:9"),
+}
 # Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
 MAX_RANGE_VALUES = 10_000_000
 # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
@@ -62,14 +65,14 @@ class Form(NamedTuple):
     has_ranges: bool
 
 
-LISTS = Form(
+LIST_FORM = Form(
     "--over",
     "table.key=v1,v2,... or table.key=low..high:n, such as contact.tilt.angle=1e-6 rad..1e-2 rad:9",
     has_lists=True,
     has_ranges=False,
 )
-RANDOM = LISTS._replace(has_ranges=True)
-BOUNDS = Form(
+RANDOM_FORM = LIST_FORM._replace(has_ranges=True)
+BOUNDS_FORM = Form(
     "--free",
     "table.key=low..high, such as friction.bond_length=0.2 um..20 um",
     has_lists=False,
@@ -151,7 +154,7 @@ class Range:
 
 
 def read_assignments(
-    texts: Iterable[str], form: Form = LISTS
+    texts: Iterable[str], form: Form = LIST_FORM
 ) -> tuple[list[Axis | Range], list[str]]:
     """Read strings ``table.key=values``.
 
@@ -199,7 +202,7 @@ def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if isinstance(values, str):
-            _append_values(axes, sentences, "", (key, values), LISTS)
+            _append_values(axes, sentences, "", (key, values), LIST_FORM)
         else:
             sentences.append('the values must be a string, such as "0.1..0.6:6"')
         mistakes += [(f"sweep.{key}", sentence) for sentence in sentences]
@@ -257,7 +260,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     return Axis(key, texts, texts, "")
 
 
-def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
+def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
     """Parse the values of a key.
 
     Parameters

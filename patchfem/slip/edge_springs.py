@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from ..core import frozen_array
 
 # Smallest compliance of a spring relative to that of its node: a node does not become much stiffer.
-MIN_SPRING_RATIO = -0.5
+MIN_SPRING_COMPLIANCE_RATIO = -0.5
 # Largest compliance of a spring relative to that of its node, which then carries no force.
-MAX_SPRING_RATIO = 1e6
+MAX_SPRING_COMPLIANCE_RATIO = 1e6
 
 
 def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: float) -> np.ndarray:
@@ -58,11 +58,11 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
         return excess - float((weight * ratio / (1 + ratio * values)).sum())
 
     # The matrix is positive definite above -1/lambda_max.
-    low = max(MIN_SPRING_RATIO, -0.5 / values.max(initial=1.0))
-    if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_RATIO):
+    low = max(MIN_SPRING_COMPLIANCE_RATIO, -0.5 / values.max(initial=1.0))
+    if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_COMPLIANCE_RATIO):
         return frozen_array(compliance * (forces.sum() / stiffness))
 
     out = compliance.copy()
-    ratio = brentq(remaining_excess, low, MAX_SPRING_RATIO, xtol=1e-15)
+    ratio = brentq(remaining_excess, low, MAX_SPRING_COMPLIANCE_RATIO, xtol=1e-15)
     out[nodes, nodes] += ratio * scale**2
     return frozen_array(out)

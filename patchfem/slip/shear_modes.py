@@ -4,7 +4,7 @@ Node i has the relative displacement q - sum_j C_ij f_j, with C the shear compli
 force of node j. Both forms hold while the contact set does not change:
 
 * Nodes that yield at a fixed force D_i (Coulomb's law, or the elastic-plastic law at constant load and tilt) are
-  together exactly equivalent to parallel Jenkins elements (`jenkins_set`), springs in series with sliders. The inverse
+  together exactly equivalent to parallel Jenkins elements (`make_jenkins_set`), springs in series with sliders. The inverse
   of C has off-diagonal entries <= 0 and row sums > 0, so slip zones only grow within a stroke, and Masing's rule holds.
   Corner nodes of bilinear cells may have a small negative row sum; such a node sticks until its neighbours have slipped.
   This costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401; leaving these nodes out would cost 1.4 %.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact.unilateral import INDEFINITE_MESSAGE
+from ..contact.unilateral import INDEFINITE_COMPLIANCE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thread
 
@@ -104,7 +104,9 @@ class ShearModes:
         )
 
 
-def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
+def make_jenkins_set(
+    tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0
+) -> JenkinsSet:
     """Return Jenkins elements that are equivalent to elastically coupled nodes with given yield forces.
 
     Parameters
@@ -271,7 +273,7 @@ def _factorise(c: np.ndarray) -> np.ndarray:
     """
     factor, fault = dpotrf(c.T, lower=1)
     if fault:
-        raise PatchfemError(INDEFINITE_MESSAGE)
+        raise PatchfemError(INDEFINITE_COMPLIANCE_MESSAGE)
     return factor
 
 

@@ -201,6 +201,18 @@ def test_coulomb_contact_that_lifts_off_follows_the_load():
     assert motion.values["open_fraction"] == pytest.approx(1 - edge / np.pi, rel=1e-10)
 
 
+def test_springs_that_a_falling_load_cuts_lose_their_energy_at_rest():
+    """A load that falls to 0 at rest: the work mu s q^2/(2 eps) of the slide before is lost, without any slip."""
+    law = LawNumbers("pressed_springs", (0.5, 1.0), (0.0, 2.5), (2.5, 2.5))
+    load = cases.Load(1.0, 1.5, 1.0, 0.0)
+    for end, part in ((1.5, 0.0), (3.0, 1.0)):
+        bench = make_bench(law, np.array([0.0, 0.5, end]), np.array([0.0, 0.2, 0.2]), load=load)
+        values = runs.run_case(bench).values
+        assert values["friction_work"] == pytest.approx(0.025, rel=1e-9)
+        assert values["energy_dissipated"] == pytest.approx(part * 0.025, abs=1e-11)
+        assert values["slip_amplitude"] == 0.0
+
+
 def test_release_ends_at_the_largest_travel():
     """A growing mode reaches the stop at the time of the closed form."""
     case = make_oscillator(

@@ -11,7 +11,7 @@ from pressed import solve_forces
 from scipy.linalg import expm
 from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fraction
 
-from patchfem.elasticity import Piece, interface_compliance
+from patchfem.elasticity import Piece, compute_interface_compliance
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump, wear_rates
 from patchfem.wear.depth import solve_jump
 
@@ -46,7 +46,7 @@ def make_contact_solver(compliance, x, gap, load=LOAD):
 def flat_contact():
     """Return contact solver, compliance, areas, wear rates and critical step of two flat uncoated
     blocks."""
-    pair = make_bare_pair(32)
+    pair = make_bare_pair()
     area = pair.interface.weight
     c = np.array(pair.normal)
     rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
@@ -79,7 +79,7 @@ def test_exact_volume_without_pressure_oscillation_at_any_step(multiple):
     for count in range(1, 11):
         depth, force = solve_jump(press, depth, rate, multiple * critical)
         volume = KAPPA * LOAD * PATH * multiple * critical * count
-        assert depth @ area == pytest.approx(volume, rel=1e-12)
+        assert depth @ area == pytest.approx(volume, rel=1e-12, abs=0)
         assert np.abs(np.diff(force / area, 2)).max() <= 2 * np.abs(before).max()
     assert force.min() > 0
 
@@ -117,7 +117,7 @@ def test_order_two_for_transient_of_punch():
 def test_exact_steady_pressure_is_inverse_to_sliding_distance():
     """Under a non-uniform sliding distance s the pressure of a yawing pad tends to the classical p
     ~ 1/s, within 1e-11."""
-    pair = make_bare_pair(32)
+    pair = make_bare_pair()
     x = pair.interface.x
     area = pair.interface.weight
     width = pair.interface.width
@@ -166,7 +166,7 @@ def test_exact_worn_hertz_contact_agrees_with_half_space_program():
     mesh = make_refined_grid(
         5 * hertz_width, hertz_width / 10, 40 * hertz_width, 20 * hertz_width, 1.2
     )
-    nn, _, _ = interface_compliance(Piece(mesh, make_bare_layers((young, 0.32))))
+    nn, _, _ = compute_interface_compliance(Piece(mesh, make_bare_layers((young, 0.32))))
     x = mesh.x
     area = mesh.tributary_lengths() * width
     press = make_contact_solver(2 * nn / width, x, x**2 / 2 / radius, line_load * width)

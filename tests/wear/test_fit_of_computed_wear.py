@@ -64,7 +64,7 @@ def test_exact_symmetric_depth_has_no_direction():
         fit_wear(measured._replace(correlation=length), history) for length in (1.0, 25.0)
     )
     assert found.is_mirrored is None and found.centre.low < CENTRE < found.centre.high
-    assert correlated.depths.noise == pytest.approx(5 * found.depths.noise)
+    assert correlated.depths.noise == pytest.approx(5 * found.depths.noise, rel=1e-9, abs=0)
 
 
 def test_exact_common_error_of_depths_widens_the_interval():

@@ -14,7 +14,7 @@ from .sweep_table import SweepTable, SweptKey
 
 NEGLIGIBLE_CHANGE = 0.05  # relative change that is commonly called negligible
 # Relative change of a measure at twice its value
-DOUBLING = 1.0
+DOUBLED_VALUE_CHANGE = 1.0
 # Measures of a motion whose change has a limit
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
@@ -31,7 +31,7 @@ CHANGE_AT_LIMIT = {
     "normal_stiffness": NEGLIGIBLE_CHANGE,
     "tangential_stiffness": NEGLIGIBLE_CHANGE,
     "contact_fraction": NEGLIGIBLE_CHANGE,
-    "pressure_peak": DOUBLING,
+    "pressure_peak": DOUBLED_VALUE_CHANGE,
 }
 # Beginnings of keys that drive the motion or change no result, so that they have no limit.
 KEYS_WITHOUT_LIMIT = ("drive.", "slide.", "accuracy.", "wear.cycles")
@@ -90,10 +90,10 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
         values = table.select_trusted(name)
         errors = np.nan_to_num(column.errors)
         blank = KeyLimit(name, key.key, key.unit, largest, np.nan, np.nan, np.nan, False)
-        on_lines = [
-            _find_limit_on_line(blank, key, along[order], values[line], errors[line])
-            for line in lines[:, order]
-        ]
+        on_lines = []
+        for line in lines[:, order]:
+            limit = _find_limit_on_line(blank, key, along[order], values[line], errors[line])
+            on_lines.append(limit)
 
         # the smallest limit of all lines counts
         known = filter(None, on_lines)
@@ -143,7 +143,7 @@ def _find_limit_on_line(
     error = (errors[counts] + errors[0]) / abs(values[0])
     error[0] = 0.0  # the first case does not differ from itself
     # Only a pressure that increases can double.
-    size = np.abs(change) if largest < DOUBLING else change
+    size = np.abs(change) if largest < DOUBLED_VALUE_CHANGE else change
 
     is_doubtful = size + error > largest
     inside = int(np.argmax(is_doubtful)) - 1 if is_doubtful.any() else size.size - 1
@@ -164,7 +164,7 @@ def _find_limit_on_line(
     target = largest
     if key.is_logarithmic:
         places = np.log(places)
-        if largest >= DOUBLING:
+        if largest >= DOUBLED_VALUE_CHANGE:
             # A power law of the key is a straight line in logarithmic coordinates.
             changes = np.log1p(changes)
             target = np.log1p(target)

@@ -15,11 +15,11 @@ from .sweep_table import SweepTable
 FREQUENCY_KEY = "drive.frequency"
 # Measures in which a resonance peak is sought. The first one that a sweep has is used.
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
-MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
-DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating curves
+MIN_SWEPT_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
+INTERPOLATION_SAFETY_FACTOR = 3.0  # safety factor of the differences between interpolating curves
 SPLINE_DEGREES = (3, 2, 4)  # splines through all cases, the best one first
 # Numbers of cases below and above the largest one through which a polynomial goes; a kink changes it most.
-POLYNOMIAL_CASES = ((1, 1), (2, 1), (1, 2))
+CASE_COUNTS_AROUND_PEAK = ((1, 1), (2, 1), (1, 2))
 MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
@@ -107,7 +107,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
         None if the largest value is at an end, or if a neighbour of it does not count.
     """
     counts = np.isfinite(height)
-    if np.count_nonzero(counts) < MIN_FREQUENCIES:
+    if np.count_nonzero(counts) < MIN_SWEPT_FREQUENCIES:
         return None
     top = int(np.nanargmax(height))
     near = slice(top - 1, top + 2)
@@ -119,7 +119,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     square = frequency**2 - frequency[top] ** 2
     inverse = (height[top] / height) ** 2
     curves = [make_interp_spline(square[counts], inverse[counts], k) for k in SPLINE_DEGREES]
-    for n_below, n_above in POLYNOMIAL_CASES:
+    for n_below, n_above in CASE_COUNTS_AROUND_PEAK:
         window = slice(max(top - n_below, 0), top + n_above + 1)
         if counts[window].all() and counts[window].size == n_below + n_above + 1:
             degree = n_below + n_above
@@ -147,7 +147,10 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
 
 def _estimate_error(values: np.ndarray) -> float:
     """Return the error of the first of some values (n,), from their differences; NaN for an unknown first value."""
-    return DIFFERENCE_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
+    return (
+        INTERPOLATION_SAFETY_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0)
+        + 0 * values[0]
+    )
 
 
 class _Shape(NamedTuple):

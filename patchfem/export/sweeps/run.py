@@ -196,15 +196,15 @@ def write_tables(
     if n_missing == len(table):
         return None
 
-    folder.remove_tables("sweep.csv", answers.PAGE)
+    folder.remove_tables("sweep.csv", answers.PAGE_FILE)
     names = folder.case_folder_names()
     if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
         write_csv(cases, table, names, folder.target / "sweep.csv")
-    answers.write(make_answer(sweep_scene, cases, table, names), folder.target)
+    answers.write_answer(make_answer(sweep_scene, cases, table, names), folder.target)
     del table  # its memory is needed for the page, which is made from the files
     if page:
-        pages.write_page(folder.target)
-    return answers.read(folder.target)
+        pages.write_report(folder.target)
+    return answers.read_answer(folder.target)
 
 
 def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:

@@ -324,7 +324,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     if jenkins_set is not None:
         states = [(one.slide, one.stretch) for one in motion.snapshots]
         length = make_law(model.friction, 1.0).element(1.0).length
-        tau, local = fields.element_fields(patch, jenkins_set, states, length)
+        tau, local = fields.compute_element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:

@@ -13,7 +13,7 @@ from ...core import Compliance, Interface, frozen_array
 from ...elasticity import mortar
 from ...elasticity.elasticity import (
     Piece,
-    interface_compliance,
+    compute_interface_compliance,
 )
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
@@ -100,10 +100,10 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
     piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
-    lower_compliance = upper_compliance = interface_compliance(piece)
+    lower_compliance = upper_compliance = compute_interface_compliance(piece)
     if upper_grid is not None:
         upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
-        upper_compliance = interface_compliance(upper)
+        upper_compliance = compute_interface_compliance(upper)
 
     # Interfaces with different nodes are joined by the mortar method.
     joint = None

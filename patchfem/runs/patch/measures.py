@@ -184,7 +184,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch])
     list of Patch
         At least one solution; if it is the only one, its change determines the error.
     """
-    if not fine.model.gap.jumps:
+    if not fine.model.gap.step_edges:
         return coarse
     n_intervals = _count_contact_intervals(fine.active)
     selected = takewhile(
@@ -324,7 +324,7 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
         return (
             "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
         )
-    for jump in patch.model.gap.jumps:
+    for jump in patch.model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
         if is_loaded[np.abs(x - jump) <= 1.5 * cell].any():
             return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
@@ -497,7 +497,7 @@ def _contact_edge_position_error(pair, cell):
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
             cells = min(1.0, cell / grid.coating_thickness)
-            out = max(out, edges.edge_offset(cells, cells, 0.0) * contrast)
+            out = max(out, edges.compute_edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 

@@ -38,7 +38,7 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
     if not patch_model.mesh.is_automatic:
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
-    has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
+    has_edges = bool(patch_model.gap.step_edges or (contact is not None and contact.places))
     for _ in range(MIN_LEVELS - 1 + (has_edges and tolerance < TIGHT_TOL)):
         bodies = [body.refine() for body in bodies]
     return bodies
@@ -158,21 +158,8 @@ def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
     )
 
 
-def describe_patch_plan(dimensionless_groups: Values, patch_model) -> list[str]:
-    """Describe tilt and asperity layer of a patch in sentences for a plan.
-
-    The tilt is compared with the opening tilt for flat pieces only.
-    """
-    rough = []
-    if patch_model.interface.skin is not None:
-        pieces = patch_model.pieces
-        mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
-        rough = skin.note_on_asperity_stiffness(patch_model, mean_pressure)
-    return [*_describe_tilt(dimensionless_groups, patch_model), *rough]
-
-
-def _describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
-    """Return a list with a sentence on the tilt relative to the tilt at which the contact opens."""
+def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
+    """Return a list with a sentence on the tilt relative to the tilt at which the contact of flat pieces opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:

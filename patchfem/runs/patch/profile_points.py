@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.active_set import patch_problem
+from ...contact.active_set import make_patch_problem
 from ...contact.conjugate_gradients import fit_motion, solve_by_gradients
 from ...contact.edges import contact_intervals
 from ...contact.half_space.layer import end_compliance, layer_compliance
@@ -391,7 +391,7 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     loading = patch_model.loading
     initial_force = None if start is None else np.repeat(start, 2) / 2
     offset = float(gap.min()) if loading.approach is None else loading.approach
-    problem = patch_problem(
+    problem = make_patch_problem(
         x, gap - offset, loading.load, loading.moment, loading.rotational_stiffness
     )
     force, n_iterations = solve_by_gradients(

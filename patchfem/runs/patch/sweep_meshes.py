@@ -48,7 +48,7 @@ def geometry_key(patch_model) -> Key:
         mesh.edge_motion,
         file,
         modification_time,
-        gap.jumps,
+        gap.step_edges,
         gap.profile,
         gap.average,
     )

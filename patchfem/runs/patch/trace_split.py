@@ -16,8 +16,8 @@ from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
 from ...surface.profile import Profile
-from ...surface.roughness.peaks import PERSSON, trace_moments
-from ...surface.spectrum import ELEMENTS_PER_CURVE, NEGLIGIBLE_LOST, wave_spectrum
+from ...surface.roughness.peaks import DECAY_LENGTH_OVER_RMS_HEIGHT, trace_moments
+from ...surface.spectrum import ELEMENTS_PER_CURVED_WAVE, NEGLIGIBLE_LOST_FRACTION, wave_spectrum
 
 PROFILE_KEY = "contact.profile.file"
 
@@ -136,7 +136,7 @@ def split_trace(
 
     # By Persson's theory the layer of the short waves is exponential, with a decay length of a
     # multiple of their rms height.
-    decay_length = sum(PERSSON) / 2 * waves.height
+    decay_length = sum(DECAY_LENGTH_OVER_RMS_HEIGHT) / 2 * waves.height
     tables = [
         "[contact.profile]",
         f"file = {json.dumps(str(gap.file), ensure_ascii=False)}",
@@ -180,5 +180,5 @@ def advise_split(patch_model, element: float) -> list[str]:
     except PatchfemError:
         return []
     spectrum = wave_spectrum(_level_trace(patch_model, element), is_tapered=True)
-    lost = spectrum.lost_fraction(ELEMENTS_PER_CURVE * element)
-    return [split.describe_split()] if lost > NEGLIGIBLE_LOST else []
+    lost = spectrum.lost_fraction(ELEMENTS_PER_CURVED_WAVE * element)
+    return [split.describe_split()] if lost > NEGLIGIBLE_LOST_FRACTION else []

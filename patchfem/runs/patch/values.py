@@ -233,7 +233,7 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
 def loaded_nodes(patch: Patch) -> np.ndarray:
     """Return whether each node of each strip carries pressure (s, m), in a smooth asperity layer a fraction of the peak."""
     pressure = patch.state.pressure
-    minimum = edges.MIN_RELATIVE_PRESSURE if patch.has_smooth_skin else 0.0
+    minimum = edges.MIN_CONTACT_PRESSURE_RATIO if patch.has_smooth_skin else 0.0
     return pressure > minimum * pressure.max()
 
 
@@ -263,7 +263,7 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
     # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if patch.has_smooth_skin:
         pressure = state.pressure
-        threshold = edges.MIN_RELATIVE_PRESSURE * pressure.max()
+        threshold = edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max()
         ends = edges.find_pressure_edges(x, pressure[strip], threshold)
     else:
         ends = edges.find_edges(
@@ -277,7 +277,7 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
         )
 
     # An edge next to a step of the gap lies on the step.
-    jumps = patch.model.gap.jumps
+    jumps = patch.model.gap.step_edges
     if not jumps:
         return ends
     gap = np.broadcast_to(patch.unloaded_gap, state.gap.shape)[strip]

@@ -24,7 +24,7 @@ from ...response.decay_curve import (
     make_half_cycles,
 )
 from ...response.errors import MAX_ORDER, convergence_error
-from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
+from ...slip.mesh_correction import ERROR_TO_SPREAD_CHANGE, spread_elements
 from ..patch import faces
 from . import joints, numerics
 from .solution import Solution
@@ -200,7 +200,8 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     changes = (compute(other) - best for other in coarse)
     by_meshes = sum(convergence_error(change, order=MAX_ORDER) for change in changes)
     return np.fmax(
-        SPREAD_FACTOR * np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes
+        ERROR_TO_SPREAD_CHANGE * np.abs(compute(fine.with_elements(_spread_elements)) - best),
+        by_meshes,
     )
 
 

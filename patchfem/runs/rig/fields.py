@@ -71,7 +71,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         reduction = getattr(solution.contact, "reduction", None)
         length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        tau, local = fields.element_fields(patch, reduction, states, length)
+        tau, local = fields.compute_element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
         force = list_frames("force")

@@ -11,7 +11,7 @@ from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...dynamics import limit_cycles
 from ...effects import law_has_trait
 from ...formatting import format_length
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response.measures import Measures
 from ...response.rows import TABLE
 from .engines import find_obstacle_of_map
@@ -63,10 +63,10 @@ def compute_flutter_amplitude(run) -> Flutter:
 
     end_notes = []
     outcome = run.solution.outcome
-    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL:
+    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
         end_time = run.solution.response.time[-1]
         end_notes.append(
-            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
+            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_COMPUTED_DISPLACEMENT:g} m"
         )
 
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.press import strip_offsets
+from ...contact.press import compute_strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
@@ -476,7 +476,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
     width = patch_model.pieces.width
-    offsets = strip_offsets(width, len(np.atleast_2d(area)))
+    offsets = compute_strip_offsets(width, len(np.atleast_2d(area)))
 
     def interpolate_path(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch.
@@ -484,7 +484,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
         Without strips there is a single row.
         """
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
-        row_offsets = strip_offsets(width, len(rows))
+        row_offsets = compute_strip_offsets(width, len(rows))
         columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
         return np.array(columns).T.reshape(area.shape)
 

@@ -123,7 +123,7 @@ def test_refuses_start_without_nearby_branch():
 # ---- folds of the rig with a cubic spring
 
 
-def duffing_equation(drive, friction=0.0):
+def duffing_equation(drive):
     """Return the right-hand side of the Duffing equation under a drive."""
 
     def state_derivative(t, y):
