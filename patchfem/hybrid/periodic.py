@@ -207,7 +207,9 @@ class _Shooting:
         state.clock[:] = 0.0
         state.clock[Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
         record = make_arrays(self.case)[1]
-        compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, record)
+        compiled.load_compiled_module("hybrid.engine_kernels").run_case(
+            self.case.rig, state, record
+        )
         self.n_periods += 1
         return state
 

@@ -56,7 +56,7 @@ class PeriodMap:
     """Map of a period of a rig by the engine `hybrid`."""
 
     def __init__(self, model, numerics, patch, say=None):
-        compiled.load("hybrid.engine_kernels", say)
+        compiled.load_compiled_module("hybrid.engine_kernels", say)
         self.rig = model.rig
         self.joints = make_joints(model, numerics, patch)
 
