@@ -968,7 +968,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(page.write_report(*_require_paths(folders, "report"), out=target))
+    return page.write_report(*_require_paths(folders, "report"), out=target)
 
 
 def export(

@@ -1,10 +1,10 @@
 """Compiled kernels and the cache of their machine code, one folder per state of the sources.
 
-`load` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in which some
-imports are replaced. The module, and with it numba, is imported only if a function is called whose machine code is not
-stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `prebuilt` finds the
-machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read `load`, `instantiate` and
-`KernelFunction` first.
+`load_compiled_module` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in
+which some imports are replaced. The module, and with it numba, is imported only if a function is called whose machine
+code is not stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code,
+`prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
+`load_compiled_module`, `instantiate` and `KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
 stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
@@ -442,7 +442,7 @@ def _evaluate(node: ast.expr, names: dict[str, object]):
     raise KeyError(ast.unparse(node))
 
 
-def load(module: str, report=None):
+def load_compiled_module(module: str, report=None):
     """Load a module of the package, whose compiled code is cached on disk.
 
     Parameters

@@ -172,14 +172,14 @@ def peak_integral(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _compute_moment(n: float, a: np.ndarray) -> np.ndarray:
-    """Return the expectation of (1 + z/a)^n for a standard normal variable z and large a.
+def _compute_moment(power: float, distance: np.ndarray) -> np.ndarray:
+    """Return the expectation of (1 + z/distance)^power for a standard normal variable z and a large distance [1].
 
-    It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.
+    It is the sum of binom(power, 2k) (2k - 1)!! distance^-2k.
     """
-    out = np.zeros_like(a)
-    term = np.ones_like(a)
+    out = np.zeros_like(distance)
+    term = np.ones_like(distance)
     for k in range(0, 24, 2):
         out += term
-        term = term * ((n - k) * (n - k - 1) / (k + 2)) / a**2
+        term = term * ((power - k) * (power - k - 1) / (k + 2)) / distance**2
     return out

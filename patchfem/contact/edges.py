@@ -172,7 +172,7 @@ def find_edges(
     return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
 
 
-def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[ContactEdge]:
+def place_edges(x, force, gap, force_rate, gap_rate, compute_offset) -> list[ContactEdge]:
     """Place the edges of a contact set between its nodes.
 
     Parameters
@@ -181,7 +181,7 @@ def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[Contac
         Positions [m], forces [N] and gap under load [m].
     force_rate, gap_rate : (m,) ndarray
         Increase of the forces [N/m] and decrease of the gaps per approach.
-    find_offset : callable
+    compute_offset : callable
         Function of the last node, the lengths [m] of its cells inside and outside, and the fraction of the latter
         that returns the inward offset [m] of the edge.
 
@@ -200,13 +200,13 @@ def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[Contac
             force[node], force_rate[node], gap[outside], gap_rate[outside]
         )
         cell = x[outside] - x[node]
-        offset = find_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
+        offset = compute_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
         position = x[node] + fraction * cell - side * offset
         edges.append(ContactEdge(node, side, fraction, float(position)))
     return edges
 
 
-def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
+def snap_to_steps(edges: list[ContactEdge], x, gap, step_positions) -> list[ContactEdge]:
     """Move a contact edge to a step at which the gap opens if it is less than one cell away from it.
 
     Parameters
@@ -215,13 +215,13 @@ def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
         Edges of one contact set.
     x, gap : (m,) ndarray
         Positions [m] and gap of the unloaded surfaces [m].
-    jumps : sequence
+    step_positions : sequence
         Positions of the steps [m], each at a node.
     """
     moved_edges = []
     for edge in edges:
         for node in (edge.node, edge.node + edge.side):
-            is_step = 0 < node < x.size - 1 and x[node] in jumps
+            is_step = 0 < node < x.size - 1 and x[node] in step_positions
             if is_step and gap[node + edge.side] > gap[node - edge.side]:
                 cell = x[edge.node + edge.side] - x[edge.node]
                 change = (x[node] - edge.position) / cell
@@ -329,16 +329,16 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
     return stiffness
 
 
-def parabola_change(shift: float, gain: float, loss: float) -> float:
+def parabola_change(edge_shift: float, gain: float, loss: float) -> float:
     """Return the change of a stiffness with the place of a contact edge, interpolated by a parabola.
 
     The change is `gain` at a shift of 1, -`loss` at -1 and 0 at 0.
 
     Parameters
     ----------
-    shift : float or ndarray
+    edge_shift : float or ndarray
         Shift of the edge from the middle of a cell, in cells.
     gain, loss : float or ndarray
         Increase of the stiffness by one node more in contact, and decrease by one node less [N/m] or [N m/rad].
     """
-    return shift * (gain + loss) / 2 + shift**2 * (gain - loss) / 2
+    return edge_shift * (gain + loss) / 2 + edge_shift**2 * (gain - loss) / 2

@@ -5,7 +5,7 @@ closing d [m] and rotation t [rad]. The unknowns y of a set are the forces of it
 the gaps of the others. The linear complementarity problem w = b + t x - d + C f then reads
 y = R (1, d, t). A node that enters or leaves the set is a principal pivot of the tableau [T | R].
 
-A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so a state on a stored
+A set is stored under a 64-bit hash, the exclusive or of the hashes of its nodes, so a state on a stored
 set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block
 pivoting), and after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive
 definite C (Murty, Opsearch 11, 1974). `sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored
@@ -221,7 +221,7 @@ def take_slot(sets):
     A slot is a row of the arrays of `sets.stored`. A set that loses its slot also leaves the list of sets of equal hash.
     """
     stored = sets.stored
-    n_slots = stored.names.size
+    n_slots = stored.hashes.size
     slot = sets.counters[STORED_COUNT_INDEX]
     if slot < n_slots:
         sets.counters[STORED_COUNT_INDEX] += 1
@@ -234,7 +234,7 @@ def take_slot(sets):
     sets.counters[OLDEST_SLOT_INDEX] = (slot + 1) % n_slots
 
     # The set that the slot holds leaves the chain of its hash
-    bucket = stored.names[slot] & (stored.heads.size - 1)
+    bucket = stored.hashes[slot] & (stored.heads.size - 1)
     k = stored.heads[bucket]
     if k == slot:
         stored.heads[bucket] = stored.links[slot]
@@ -246,7 +246,7 @@ def take_slot(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store_set(sets, name):
+def store_set(sets, set_hash):
     """Store the contact set to which the tableau is pivoted.
 
     Parameters
@@ -255,7 +255,7 @@ def store_set(sets, name):
         Its `stored` gets the nodes in contact (m,), forces [N] or gaps [m] of all nodes per unit of 1, of the closing
         d and of the rotation t (3, m), and the six coefficients of the energy [J] as a quadratic function of d and t
         (`EnergyTerm`).
-    name : int
+    set_hash : int
         64-bit hash of the set.
 
     Returns
@@ -294,8 +294,8 @@ def store_set(sets, name):
             energy[EnergyTerm.BY_TT] -= by_t * sets.x[i]
 
     # The set becomes the first one in the chain of its hash
-    stored.names[slot] = name
-    bucket = name & (stored.heads.size - 1)
+    stored.hashes[slot] = set_hash
+    bucket = set_hash & (stored.heads.size - 1)
     stored.links[slot] = stored.heads[bucket]
     stored.heads[bucket] = slot
     return slot
@@ -315,29 +315,29 @@ def pivot_to_target(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def build_set(sets, name):
+def build_set(sets, set_hash):
     """Pivot the tableau to its target contact set, store the set, and return its slot.
 
     If the tableau has lost its digits, it is computed anew and pivoted once more. The slot is -1 if the compliance is
-    not positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. `name` is the 64-bit
+    not positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. `set_hash` is the 64-bit
     hash of the set.
     """
     if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
         reset_tableau(sets)
         if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
-    return store_set(sets, name)
+    return store_set(sets, set_hash)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_stored(sets, name):
+def find_stored(sets, set_hash):
     """Return the slot in which the target contact set is stored, or -1.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
         Preloaded interface with its stored contact sets.
-    name : int
+    set_hash : int
         Hash of the target set. Different sets may have equal hashes, so that sets are also compared node by node.
 
     Returns
@@ -345,9 +345,9 @@ def find_stored(sets, name):
     int
     """
     stored = sets.stored
-    slot = stored.heads[name & (stored.heads.size - 1)]
+    slot = stored.heads[set_hash & (stored.heads.size - 1)]
     while slot >= 0:
-        if stored.names[slot] == name:
+        if stored.hashes[slot] == set_hash:
             is_equal = True
             for i in range(sets.x.size):
                 if stored.in_contact[slot, i] != sets.tableau.target[i]:
@@ -434,7 +434,7 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
         Hash of the new set, by which `find_stored` looks it up.
     """
     stored = sets.stored
-    name = stored.names[slot]
+    set_hash = stored.hashes[slot]
     is_searching = True
     for i in range(sets.x.size):
         in_contact = stored.in_contact[slot, i]
@@ -442,10 +442,10 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
         value += stored.unknowns[slot, 2, i] * t
         is_violated = is_searching and value < (bounds.min_force if in_contact else bounds.min_gap)
         if is_violated:
-            name ^= stored.node_names[i]
+            set_hash ^= stored.node_hashes[i]
             is_searching = not is_single
         sets.tableau.target[i] = in_contact != is_violated
-    return name
+    return set_hash
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -476,17 +476,17 @@ def find_set(sets, slot, d, t):
         if holds:
             return slot
         is_single = count >= N_BLOCK_EXCHANGES
-        name = exchange_violating_nodes(sets, slot, d, t, bounds, is_single)
-        slot = find_stored(sets, name)
+        set_hash = exchange_violating_nodes(sets, slot, d, t, bounds, is_single)
+        slot = find_stored(sets, set_hash)
         if slot < 0:
-            slot = build_set(sets, name)
+            slot = build_set(sets, set_hash)
         if slot < 0:
             return slot
     return -1
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def build_first_set(sets, name):
+def build_first_set(sets, set_hash):
     """Compute the target contact set from an empty tableau, and return its slot.
 
     The slot is -1 if the compliance is not positive definite on the set.
@@ -495,11 +495,11 @@ def build_first_set(sets, name):
     ----------
     sets : set_arrays.SetArrays
         Preloaded interface with its stored contact sets.
-    name : int
+    set_hash : int
         Hash of the target set.
     """
     reset_tableau(sets)
-    return build_set(sets, name)
+    return build_set(sets, set_hash)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -177,7 +177,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return slot
 
         # The set beyond the border. It may be stored in the slot of the set before the border.
-        name = sets.stored.names[slot]
+        set_hash = sets.stored.hashes[slot]
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
         next_slot = find_set(sets, slot, d, rotation + beyond * rotation_change)
@@ -185,7 +185,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return next_slot
 
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
-        if sets.stored.names[next_slot] == name:
+        if sets.stored.hashes[next_slot] == set_hash:
             border_step *= 10
             start = beyond
         else:

@@ -296,23 +296,23 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
     return selected
 
 
-def _merge_nodes(parts) -> np.ndarray:
+def _merge_nodes(node_arrays) -> np.ndarray:
     """Return the different nodes of several arrays of nodes, sorted.
 
     `np.unique` takes several times as long for few nodes.
     """
-    nodes = np.sort(np.concatenate(parts, axis=None))
+    nodes = np.sort(np.concatenate(node_arrays, axis=None))
     return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
 
 
-def _assemble_cells(blocks, order, position) -> np.ndarray:
+def _assemble_cells(blocks, nodes_in_order, position) -> np.ndarray:
     """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
 
-    `blocks` are the cells by element, `order` (k,) are the nodes, and `position` (N + 1,) is a workspace for the places
-    of all N nodes in `order`.
+    `blocks` are the cells by element, `nodes_in_order` (k,) are the nodes, and `position` (N + 1,) is a workspace for
+    the places of all N nodes in `nodes_in_order`.
     """
-    position[order] = np.arange(order.size)
-    size = 2 * order.size
+    position[nodes_in_order] = np.arange(nodes_in_order.size)
+    size = 2 * nodes_in_order.size
     total = 0.0
     for nodes, matrices in blocks:
         unknowns = _number_unknowns(position[nodes])
@@ -345,14 +345,14 @@ def _number_unknowns(nodes) -> np.ndarray:
     )
 
 
-def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:
+def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, _Stiffness]:
     """Eliminate the own nodes of a part.
 
     With K its stiffness, K_oo = L L^T, W = L^-1 K_ob and the Schur complement S = K_bb - W^T W.
 
     Parameters
     ----------
-    own, boundary : (a,) and (b,) ndarray of int
+    own_nodes, boundary : (a,) and (b,) ndarray of int
         Nodes that are eliminated (o), and those that remain (b).
     matrix : (2 a + 2 b + 2, 2 a + 2 b + 2) ndarray
         Stiffness of the part [N/m per m] for the own nodes, the boundary and a last node with zeros.
@@ -364,20 +364,20 @@ def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:
     remaining : _Stiffness
         S of the boundary.
     """
-    size = 2 * own.size
+    size = 2 * own_nodes.size
     own_boundary = matrix[:size, size:].copy()
     remaining = matrix[size:, size:].copy()
     factor = matrix[:size, :size].copy()
     smallest_pivot = 1.0
     # The coupling W and the remaining stiffness S overwrite their terms
-    if own.size:
+    if own_nodes.size:
         factor, smallest_pivot = _factorise(factor)
         # The arrays are passed transposed, because LAPACK stores columns.
         coupling = own_boundary.T
         dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
         dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
 
-    front = Front(own, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
+    front = Front(own_nodes, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
     return front, _Stiffness(boundary, remaining)
 
 

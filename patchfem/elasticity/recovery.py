@@ -129,12 +129,12 @@ class Patches(NamedTuple):
         return self.cell[np.arange(owner.size) + first], owner
 
 
-def collect_patches(point, cell) -> Patches:
+def collect_patches(points, cells) -> Patches:
     """Group pairs of a point and a cell near it by point, each pair once.
 
-    `point` and `cell` (e,) are the numbers of both. All weights are 1.
+    `points` and `cells` (e,) are the numbers of both. All weights are 1.
     """
-    keys = np.unique(np.asarray(point, np.int64) << 32 | cell)
+    keys = np.unique(np.asarray(points, np.int64) << 32 | cells)
     return Patches(keys >> 32, keys & 0xFFFFFFFF, np.ones(keys.size))
 
 

@@ -42,7 +42,7 @@ BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "
 BACKBONE_UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
 SENTENCE_NAMES = {"frequency": "frequency", "damping": "damping ratio"}
 # Significant digits in a sentence on the change of frequency or damping
-SENTENCE_DIGITS = {"frequency": 5, "damping": 3}
+CHANGE_DIGITS = {"frequency": 5, "damping": 3}
 # Largest relative change of a key that is said in percent.
 MAX_KEY_CHANGE_IN_PERCENT = 0.995
 
@@ -383,12 +383,13 @@ def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | 
     return int(np.argmax(score)) if np.any(score) else None
 
 
-def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
+def _describe_step(name: str, step: Quantity, values: list[float]) -> str:
     """Return the change of the frequency or of the damping ratio between two values as a clause.
 
-    `name` is "frequency" or "damping", `step` the change with its error, and `ends` are the first and last value [SI].
+    `name` is "frequency" or "damping", `step` the change with its error, and `values` are the first and the last
+    value [SI].
     """
-    texts = [format_quantity(value, BACKBONE_UNITS[name], SENTENCE_DIGITS[name]) for value in ends]
+    texts = [format_quantity(value, BACKBONE_UNITS[name], CHANGE_DIGITS[name]) for value in values]
     if abs(step.value) <= step.error:
         return f"keeps the {SENTENCE_NAMES[name]} at {texts[0]}"
     verb = "raises" if step.value > 0 else "lowers"

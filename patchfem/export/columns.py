@@ -123,10 +123,10 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
     return lists
 
 
-def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
+def _list_column(rows: list[Cells], column: Column, quantity_part: str = "value") -> Lists:
     """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
 
-    `rows` have the cells by name, and `part` of a quantity is "value", "low" or "high".
+    `rows` have the cells by name, and `quantity_part` of a quantity is "value", "low" or "high".
     """
     heading = column.heading
     cells = [row.get(column.name) for row in rows]
@@ -138,7 +138,7 @@ def _list_column(rows: list[Cells], column: Column, part: str = "value") -> List
     unit = heading.partition("[")[2].rstrip("]")
     if not unit and column.style != "bare" and sized[0].unit not in ("", "1"):
         heading = f"{heading} [{sized[0].unit}]"
-    numbers = [getattr(cell, part, None) for cell in cells]
+    numbers = [getattr(cell, quantity_part, None) for cell in cells]
     scale = CSV_UNITS_PER_SI_UNIT.get(unit, 1.0)
     return {heading: [None if cell is None else cell * scale for cell in numbers]}
 

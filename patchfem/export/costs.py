@@ -195,7 +195,7 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
 
 
 def _make_data(rows: list[Row], main: str) -> Variables:
-    """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too.
+    """Return the columns of cost.csv, one element for each run; the charts and the table of the page show them too.
 
     `rows` are runs with their judgements, and `main` is the name of the main measure.
     """

@@ -37,7 +37,7 @@ class Folder:
     """Results folder as a context manager, which is locked while files are written.
 
     `path` is the partial folder into which files are written. At exit without an error it replaces
-    an older folder; at exit with an error it is removed except for saved STATES. The next entry
+    an older folder; at exit with an error it is removed except for saved states (`is_state_file`). The next entry
     keeps these states if `resume` is set; otherwise it deletes them and says so in the sentence
     `dropped`.
 
@@ -174,7 +174,9 @@ def list_states(folder: Path) -> list[Path]:
     return [path for path in folder.glob("*.npz") if is_state_file(path.name)]
 
 
-def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
+def refuse_others(
+    folder: Path, user_path, allowed_names, description: str, allows_dot_names: bool = False
+) -> None:
     """Raise PatchfemError if a path is not a folder, or if the folder contains files of another kind.
 
     Parameters
@@ -183,11 +185,11 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
         The path, which may not exist.
     user_path : Path
         The path as the user named it.
-    allowed : container of str
+    allowed_names : container of str
         Names of files that are allowed.
-    kind : str
+    description : str
         What these files are, in words.
-    dots : bool
+    allows_dot_names : bool
         Whether names that start with a dot are allowed.
     """
     if not folder.exists():
@@ -199,12 +201,12 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
     other_files = sorted(
         path.name
         for path in folder.iterdir()
-        if path.name not in allowed
+        if path.name not in allowed_names
         and not (is_partial_name(path.name) or is_state_file(path.name))
-        and not (dots and path.name.startswith("."))
+        and not (allows_dot_names and path.name.startswith("."))
     )
     if other_files:
         raise PatchfemError(
-            f"{user_path}: {folder.name} contains files that are not {kind} "
+            f"{user_path}: {folder.name} contains files that are not {description} "
             f"({', '.join(other_files[:3])}{', ...' if len(other_files) > 3 else ''}); choose another -o"
         )

@@ -235,7 +235,7 @@ def format_quantity(name: str, quantity: Quantity) -> str:
 
 
 def _find_digits(name: str) -> int | None:
-    """Return the number of digits of a quantity without an error; None for a measure of a run, which has all digits."""
+    """Return the number of digits to show of a quantity without an error; None for a measure of a run: all digits."""
     if name in QUANTITIES:
         return QUANTITIES[name].digits
     base_name = rows.remove_interface_number(name)

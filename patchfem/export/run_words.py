@@ -275,7 +275,7 @@ def _describe_stuck_outcome(measures: Quantities) -> str:
     return _describe_no_slip(has_patch, "cycles")
 
 
-def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -> str:
+def _describe_place(contact: JsonObject | None, sentence_form: str = "In contact: {}.") -> str:
     """Return where the contact is along x, such as "x = -6.35 to -3.56 mm"; "" if all of the length is in contact."""
     if not contact or not contact["stretches"]:
         return ""
@@ -291,7 +291,7 @@ def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -
         f"{format_number(start * scale, 4)} to {format_number(end * scale, 4)}"
         for start, end in stretches
     ]
-    return form.format(f"{count}x = {' and '.join(texts)} {unit}")
+    return sentence_form.format(f"{count}x = {' and '.join(texts)} {unit}")
 
 
 def _describe_readings(readings: Iterable[JsonObject]) -> str:
@@ -373,7 +373,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
 
 
 def _format_measure(name: str, measures: Quantities) -> str:
-    """Return a measure as text with its error."""
+    """Return a measure as text with its error, such as "14.808 ± 0.041 um"."""
     return quantities.format_quantity(name, measures[name])
 
 
@@ -412,7 +412,7 @@ def _describe_decay(decay) -> str:
     return f"It decays with {', with '.join(parts)}."
 
 
-def describe_rest(time, output, error: float = 0.0, last: float | None = None) -> str:
+def describe_rest(time, output, error: float = 0.0, last_amplitude: float | None = None) -> str:
     """Describe where and when a released motion comes to rest, or how it moves at the end.
 
     Parameters
@@ -421,7 +421,7 @@ def describe_rest(time, output, error: float = 0.0, last: float | None = None) -
         Stored samples with all reversals [s], [m].
     error : float
         Error of the amplitude [m]; an output that moves by no more is at rest.
-    last : float, optional
+    last_amplitude : float, optional
         Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
@@ -429,7 +429,7 @@ def describe_rest(time, output, error: float = 0.0, last: float | None = None) -
     rest_limit = max(error, MAX_REST_DEVIATION * abs(end), ZERO_POSITION_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
-    amplitude = amplitude if last is None else min(last, amplitude)
+    amplitude = amplitude if last_amplitude is None else min(last_amplitude, amplitude)
     if amplitude > rest_limit:
         end_time = format_quantity(time[-1], "s", 3)
         return f"still moves with an amplitude of {format_length(amplitude, 3)} after {end_time}"

@@ -381,26 +381,26 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
         )
 
 
-def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
+def _check_touching_nodes(mesh: PieceMesh, border_edges, side: str) -> None:
     """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
 
-    The rows of `border` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
+    The rows of `border_edges` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
     """
     # Only nodes within half the length of an edge from its middle can lie on it
-    nodes = np.unique(border)
-    start = mesh.points[border[:, 0]]
-    along = mesh.points[border[:, 1]] - start
+    nodes = np.unique(border_edges)
+    start = mesh.points[border_edges[:, 0]]
+    along = mesh.points[border_edges[:, 1]] - start
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
     nearby_nodes = tree.query_ball_point(start + along / 2, length / 2 * (1 + 1e-9))
-    edge = np.repeat(np.arange(len(border)), [len(neighbours) for neighbours in nearby_nodes])
+    edge = np.repeat(np.arange(len(border_edges)), [len(neighbours) for neighbours in nearby_nodes])
     node = nodes[np.concatenate(nearby_nodes).astype(int)]
 
     # The area that edge and node span is 0 where the node lies on the edge
     offset = mesh.points[node] - start[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
     is_touching = np.abs(area) <= EQUAL_LENGTH_TOL * mesh.length * length[edge]
-    is_touching &= (border[edge] != node[:, None]).all(axis=1)
+    is_touching &= (border_edges[edge] != node[:, None]).all(axis=1)
 
     if is_touching.any():
         x, y = mesh.points[node[np.argmax(is_touching)]]

@@ -81,24 +81,24 @@ class Deck:
 
     def _add_numbered(
         self,
-        known: dict[int, object],
-        new: list[tuple[int, object]],
+        contents: dict[int, object],
+        numbered_entries: list[tuple[int, object]],
         kind: str,
         parameters: dict[str, str],
     ) -> None:
-        """Add numbered nodes or elements to the known ones.
+        """Add nodes or elements, a list of number and content, to the `contents` by number.
 
-        PatchfemError is raised for a number given twice. `new` lists number and content. If the `parameters` of the
-        block name a set of this `kind` ("NSET" or "ELSET"), the numbers become members of it.
+        PatchfemError is raised for a number given twice. If the `parameters` of the block name a set of this `kind`
+        ("NSET" or "ELSET"), the numbers of the `numbered_entries` become members of it.
         """
-        for number, content in new:
-            if number in known:
+        for number, content in numbered_entries:
+            if number in contents:
                 name = "node" if kind == "NSET" else "element"
                 raise PatchfemError(f"{name} {number} is given twice")
-            known[number] = content
+            contents[number] = content
         if kind in parameters:
             members = self.sets[kind].setdefault(parameters[kind].lower(), [])
-            members += [number for number, _ in new]
+            members += [number for number, _ in numbered_entries]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
         """Return the numbers of the nodes or elements in a set, which may contain other sets.

@@ -54,33 +54,34 @@ class Element(NamedTuple):
         ]
         return ShapeFunctions(self._monomials(points, 0, 0) @ to_nodes, np.stack(slopes, axis=1))
 
-    def _monomials(self, points, order_x: int, order_y: int) -> np.ndarray:
+    def _monomials(self, points, x_derivative: int, y_derivative: int) -> np.ndarray:
         """Return the monomials (g, k) at points (g, 2), or their derivatives.
 
-        They are differentiated once along x or y if `order_x` or `order_y` is 1, and not if it is 0.
+        They are differentiated once along x or y if `x_derivative` or `y_derivative` is 1, and not if it is 0.
         """
         out = np.ones((len(points), len(self.powers)))
-        for axis, order in enumerate((order_x, order_y)):
+        for axis, order in enumerate((x_derivative, y_derivative)):
             power = self.powers[:, axis]
             factor = power if order else 1
             out *= factor * points[:, [axis]] ** np.maximum(power - order, 0)
         return out
 
 
-def _make_element(corners, powers, rule, has_centre: bool = False) -> Element:
+def _make_element(corners, exponents, quadrature, has_centre: bool = False) -> Element:
     """Return an element from its corners.
 
-    With more monomials than corners it has mid-edge nodes. `powers` (k, 2) are the exponents of the monomials, `rule`
-    the points and weights of the integration, and an element with `has_centre` has one more node at the origin.
+    With more monomials than corners it has mid-edge nodes. `exponents` (k, 2) are those of the monomials along both
+    coordinates, `quadrature` the points and weights of the integration, and an element with `has_centre` has one more
+    node at the origin.
     """
     nodes = np.array(corners, float)
-    if len(powers) > len(corners):
+    if len(exponents) > len(corners):
         middles = (nodes + np.roll(nodes, -1, axis=0)) / 2
         nodes = np.concatenate([nodes, middles])
     if has_centre:
         nodes = np.concatenate([nodes, np.zeros((1, 2))])
-    points, weights = rule
-    return Element(len(corners), nodes, np.array(powers), np.array(points), np.array(weights))
+    points, weights = quadrature
+    return Element(len(corners), nodes, np.array(exponents), np.array(points), np.array(weights))
 
 
 def _square_rule(count: int) -> tuple[list, list]:

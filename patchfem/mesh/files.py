@@ -71,8 +71,8 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         meshio.write(partial, mesh, **options)
 
 
-def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
-    """Join the meshes `lower` and `upper` of a pair, the lower piece at y <= 0 and first.
+def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]]:
+    """Join the meshes `lower_piece` and `upper_piece` of a pair, the lower piece at y <= 0 and first.
 
     Both are `PieceMesh`, whose second coordinate is the depth below the interface.
 
@@ -86,7 +86,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
     cells = {}
     lines = []
     n_points = 0
-    for side, sign, body in (("lower", -1.0, lower), ("upper", 1.0, upper)):
+    for side, sign, body in (("lower", -1.0, lower_piece), ("upper", 1.0, upper_piece)):
         # Cells of a kind, with the numbers of their nodes among those of both pieces
         n_cells = 0
         for kind, nodes in body.blocks.items():

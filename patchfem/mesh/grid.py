@@ -213,15 +213,15 @@ class TensorGrid:
 
 
 def compute_row_heights(
-    start: float, total: float, growth: float = COLUMN_LENGTH_RATIO, min_rows: int = 1
+    first_height: float, total_height: float, growth: float = COLUMN_LENGTH_RATIO, min_rows: int = 1
 ) -> np.ndarray:
     """Compute heights of rows that grow with a constant ratio and add up to a total.
 
     Parameters
     ----------
-    start : float
+    first_height : float
         Height of the first row [m], or a little less.
-    total : float
+    total_height : float
         Sum of the heights [m].
     growth : float
         Largest ratio of successive heights, above 1.
@@ -233,10 +233,12 @@ def compute_row_heights(
     (ny,) ndarray
         Heights [m], the smallest first.
     """
-    start = min(start, total / min_rows)
-    n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
-    if n_rows * start >= total * (1 - 1e-12):
-        return np.full(n_rows, total / n_rows)
+    first_height = min(first_height, total_height / min_rows)
+    n_rows = max(
+        min_rows, ceil(log(1 + total_height * (growth - 1) / first_height) / log(growth) - 1e-9)
+    )
+    if n_rows * first_height >= total_height * (1 - 1e-12):
+        return np.full(n_rows, total_height / n_rows)
     # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
     powers = np.arange(n_rows)
     next_ratio = growth * (1 + 1e-6) + 1e-6
@@ -244,14 +246,14 @@ def compute_row_heights(
     while next_ratio < ratio:
         ratio = next_ratio
         rows = ratio**powers
-        derivative = start * (powers[1:] @ rows[:-1])
-        next_ratio = ratio - (start * rows.sum() - total) / derivative
-    rows = start * ratio**powers
-    return rows * (total / rows.sum())
+        derivative = first_height * (powers[1:] @ rows[:-1])
+        next_ratio = ratio - (first_height * rows.sum() - total_height) / derivative
+    rows = first_height * ratio**powers
+    return rows * (total_height / rows.sum())
 
 
 def make_graded_grid(
-    length: float, height: float, element_size: float, coating: float = 0.0
+    length: float, height: float, element_size: float, coating_thickness: float = 0.0
 ) -> TensorGrid:
     """Make the grid of a piece with equal columns, whose rows grow with the distance from both faces.
 
@@ -264,7 +266,7 @@ def make_graded_grid(
         Size of the piece [m].
     element_size : float
         Width of the columns [m], or a little more.
-    coating : float
+    coating_thickness : float
         Thickness of the coating [m].
 
     Returns
@@ -278,15 +280,16 @@ def make_graded_grid(
 
     # The stress is singular at the ends of the far face, so that the rows are short there as well.
     bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
-    if coating > 0:
-        bands.append((coating, coating, min(reference_cell, coating / N_COATING_ROWS)))
+    if coating_thickness:
+        coating_row = min(reference_cell, coating_thickness / N_COATING_ROWS)
+        bands += [(coating_thickness, coating_thickness, coating_row)]
     max_row = height / MIN_PIECE_ROWS
     rows = Layout(
         0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_HEIGHT_GROWTH
     ).scale_cells(scale)
 
     x = np.linspace(-length / 2, length / 2, n_columns + 1)
-    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating))
+    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating_thickness))
 
 
 def compute_row_scale(n_columns: int) -> float:

@@ -215,7 +215,7 @@ def raise_order(
     points,
     blocks: dict[str, np.ndarray],
     tagged: list[np.ndarray],
-    kinds: dict[str, str] = SECOND_ORDER_NAMES,
+    second_order_names: dict[str, str] = SECOND_ORDER_NAMES,
 ) -> tuple[np.ndarray, dict[str, np.ndarray], list[np.ndarray]]:
     """Add the nodes of elements of second order to cells of first order.
 
@@ -229,7 +229,7 @@ def raise_order(
         Cells (t, n) by the name of their element.
     tagged : list of (N,) bool ndarray
         Whether each point has each tag.
-    kinds : dict
+    second_order_names : dict
         Elements of second order by those of first order.
 
     Returns
@@ -252,10 +252,10 @@ def raise_order(
     for kind, corners in blocks.items():
         nodes = [corners, middles[n_edges : n_edges + corners.size].reshape(corners.shape)]
         n_edges += corners.size
-        if kinds[kind] == "quad9":
+        if second_order_names[kind] == "quad9":
             nodes.append(len(points) + np.arange(len(corners))[:, None])
             points = np.concatenate([points, corner_points[corners].mean(axis=1)])
-        out[kinds[kind]] = np.concatenate(nodes, axis=1)
+        out[second_order_names[kind]] = np.concatenate(nodes, axis=1)
     return points, out, _tag_inner_points(tagged, len(points))
 
 

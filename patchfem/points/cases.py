@@ -79,7 +79,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
-    compiled.load("points.case_kernels").march_cases(
+    compiled.load_compiled_module("points.case_kernels").march_cases(
         steps, make_responses(columns, steps), cases.parameters, cases.numbers,
         cases.memory.copy(), now, seen, history,
     )  # fmt: skip

@@ -469,7 +469,7 @@ def _make_no_sets():
 
 def _press_first(system: System, contact: Contact) -> None:
     """Find the contact set at the start."""
-    press = compiled.load("contact.press_kernels")
+    press = compiled.load_compiled_module("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
     heave, pitch = (

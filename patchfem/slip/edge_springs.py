@@ -16,7 +16,7 @@ MIN_SPRING_COMPLIANCE_RATIO = -0.5
 MAX_SPRING_COMPLIANCE_RATIO = 1e6
 
 
-def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: float) -> np.ndarray:
+def add_edge_springs(compliance: np.ndarray, is_loaded: np.ndarray, stiffness: float) -> np.ndarray:
     """Return a compliance matrix with springs at the edges of the contact.
 
     With the loaded nodes stuck, the sum of the nodal forces per displacement is K(c) = K - sum_i q_i^2 c/(1 + c
@@ -28,7 +28,7 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     ----------
     compliance : (m, m) ndarray
         Tangential compliance of the nodes [m/N].
-    loaded : (m,) ndarray of bool
+    is_loaded : (m,) ndarray of bool
         Whether a node carries a normal force.
     stiffness : float
         Tangential stiffness in full stick [N/m].
@@ -38,12 +38,12 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     (m, m) ndarray
         Compliance with the springs [m/N].
     """
-    points = np.flatnonzero(loaded)
+    points = np.flatnonzero(is_loaded)
     inverse = np.linalg.inv(compliance[np.ix_(points, points)])
     forces = inverse.sum(axis=1)
     excess = forces.sum() - stiffness
     # Loaded nodes beside an unloaded one; the ends of the interface have no neighbour.
-    neighbours = np.pad(loaded, 1, mode="edge")
+    neighbours = np.pad(is_loaded, 1, mode="edge")
     is_edge = ~(neighbours[:-2] & neighbours[2:])[points]
     nodes = points[is_edge]
     scale = np.sqrt(compliance[nodes, nodes])

@@ -142,7 +142,8 @@ def _layer_states(
     nu = lam / (2 * (lam + mu))
     softness = scale / (2 * mu)
     states = np.empty((k.size, 4, 4))
-    # The first two solutions decay downwards, the others upwards.
+    # The first two solutions decay downwards, the others upwards. The first of each pair is the gradient of the harmonic
+    # function exp(-k z) cos(k x), the second one contains the factor k z.
     for first, sign, distance in ((0, 1.0, z), (2, -1.0, depth - z)):
         kz = k * distance
         ones = np.ones(k.size)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_banded
 
-from ...compiled import instantiate, load
+from ...compiled import instantiate, load_compiled_module
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
 from .series import find_harmonics
@@ -29,7 +29,7 @@ MAX_WAVES = 1000.0  # largest number of passed wavelengths for which the samples
 @cache
 def load_kernels(name: str, law: str):
     """Load the compiled functions of a module of this folder for the law of another module."""
-    return instantiate(f"dynamics.harmonic.{name}", {"law": load(law)})
+    return instantiate(f"dynamics.harmonic.{name}", {"law": load_compiled_module(law)})
 
 
 class FlowStates(NamedTuple):
@@ -123,7 +123,7 @@ class Jenkins(Law):
 
         # Rows: force, stiffness, and derivatives of the force by the slides at the reversals.
         out = np.zeros((2 + turns.size, q.size))
-        kernels = load("dynamics.harmonic.element_kernels")
+        kernels = load_compiled_module("dynamics.harmonic.element_kernels")
         kernels.follow_elements(self.stiffness, self.limit_slide, q, reversal_of_node, first, out)
         return LawForce(out[0], out[1], out[2:])
 

@@ -181,17 +181,17 @@ def _take_indices(data: Variables, dimension: str, indices: np.ndarray) -> Varia
 
 
 def _make_curves(
-    data: Variables, chart: Chart, name: str, own_x: str, axes: tuple[Axis, Axis]
+    data: Variables, chart: Chart, name: str, own_x_name: str, axes: tuple[Axis, Axis]
 ) -> list[Curve]:
     """Return the curves of a variable: one for each interface, case, code, or element of an overlay.
 
-    `name` is the variable, and `own_x` that against which it is drawn, or "" for the horizontal variable of the chart.
+    `name` is the variable, and `own_x_name` that against which it is drawn, or "" for the horizontal variable of the chart.
     The scales of `axes`, the horizontal and the vertical one, apply.
     """
-    own_x = own_x or _find_x(data, chart)
-    if not {name, own_x} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
+    own_x_name = own_x_name or _find_x(data, chart)
+    if not {name, own_x_name} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
         return []
-    x_values = _as_floats(data[own_x]) * axes[0].scale
+    x_values = _as_floats(data[own_x_name]) * axes[0].scale
     values = _as_floats(data[name])
     bands = _find_band(data, name)
     labels = [name.replace("_", " ")]

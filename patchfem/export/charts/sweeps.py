@@ -157,7 +157,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
 
 
 def make_menu(answers: Answers, chart: Chart) -> Panel | None:
-    """Return a panel for each measure against a key, between which a menu chooses."""
+    """Return the measures against a swept key, one panel each, with a menu that selects the panel to show."""
     names = list_measures(answers)
     return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
 
@@ -214,7 +214,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
 
 
 def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
-    """Return a map of each measure over two keys, between which a menu chooses."""
+    """Return the measures as maps over two swept keys, one panel each, with a menu that selects the panel to show."""
     view = view_sweep(next(iter(answers.values())))
     if len(answers) > 1 or len(view.others) != 1:
         return None

@@ -16,7 +16,7 @@ class Field(NamedTuple):
 
     - unit: SI unit.
     - shape: shape of one value.
-    - codes: meaning of each of its codes, in their order.
+    - codes: meanings of its codes 0, 1, ...; empty for a field of numbers.
     """
 
     unit: str

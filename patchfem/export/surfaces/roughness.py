@@ -168,7 +168,7 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
 
 
 def _format_main_parameters(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
-    """Return the main parameters as text; a mean without an interval has the range of the files."""
+    """Return the parameters of the headline as text; a mean without an interval has the range of the files."""
     parts = []
     names = next(names for names in HEADLINE_PARAMETERS if names[0] in values)
     for name in names:
@@ -183,9 +183,9 @@ def _format_main_parameters(values: dict[str, Quantity], members: list[Roughness
     return ", ".join(parts)
 
 
-def describe_treatment(each: RoughnessReport) -> str:
+def describe_treatment(roughness: RoughnessReport) -> str:
     """Return the sentence on size, form, window and filters of a measured surface."""
-    size, treatment = each.sampling, each.treatment
+    size, treatment = roughness.sampling, roughness.treatment
     shape = " x ".join(map(str, size.shape))
     text = f"{shape} heights over {format_length(size.length)}, every {format_length(size.step)}"
     text += f", about the least-squares {treatment.form}"
@@ -197,7 +197,7 @@ def describe_treatment(each: RoughnessReport) -> str:
         return (
             f"{text}, cut-off {format_length(treatment.cutoff)} (half of it trimmed at each end)."
         )
-    if each.kind == "areal":
+    if roughness.kind == "areal":
         return f"{text}, no L-filter."
 
     # the trace is longer than its last position by one sampling interval
@@ -206,13 +206,13 @@ def describe_treatment(each: RoughnessReport) -> str:
     return f"{text}; without a cut-off there is no roughness profile{advice and ', '}{advice}."
 
 
-def report_to_dict(each: RoughnessReport) -> JsonObject:
+def report_to_dict(roughness: RoughnessReport) -> JsonObject:
     """Return the roughness of a surface as an object of profile.json."""
-    size, treatment = each.sampling, each.treatment
-    has_interval = any(value.low is not None for value in each.values)
+    size, treatment = roughness.sampling, roughness.treatment
+    has_interval = any(value.low is not None for value in roughness.values)
     content = {
-        "file": each.source,
-        "kind": each.kind,
+        "file": roughness.source,
+        "kind": roughness.kind,
         "length": size.length,
         "step": size.step,
         "shape": size.shape,
@@ -221,19 +221,19 @@ def report_to_dict(each: RoughnessReport) -> JsonObject:
         "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        "measures": sentences.to_answers({value.name: value for value in each.values}),
-        "notes": each.notes,
+        "measures": sentences.to_answers({value.name: value for value in roughness.values}),
+        "notes": roughness.notes,
     }
-    if each.kind == "areal":
+    if roughness.kind == "areal":
         return content
-    return content | {"band": WAVE_BAND, "asperities": _find_moments(each)}
+    return content | {"band": WAVE_BAND, "asperities": _find_moments(roughness)}
 
 
-def _find_moments(each: RoughnessReport) -> dict | None:
+def _find_moments(roughness: RoughnessReport) -> dict | None:
     """Return what an asperity law needs of the waves below the cut-off: rms height, slope and curvature; None if flat."""
-    cutoff = each.treatment.cutoff
+    cutoff = roughness.treatment.cutoff
     try:
-        moments = peaks.trace_moments(each.surface.primary, cutoff)
+        moments = peaks.trace_moments(roughness.surface.primary, cutoff)
     except PatchfemError:
         return None
     values = {f"rms_{name}": value for name, value in moments.fine._asdict().items()}

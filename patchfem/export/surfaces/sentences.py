@@ -153,7 +153,7 @@ def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
 
 
 def describe_region(comparison: Comparison) -> str:
-    """Return what the mean worn depth is the mean of."""
+    """Return in words the part of the surface over which the worn depth is averaged, such as "the track"."""
     return "the common area" if comparison.is_areal else "the common length"
 
 
@@ -236,7 +236,7 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
 
 
 def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> dict[str, str]:
-    """Return the numbers of a finding as text by name."""
+    """Return the numbers of a finding as text by name; `is_areal` tells whether the surfaces are scans."""
     fields = defaultdict(lambda: MISSING_NUMBER_TEXT)
     for name, number in numbers.items():
         unit = FINDING_NUMBER_UNITS.get(name, "m")

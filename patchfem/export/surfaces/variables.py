@@ -43,7 +43,7 @@ def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
     return data
 
 
-def make_band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
+def make_band(dimension: str, name: str, values: np.ndarray, half_width: np.ndarray) -> Variables:
     """Return lengths with the ends of their band as the variables NAME, NAME_low and NAME_high.
 
     Parameters
@@ -52,7 +52,7 @@ def make_band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -
         Name of the dimension.
     name : str
         Name of the variable.
-    values, half : (n,) array
+    values, half_width : (n,) array
         Lengths, and half-widths of their band [m].
 
     Returns
@@ -60,7 +60,7 @@ def make_band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -
     dict of str to Variable
         The three variables.
     """
-    ends = {f"{name}_low": values - half, f"{name}_high": values + half}
+    ends = {f"{name}_low": values - half_width, f"{name}_high": values + half_width}
     return make_variables(dimension, **{name: values}, **ends)
 
 

@@ -193,7 +193,7 @@ class Folder:
 
     def __enter__(self) -> Folder:
         allowed = (CASES_FOLDER, CHUNKS_FOLDER, *SWEEP_FILES)
-        refuse_others(self.target, self.shown, allowed, "those of a sweep", dots=True)
+        refuse_others(self.target, self.shown, allowed, "those of a sweep", allows_dot_names=True)
         try:
             (self.target / CHUNKS_FOLDER).mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -147,7 +147,7 @@ def run_from_event_to_event(
     begin = perf_counter()
     joints = make_joints(model, numerics, patch)
     prepare = {"reduce": perf_counter() - begin}
-    compiled.load("hybrid.engine_kernels", say)
+    compiled.load_compiled_module("hybrid.engine_kernels", say)
     return LumpedEvaluator(model, numerics, patch, joints).solve(frames, progress, prepare)
 
 

@@ -35,7 +35,7 @@ neglect.
 SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.toml_text.MAX_SCENE_FILE_BYTES": "bytes of a scene file",
     "scene.rules.contact.MAX_INTERFACE_ELEMENTS": "number of elements along an interface that has element_size",
-    "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
+    "effects.MAX_RIG_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_SWEEP_CASES": "number of cases of a sweep",
     "inputs.tables.MAX_TABLE_BYTES": "bytes of a text file with a table",

@@ -72,7 +72,7 @@ class ShootingFinder:
         self.numerics = replace(
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
-        compiled.load("hybrid.engine_kernels", say)
+        compiled.load_compiled_module("hybrid.engine_kernels", say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
