@@ -448,7 +448,7 @@ def cost(
     ('200', True)
     """
     model = build(scene, **sets)
-    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
+    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)
@@ -652,7 +652,7 @@ def sweep(
     # the cases are those of the command line, whose words the answer names
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
-    request = parse_request.Request(ranges, None, draw, sobol, seed)
+    request = parse_request.CaseRequest(ranges, None, draw, sobol, seed)
     command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets, request.list_options())
     cases = replace(parse_request.read_cases(sweep_scene, request), command=command)
 

@@ -24,6 +24,7 @@ from .formatting import format_value
 
 __all__ = [
     "G_N",
+    "MIN_LOAD",
     "Compliance",
     "ContactState",
     "DriveSegment",
@@ -44,6 +45,7 @@ __all__ = [
 ]
 
 G_N = 9.80665  # standard gravity [m s-2]
+MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness of a friction law refers
 # relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
 _STIFFENING_ROUND_OFF = 1e-9
 # lower limit of the overlap of two mode shapes, which keeps its logarithm finite

@@ -347,9 +347,8 @@ EFFECTS = {
         "and found by Newton's method",
     ),
     "accuracy.method=harmonic": Effect(
-        "patchfem.dynamics.harmonic.equations",
-        "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
-        "exact motion from event to event, found so that it repeats after one period",
+        "patchfem.hybrid.periodic",
+        "the motion from event to event, found so that it repeats after one period of the drive",
     ),
     "wear": Effect(
         "patchfem.wear.depth",
@@ -522,7 +521,6 @@ REMEDIES = {  # advice by name, for two effects that cannot be combined
     "out": "leave out this entry",
     "linear": "use 'linear'",
     "march": "use 'march'",
-    "march or stiff": "use 'march', or law 'elastic-plastic' with a short bond_length",
     "stiff": "use law 'elastic-plastic' with a short bond_length, which approximates Coulomb friction",
 }
 

@@ -93,7 +93,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
-        "dynamics.harmonic.equations dynamics.harmonic.continuation dynamics.harmonic.steady "
+        "dynamics.harmonic.equations hybrid.continuation hybrid.periodic_curves "
         "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{

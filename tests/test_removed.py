@@ -130,6 +130,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(load, RIG, {"accuracy.convergence": 1e-6}),
         "use accuracy.method = 'march' without it",
     ),
+    "accuracy.harmonics": (
+        partial(load, RIG, {"accuracy.harmonics": 9}),
+        "leave it out: method 'harmonic' computes the motion over one period to the tolerance",
+    ),
     "friction.breakaway": (
         partial(load, RIG, {"friction.breakaway": 0.2}),
         "law 'iwan' or 'elastic-plastic' does not creep",

@@ -8,7 +8,7 @@ from ..export import run_folder, store
 from ..runs import plan
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     Output,
     OutputGroup,
@@ -99,7 +99,7 @@ def _end_run(answer, is_quiet: bool) -> None:
         return
     for text in answer.remarks.warnings if is_quiet else ():
         print_message(f"warning: {text}")
-    raise CommandExit(NOT_CONVERGED)
+    raise CommandExit(NOT_CONVERGED_EXIT_CODE)
 
 
 def _report_missing_page(fault: BaseException, target: Path) -> None:

@@ -23,7 +23,8 @@ from .streams import make_printable
 if TYPE_CHECKING:
     from ..export.answer import Answer
 
-NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if some cases failed
+# Exit code if a numerical method did not converge, or if some cases failed
+NOT_CONVERGED_EXIT_CODE = 3
 
 
 def flag_option(text: str, *names: str) -> type:

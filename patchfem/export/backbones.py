@@ -4,7 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..campaigns.backbone.records import METHODS, VALUES, Backbone, Curve, match_amplitudes
+from ..campaigns.backbone.records import (
+    CURVE_METHODS,
+    CURVE_QUANTITIES,
+    Backbone,
+    Curve,
+    match_amplitudes,
+)
 from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
 from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
@@ -29,7 +35,7 @@ from .runs import make_origin
 # Columns of a curve and of its band, their units, and words for them in a sentence
 CURVE_COLUMNS = (
     "amplitude",
-    *(name + end for name in VALUES for end in ("", "_error")),
+    *(name + end for name in CURVE_QUANTITIES for end in ("", "_error")),
     "force_frequency",
 )
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
@@ -118,7 +124,7 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     curve = backbone.best
     if curve is not None:
         largest = int(np.argmax(curve.damping))
-        for name in VALUES:
+        for name in CURVE_QUANTITIES:
             out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
         out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
@@ -219,7 +225,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
     all_bands = [backbone.band for backbone in backbones]
-    for method in METHODS:
+    for method in CURVE_METHODS:
         bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
         if axis is not None:
@@ -337,7 +343,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     # differences at the common amplitudes, and the largest one
     start, end = first.best.at(here), last.best.at(there)
     changes = {}
-    for name in VALUES:
+    for name in CURVE_QUANTITIES:
         error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
         changes[name] = getattr(end, name) - getattr(start, name), error
     point = _find_largest_change([changes[name] for name in SENTENCE_NAMES])
@@ -349,7 +355,10 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     for name, (step, error) in changes.items():
         measures[f"{name}_change"] = Quantity(step[point], BACKBONE_UNITS[name], error[point])
 
-    ends = {name: [getattr(curve, name)[point] for curve in (start, end)] for name in VALUES}
+    ends = {
+        name: [_make_point_quantity(curve, name, point).value for curve in (start, end)]
+        for name in CURVE_QUANTITIES
+    }
     parts = [
         _describe_step(name, measures[f"{name}_change"], ends[name]) for name in SENTENCE_NAMES
     ]

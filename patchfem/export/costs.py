@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ..campaigns.cost import (
-    TOLERANCE,
+    TOLERANCE_SETTING,
     Accuracy,
     Cost,
     Judgement,
@@ -47,7 +47,7 @@ SCENE_JUDGEMENT_WORDS = {
 class Row(NamedTuple):
     """A run of a curve of cost, and its least accurate measure.
 
-    - knob: what varies along the curve: TOLERANCE, or the name of a numerical setting.
+    - knob: what varies along the curve: TOLERANCE_SETTING, or the name of a numerical setting.
     - run: the run.
     - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
       curve do not count.
@@ -69,7 +69,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     Parameters
     ----------
     curves : dict of str to list of Cost
-        The runs, from coarse to fine, by what varies: TOLERANCE, or the name of a numerical setting.
+        The runs, from coarse to fine, by what varies: TOLERANCE_SETTING, or the name of a numerical setting.
     model : Model
         Model of the scene as it is, which no run changes.
 
@@ -87,19 +87,19 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         knob_rows = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
         rows += knob_rows
         # the runs of a curve of tolerances have no tolerance in common
-        sentence = None if one == TOLERANCE else describe_best_setting(curve, tolerance)
+        sentence = None if one == TOLERANCE_SETTING else describe_best_setting(curve, tolerance)
         details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
-    if knob == TOLERANCE:
+    if knob == TOLERANCE_SETTING:
         chosen = next((run for run in runs if run.tolerance == tolerance), runs[-1])
     else:
         chosen = find_best_run(runs, tolerance)
     row = next(row for row in rows if row.run is chosen)
-    sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE else []
+    sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
-    advised = rows[: len(runs)] if knob == TOLERANCE else [row]
+    advised = rows[: len(runs)] if knob == TOLERANCE_SETTING else [row]
     notes = [f"{_describe_miss(one)}: {text}." for one in advised for text in one.run.remedies]
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import __version__
-from ..campaigns.fits.curve import EXTENT, FittedCurve
+from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
 from ..campaigns.fits.options import FitOptions
 from ..campaigns.fits.problem import FittedKeys, Listener
@@ -414,7 +414,7 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     for end, value in ends.items():
         points[f"depth_{end}".removesuffix("_value")] = ([value], "m")
     # the computed curve is drawn a little beyond the interval of the coefficient
-    coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
+    coefficients, depths = fit.curve[:, fit.curve[0] <= CURVE_EXTENSION_RATIO * fit.high]
     curve = {
         "curve_coefficient": (coefficients, WEAR_COEFFICIENT_UNIT),
         "curve_depth": (depths, "m"),

@@ -171,7 +171,7 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     # quantities of a sweep: limits of its key, and extremes of measures
     measure = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(measure)
-    definitions = ChainMap(QUANTITIES, patch_rows.TABLE, rows.TABLE)
+    definitions = ChainMap(QUANTITIES, patch_rows.PATCH_TABLE, rows.MOTION_TABLE)
     found = definitions.get(name) or definitions.get(measure) or definitions.get(base_name)
     return found and Definition(found.unit, found.text)
 
@@ -239,7 +239,7 @@ def _find_digits(name: str) -> int | None:
     if name in QUANTITIES:
         return QUANTITIES[name].digits
     base_name = rows.remove_interface_number(name)
-    if base_name in rows.TABLE or base_name in patch_rows.TABLE:
+    if base_name in rows.MOTION_TABLE or base_name in patch_rows.PATCH_TABLE:
         return None
     return SURFACE_QUANTITY_DIGITS if surface_definitions.find_surface_definition(name) else None
 
@@ -289,7 +289,7 @@ def _zero_limit(name: str, quantity: Quantity) -> float:
 
     It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
     """
-    table = patch_rows.TABLE if name in patch_rows.TABLE else rows.TABLE
+    table = patch_rows.PATCH_TABLE if name in patch_rows.PATCH_TABLE else rows.MOTION_TABLE
     row = table.get(rows.remove_interface_number(name))
     return quantity.floor if row is None else min(row.floor, quantity.floor)
 

@@ -18,7 +18,7 @@ from ..model import structure
 from ..response import spectrum
 from ..response.events import EVENT_KIND_NAMES
 from ..response.levels import LEVEL_MEASURES
-from ..response.rows import TABLE
+from ..response.rows import MOTION_TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
@@ -421,10 +421,10 @@ def _collect_levels(result: Result) -> Variables:
     }
     for name in LEVEL_MEASURES:
         if any(name in level.values for level in levels):
-            unit = TABLE[name].unit
+            unit = MOTION_TABLE[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, TABLE[name].text)
+            columns[f"level_{name}"] = (values, unit, MOTION_TABLE[name].text)
             columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
     data = make_columns("level", columns)
     data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))

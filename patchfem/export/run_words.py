@@ -17,7 +17,7 @@ from ..formatting import (
     format_quantity,
     format_value,
 )
-from ..response.outcome import OPEN_LOOP
+from ..response.outcome import OPEN_LOOP_MESSAGE
 from ..response.rows import remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
@@ -155,7 +155,7 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
         return []
     if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
         text += " (mean of the last cycles)"
-    if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
+    if any(warning.startswith(OPEN_LOOP_MESSAGE) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"

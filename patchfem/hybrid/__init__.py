@@ -28,6 +28,8 @@ A module imports its own entry of this list and the entries before it:
 11. `measures`        measures of the window, energies
 12. `runs`            runs with errors and histories
 13. `periodic`        periodic motions by shooting
+14. `continuation`    curves of solutions through folds
+15. `periodic_curves` curves of periodic motions
 
 Limits. The method is explicit: a law or mode that is 1e4 times faster than the drive takes as many more steps, and a
 run ends with a message after `cases.MAX_STEPS`. Margins are evaluated at three points of a step and at nearly

@@ -11,8 +11,11 @@ import numpy as np
 from .. import compiled
 from ..core import NotConverged
 from .cases import Case, make_arrays
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State, Status
-from .runs import Motion, describe_end, run_case
+from .laws import LAWS, masing
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State, Status
+from .runs import MESSAGES, Motion, run_case
+
+MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
@@ -24,6 +27,9 @@ MAX_RELAXED = 200  # largest number of these cycles
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
 MAX_KINKED_CHANGE = 1e-6
+# Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds; corrections
+# are exact to MAX_KINKED_CHANGE.
+MAX_FORCE_RATIO = 1 + 10 * MAX_KINKED_CHANGE
 N_CHECKED = 10  # periods that such a motion is followed
 CHECK_FACTOR = 10.0  # largest distance after these periods, relative to the change of a period that counts as none
 # Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
@@ -38,12 +44,14 @@ N_GROWTH_CYCLES = (
 MIN_SIZE_RATIO = (
     1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
 )
+SEARCH_STEPS_RATIO = (
+    3.0  # steps of the search for a periodic motion beside them, relative to theirs
+)
 # Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
 # are used again. The ratio is about the relative change of the derivatives.
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
-N_MEMORY_CYCLES = 3  # cycles in which the laws take the memory of a motion from another method
 
 
 class PeriodicMotion(NamedTuple):
@@ -80,6 +88,7 @@ def find_periodic_motion(
     n_first: int = N_FIRST_CYCLES,
     start: State | None = None,
     has_kinks: bool = False,
+    is_undamped: bool = False,
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -94,15 +103,65 @@ def find_periodic_motion(
     has_kinks : bool
         Whether a law has many elements, so that a change of MAX_KINKED_CHANGE counts as none. The derivatives of the
         map are then those between two kinks; stability and error follow from N_CHECKED periods of the motion itself.
+    is_undamped : bool
+        Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
+        because the periods of a growing motion would lead nowhere.
+
+    Raises
+    ------
+    NotConverged
+        If the search needs too many steps.
     """
-    shooting = _Shooting(case)
+    growth = _measure_growth(case) if is_undamped and start is None else None
+    shooting = Shooting(case)
     if start is not None:
         shooting.state = start
+    if growth is None or not growth.size:
+        motion = _search(shooting, n_first, MAX_RELAXED, has_kinks=has_kinks)
+    else:
+        # A growing motion leads nowhere, so that the search beside it is short.
+        shooting.limit_steps(SEARCH_STEPS_RATIO * growth.n_steps)
+        try:
+            motion = _search(shooting, n_first, N_RELAXED, has_kinks=has_kinks)
+        except NotConverged:
+            shooting = Shooting(case)
+            before = shooting.state
+            shooting.relax(1)
+            change = shooting.measure_change(before)
+            run = run_case(shooting.case)
+            motion = PeriodicMotion(run, change, np.inf, 0.0, np.zeros(0), shooting.period, 1)
+
+    # A periodic motion far beyond the growing one is never reached.
+    has_converged = motion.change < motion.tolerance
+    largest = np.abs(motion.multipliers).max(initial=0.0)
+    if has_converged and largest <= 1 - UNDAMPED_TOL:
+        return motion
+    growth = growth or _measure_growth(case)
+    size = shooting.find_size(motion.run.final) if has_converged else np.inf
+    return motion._replace(grows=bool(growth.size and size > MIN_SIZE_RATIO * growth.size))
+
+
+def _search(
+    shooting: "Shooting", n_first: int, max_relaxed: int, *, has_kinks: bool
+) -> PeriodicMotion:
+    """Return the motion with the smallest change over a period, and its multipliers.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        Map of a period and the state from which the search begins.
+    n_first : int
+        Number of first cycles.
+    max_relaxed : int
+        Largest number of cycles after a correction that did not help.
+    has_kinks : bool
+        As in `find_periodic_motion`.
+    """
     shooting.relax(n_first - 1)
-    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    tolerance = MAX_CHANGE * float(shooting.case.rig.settings[Setting.RTOL])
     if has_kinks:
         tolerance = max(tolerance, MAX_KINKED_CHANGE)
-    before, change = shooting.converge(tolerance)
+    before, change = shooting.converge(tolerance, max_relaxed)
     if has_kinks:
         multipliers, error = shooting.check(before, tolerance)
     else:
@@ -118,74 +177,36 @@ def find_periodic_motion(
 
     # The measures are those of a period from there on.
     run = run_case(shooting.case, start=before)
-    largest = np.abs(multipliers).max(initial=0.0)
-    has_converged = change < tolerance
-    may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
-    size = np.abs(before.y[: 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
     return PeriodicMotion(
-        run,
-        change,
-        error,
-        tolerance,
-        multipliers,
-        shooting.period,
-        shooting.n_periods,
-        grows=may_grow and _grows_for_ever(case, size),
+        run, change, error, tolerance, multipliers, shooting.period, shooting.n_periods
     )
 
 
-def find_multipliers(case: Case, modal_state) -> np.ndarray:
-    """Return the Floquet multipliers (k,) of a motion that another method has found, in decreasing magnitude.
+class _Growth(NamedTuple):
+    """Motion from the start of a case that may grow for ever.
 
-    Its modes are those of the other method at the start of each of N_MEMORY_CYCLES periods, in which the laws take the
-    memory of the periodic motion.
-
-    Parameters
-    ----------
-    case : Case
-        Its schedule is not used.
-    modal_state : (2 n,) array
-        Modal coordinates [m] and velocities [m/s] at phase 0 of the drive.
-
-    Raises
-    ------
-    NotConverged
-        If a period cannot be computed.
+    - size: largest coordinate or velocity after some time, 0 if the motion does not grow for ever
+    - n_steps: steps of the engine up to there
     """
-    shooting = _Shooting(case)
-    shooting.relax(1)
-    for _ in range(N_MEMORY_CYCLES):
-        before = shooting.state
-        before.y[: modal_state.size] = modal_state
-        shooting.relax(1)
-    status = Status(int(shooting.state.clock[Clock.STATUS]))
-    if status != Status.DONE:
-        raise NotConverged(
-            f"the stability of the steady motion is unknown: {describe_end(case, status)}"
-        )
-    multipliers, _ = shooting.find_multipliers(before)
-    return multipliers[np.argsort(-np.abs(multipliers))]
+
+    size: float
+    n_steps: float
 
 
-def _grows_for_ever(case: Case, size: float) -> bool:
-    """Return whether the motion from the start of a case increases by similar amounts in equal times.
-
-    `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
-    does not come near; inf if none was found.
-    """
-    shooting = _Shooting(case)
+def _measure_growth(case: Case) -> _Growth:
+    """Return whether the motion from the start of a case increases by similar amounts in equal times, and its size."""
+    shooting = Shooting(case)
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
-        sizes.append(float(np.abs(shooting.state.y[: 2 * case.rig.modes.shape[1]]).max()))
+        sizes.append(shooting.find_size(shooting.state))
     first, second = np.diff(sizes)
     is_moving = sizes[0] > case.rig.scales[0]
-    is_far = size > MIN_SIZE_RATIO * sizes[-1]
     is_growing = first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first
-    return bool(is_moving and is_far and is_growing)
+    return _Growth(sizes[-1] if is_moving and is_growing else 0.0, shooting.n_steps)
 
 
-class _Shooting:
+class Shooting:
     """State of a motion at the start of a period, and its map."""
 
     def __init__(self, case: Case):
@@ -197,20 +218,45 @@ class _Shooting:
         self.state = make_arrays(case)[0]
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
+        self.n_steps = 0.0
         self.map: _Map | None = None
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
+    def limit_steps(self, max_steps: float) -> None:
+        """Set the largest number of steps of all periods."""
+        settings = self.case.rig.settings.copy()
+        settings[Setting.MAX_STEPS] = max_steps
+        self.case = replace(self.case, rig=self.case.rig._replace(settings=settings))
+
+    def find_size(self, state: State) -> float:
+        """Return the largest coordinate or velocity of the modes in a state."""
+        return float(np.abs(state.y[: 2 * self.case.rig.modes.shape[1]]).max())
+
     def advance(self, state: State) -> State:
-        """Return the state a period after another one, whose clock starts at 0."""
-        state = _copy(state)
+        """Return the state a period after another one, whose clock starts at 0.
+
+        Raises
+        ------
+        NotConverged
+            If all periods of the search take more than `Setting.MAX_STEPS` steps.
+        """
+        state = copy_state(state)
+        settings = self.case.rig.settings
         state.clock[:] = 0.0
-        state.clock[Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
-        record = make_arrays(self.case)[1]
+        state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
+        state.clock[Clock.N_STEPS] = self.n_steps
+        self.record = make_arrays(self.case)[1]
         compiled.load_compiled_module("hybrid.engine_kernels").run_case(
-            self.case.rig, state, record
+            self.case.rig, state, self.record
         )
         self.n_periods += 1
+        self.n_steps = state.clock[Clock.N_STEPS]
+        if self.n_steps > settings[Setting.MAX_STEPS]:
+            cause = MESSAGES[Status.TOO_MANY_STEPS].format(steps=settings[Setting.MAX_STEPS])
+            raise NotConverged(
+                f'no periodic motion was found: {cause}, or accuracy.method = "auto"'
+            )
         return state
 
     def relax(self, count: int) -> None:
@@ -218,8 +264,10 @@ class _Shooting:
         for _ in range(count):
             self.state = self.advance(self.state)
 
-    def converge(self, tolerance: float) -> tuple[State, float]:
+    def converge(self, tolerance: float, max_relaxed: int) -> tuple[State, float]:
         """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
+
+        Up to `max_relaxed` periods without a correction follow one that did not help.
 
         Returns
         -------
@@ -242,21 +290,39 @@ class _Shooting:
 
             # A correction that did not help is given up for some periods of the motion itself. They are many for an
             # interface that hardly slips, where the steps of a stuck one lead far away.
-            if change > best:
+            helps = change <= best
+            if helps:
+                # The derivatives of a correction that was nearly exact serve for the next one.
+                if best < np.inf and change > MAX_REMAINDER * best:
+                    self.map = None
+                best = change
+                advanced = self.state
+                self.correct(before)
+                if not self.is_possible():
+                    self.state = advanced
+                    helps = False
+            if not helps:
                 self.relax(n_relaxed)
-                n_relaxed = min(2 * n_relaxed, MAX_RELAXED)
+                n_relaxed = min(2 * n_relaxed, max_relaxed)
                 self.map = None
                 best = np.inf
-                continue
-
-            # The derivatives of a correction that was nearly exact serve for the next one.
-            if best < np.inf and change > MAX_REMAINDER * best:
-                self.map = None
-            best = change
-            self.correct(before)
         if best < np.inf and change > MAX_REMAINDER * best:
             self.map = None
         return before, change
+
+    def is_possible(self) -> bool:
+        """Return whether no law of reversal points remembers forces beyond its friction limit.
+
+        With such forces a loop far away from the motion would repeat itself.
+        """
+        faces = self.case.rig.faces
+        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+            memory = self.state.memory[i]
+            forces = memory[Memory.STACK + 1 : Memory.STACK + 2 * int(memory[Memory.COUNT]) : 2]
+            limit = faces[i, Face.NUMBERS + masing.LIMIT]
+            if np.abs(forces).max(initial=0.0) > MAX_FORCE_RATIO * limit:
+                return False
+        return True
 
     def check(self, before: State, tolerance: float) -> tuple[np.ndarray, float]:
         """Follow a motion that was found for some periods.
@@ -282,7 +348,7 @@ class _Shooting:
         self.relax(1)
         return nearer, self.measure_change(nearer)
 
-    def _scales(self) -> np.ndarray:
+    def scales(self) -> np.ndarray:
         """Return the magnitudes (n,) of the modes and law states at the start of a period."""
         scale = np.maximum(np.abs(self.state.y[: self.n]), self.case.rig.scales[: self.n])
         n_modes = self.case.rig.modes.shape[1]
@@ -296,48 +362,63 @@ class _Shooting:
     def measure_change(self, before: State) -> float:
         """Return the change of the state since another one, relative to its scale."""
         change = np.abs(self.state.y[: self.n] - before.y[: self.n])
-        return float((change / self._scales()).max())
+        return float((change / self.scales()).max())
 
     def has_same_regime(self, before: State) -> bool:
         """Return whether the laws are in the regimes of another state."""
         columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
-    def _columns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in (state, memory): what a period changes."""
-        changed = _pack(self.state, self.n) != _pack(before, self.n)
-        changed[: 2 * self.case.rig.modes.shape[1]] = True
+    def pack(self, state: State) -> np.ndarray:
+        """Return the n states of the motion and the reversal points in one array (k,)."""
+        return np.append(state.y[: self.n], state.memory[:, Memory.STACK :])
 
-        # Of the memories only the reversal points count, if their number is the same.
+    def unpack(self, state: State, packed) -> State:
+        """Return a copy of a state with the values of `pack`."""
+        state = copy_state(state)
+        stack = state.memory[:, Memory.STACK :]
+        state.y[: self.n] = packed[: self.n]
+        stack[:] = packed[self.n :].reshape(stack.shape)
+        return state
+
+    def find_columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state: what a period changes."""
+        is_unknown = self.pack(self.state) != self.pack(before)
+        is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
+
+        # Reversal points count if their number is the same.
         counts = before.memory[:, Memory.COUNT, None]
-        stack_index = np.arange(before.memory.shape[1]) - Memory.STACK
-        is_used = (stack_index >= 0) & (stack_index < 2 * counts)
+        is_used = np.arange(before.memory.shape[1] - Memory.STACK) < 2 * counts
         is_used &= counts == self.state.memory[:, Memory.COUNT, None]
-        changed[self.n :] &= is_used.ravel()
-        return np.flatnonzero(changed)
+        is_unknown[self.n :] &= is_used.ravel()
+        return np.flatnonzero(is_unknown)
 
-    def _differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
+    def differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
         """Return the derivatives of the map of a period from a state, and the change over this period, in scaled unknowns.
 
         The derivatives of the last correction are used again as long as `map` has them.
         """
-        columns = self._columns(before)
-        start = _pack(before, self.n)
-        end = _pack(self.state, self.n)
+        columns = self.find_columns(before)
+        start = self.pack(before)
+        end = self.pack(self.state)
         if self.map is None or not np.array_equal(self.map.columns, columns):
-            scale = np.append(self._scales(), np.abs(start[self.n :]))[columns]
+            scale = np.append(self.scales(), np.abs(start[self.n :]))[columns]
             slopes = np.empty((columns.size, columns.size))
             for k, column in enumerate(columns):
                 packed = start.copy()
                 packed[column] += self.difference * scale[k]
-                after = _pack(self.advance(_unpack(before, packed)), self.n)
-                slopes[:, k] = (after - end)[columns] / (self.difference * scale)
+                slopes[:, k] = self.find_change(self.unpack(before, packed), end)[columns]
+                slopes[:, k] /= self.difference * scale
             self.map = _Map(columns, slopes, scale)
         return self.map, (end - start)[columns] / self.map.scale
 
+    def find_change(self, state: State, end) -> np.ndarray:
+        """Return the change of the packed state after a period from that of another motion, `end`."""
+        return self.pack(self.advance(state)) - end
+
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
-        found, change = self._differentiate(before)
+        found, change = self.differentiate(before)
         if not np.isfinite(found.slopes).all():
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
@@ -349,11 +430,11 @@ class _Shooting:
 
         Regimes are those at the end of the period, where the motion has brought them.
         """
-        period_map, change = self._differentiate(before)
-        packed = _pack(self.state, self.n)
+        period_map, change = self.differentiate(before)
+        packed = self.pack(self.state)
         step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
-        packed[period_map.columns] = _pack(before, self.n)[period_map.columns] + step
-        self.state = _unpack(self.state, packed)
+        packed[period_map.columns] = self.pack(before)[period_map.columns] + step
+        self.state = self.unpack(self.state, packed)
 
 
 class _Map(NamedTuple):
@@ -378,20 +459,6 @@ def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     return np.linalg.lstsq(np.eye(change.size) - linear.slopes, change, rcond=rcond)[0]
 
 
-def _copy(state: State) -> State:
+def copy_state(state: State) -> State:
     """Return an independent copy of a state."""
     return State(*(array.copy() for array in state))
-
-
-def _pack(state: State, n: int) -> np.ndarray:
-    """Return the first n states of the motion and the memories in one array (k,)."""
-    return np.append(state.y[:n], state.memory)
-
-
-def _unpack(state: State, packed) -> State:
-    """Return a copy of a state with the values of `_pack`."""
-    state = _copy(state)
-    n = packed.size - state.memory.size
-    state.y[:n] = packed[:n]
-    state.memory[:] = packed[n:].reshape(state.memory.shape)
-    return state

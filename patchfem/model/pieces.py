@@ -14,7 +14,7 @@ from .source import name_key
 
 # Largest difference of equal sizes, as a fraction of the interface length; mesh files
 # contain coordinates of few digits.
-MESH_SIZE_TOL = 1e-6
+EQUAL_SIZES_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):
@@ -149,11 +149,11 @@ def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
             ("height", body.height, piece.height),
             ("coating.thickness", body.coating_thickness, piece.thickness),
         ):
-            if abs(in_file - in_scene) <= MESH_SIZE_TOL * pieces.length:
+            if abs(in_file - in_scene) <= EQUAL_SIZES_TOL * pieces.length:
                 continue
             advice = ""
             for name, factor in UNIT_FACTORS["length"].items():
-                if in_scene and abs(in_file / unit * factor / in_scene - 1) <= MESH_SIZE_TOL:
+                if in_scene and abs(in_file / unit * factor / in_scene - 1) <= EQUAL_SIZES_TOL:
                     advice = f': set contact.mesh_unit = "{name}"'
             text = f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh"
             # The unit belongs to the file, not to the size in the scene

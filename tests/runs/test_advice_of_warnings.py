@@ -18,7 +18,7 @@ import patchfem
 from patchfem import run
 from patchfem.scene import choose_law, compose_scene
 
-# Random scenes with few steps, harmonics, elements or strips or a tight tolerance, whose warnings advise to set or to leave
+# Random scenes with few steps, elements or strips or a tight tolerance, whose warnings advise to set or to leave
 # out a key (drawn by `support/remedies.py` of version 1.11).
 WARNED = read_json(Path(__file__).parent / "found/warned_scenes.json")
 ADVICE = re.compile(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.dynamics.harmonic import branch
+from patchfem.runs.rig.steady import shooting
 
 RIG = """
 [structure]
@@ -76,7 +76,8 @@ def test_curve_that_ends_early_has_a_note(max_points, monkeypatch):
 
     Once the largest motion of such a part was stated without a word.
     """
-    monkeypatch.setattr(branch, "PATH", branch.PATH._replace(max_points=max_points))
+    path = shooting.FREQUENCY_PATH._replace(max_points=max_points)
+    monkeypatch.setattr(shooting, "FREQUENCY_PATH", path)
     begin = "60 Hz" if max_points == 15 else "195 Hz"
     scene = RIG + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n'
     result = pf.run(scene, **{"drive.from": begin})

@@ -32,7 +32,6 @@ MARCH, GIGABYTE = "accuracy.method=march", 10**9
     [
         (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
         (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
-        (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
         (RIG, [MARCH, "drive.cycles=3e7"], "lower drive.cycles"),
         (POINT + COULOMB + STRUCTURE, ["drive.cycles=2e7"], "lower drive.cycles"),
         (

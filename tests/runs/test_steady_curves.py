@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 from scene_runs import find_sentences
-from scene_texts import COULOMB, MODE, PLASTIC, POINT, SWEEP
+from scene_texts import COULOMB, FORCED, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
+from patchfem.response.rows import AMPLITUDE
+from patchfem.runs.rig.numerics import choose_numerics
 from patchfem.runs.rig.steady import shooting
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
@@ -71,8 +73,102 @@ def test_always_unstable_steady_state_is_not_converged():
 
 
 def test_exact_number_of_steady_motions_is_stated():
-    """With an interlock of 80 um three steady motions exist at 180 Hz; a warning says how many are stable."""
-    steady = pf.run(INTERLOCK + SINE.format(180, 10), **STEADY)
-    assert steady.outcome == "steady" and np.abs(steady.motion.steady.multipliers).max() < 1
-    (sentence,) = find_sentences([*steady.warnings, *steady.notes], "3 steady motions exist")
-    assert "1 of them stable" in sentence
+    """Near 160 Hz a stiffening rig has three steady motions. For the unstable one of them the smallest stable one
+    is shown, and a note says how many are stable."""
+    scene = MODE + '[structure.stiffening]\ncubic = "1.4e10 N/m^3"\n' + STRONG_SWEEP
+    model = pf.plan(pf.load(scene, **STEADY, **{"drive.to": "240 Hz"})).model
+    finder = shooting.ShootingFinder(model, choose_numerics(model), None)
+    points = finder.trace_curve(model.rig.drive.signal).points
+    unstable = [point for point in points if not point.stable]
+    middle = min(unstable, key=lambda point: abs(point.drive.omega - 2 * np.pi * 160))
+    found = finder.compute_steady_motion(middle.drive, middle.guess)
+    assert found.values[AMPLITUDE] < 0.5 * middle.values[AMPLITUDE]
+    assert np.abs(found.periodic.multipliers).max() < 1
+    (sentence,) = find_sentences(found.notes, "3 steady motions exist")
+    assert "2 of them stable; the stable motion of smallest amplitude is shown" in sentence
+
+
+def test_exact_regimes_of_laws_with_memory():
+    """Bonds stick at a small level and slide at a large one; a nonlinear spring alone has no friction."""
+    for level, regime in (("0.001 g", "stuck"), ("20 g", "slides")):
+        steady = pf.run(
+            POINT + NONLOCAL + MODE + SINE.format(100, 10),
+            **STEADY,
+            **{"drive.acceleration": level},
+        )
+        assert steady.motion.steady.regime == regime
+    spring = MODE + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n' + SINE.format(100, 10)
+    assert pf.run(spring, **STEADY).motion.steady.regime == "no friction"
+
+
+def test_exact_measures_of_bonds_agree_with_march():
+    """The measures under bonds agree within 2e-3 with those of a scene that is integrated in time for 300 cycles at 5 g."""
+    scene = POINT + NONLOCAL.replace("1 um", "20 um") + MODE + SINE.format(143, 300)
+    keys = {"accuracy.method": "march", "accuracy.steps_per_cycle": 1000}
+    march = pf.run(scene, **keys).measures
+    steady = pf.run(scene, **STEADY).measures
+    for name in (
+        AMPLITUDE,
+        "absolute_acceleration_peak",
+        "friction_force_peak",
+        "slip_amplitude",
+        "loop_area",
+        "equivalent_stiffness",
+        "equivalent_damping",
+    ):
+        assert steady[name].value == pytest.approx(march[name].value, rel=2e-3), name
+
+
+TANH = 'law = "tanh"\nreference_speed = "5 mm/s"\n'
+BOTH_SMOOTH = re.sub('law = "elastic-plastic"\n', TANH, re.sub("bond_length = .*\n", "", PAIR))
+COMBINED = {
+    "two interfaces": BOTH_SMOOTH + FORCED.replace("cycles = 25", "cycles = 300"),
+    "rigid law and spring": POINT
+    + COULOMB
+    + MODE
+    + '[structure.stiffening]\ncubic = "1.4e10 N/m^3"\n'
+    + SINE.format(100, 300).replace('"5 g"', '"20 g"'),
+}
+
+
+@pytest.mark.parametrize("name", COMBINED)
+def test_exact_motions_of_combined_laws_agree_with_march(name):
+    """Interfaces whose laws have no piecewise solution, and Coulomb friction beside a nonlinear spring, have the amplitude
+    of a march within the sum of the errors."""
+    found = [
+        pf.run(COMBINED[name], **{"accuracy.method": method}).measures[AMPLITUDE]
+        for method in ("harmonic", "march")
+    ]
+    assert abs(found[0].value - found[1].value) <= found[0].error + found[1].error
+    assert found[0].error < 1e-6 * found[0].value
+
+
+IWAN_MODES = (
+    '[normal]\nload = "100 N"\n[structure]\nmoving_mass = "0.5 kg"\n'
+    + "".join(
+        f'[[structure.mode]]\nname = "m{k}"\nfrequency = "{frequency} Hz"\ndamping = 0.0086\nslide = {slide}\n'
+        + f"output = {slide}\nbase = {slide}\n"
+        for k, (frequency, slide) in enumerate(
+            ((117, 0.7), (222.3, 0.4), (327.6, 0.35), (432.9, 0.25), (538.2, 0.2))
+        )
+    )
+    + '[friction]\nstatic = 0.339\nlaw = "iwan"\nchi = -0.478\nbeta = 0.932\nstiffness = "36.7 kN/m"\n'
+)
+
+
+def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
+    """The curve has the amplitudes of a march of 800 cycles at its ends and at its peak within 1e-6, all of it is stable,
+    and the motion from which it starts is near the origin: corrections to forces beyond the friction limit, which would
+    hold it far away, are refused. After 200 cycles the transient of the march is still 1.3e-4."""
+    text = IWAN_MODES + SWEEP.replace('"3 g"', '"14 g"').replace('"120 Hz"', '"80 Hz"')
+    model = pf.plan(pf.load(text, **STEADY)).model
+    finder = shooting.ShootingFinder(model, choose_numerics(model), None)
+    points = finder.trace_curve(model.rig.drive.signal).points
+    assert all(point.stable for point in points)
+    peak = max(points, key=lambda point: point.values[AMPLITUDE])
+    for point in (points[0], peak, points[-1]):
+        state = point.guess.equations.details.run.final
+        assert np.abs(state.y[:5]).max() <= 2 * point.values[AMPLITUDE]
+        sine = SINE.format(point.drive.omega / (2 * np.pi), 800).replace('"5 g"', '"14 g"')
+        found = pf.run(IWAN_MODES + sine, **{"accuracy.method": "march"}).measures[AMPLITUDE]
+        assert found.value == pytest.approx(point.values[AMPLITUDE], rel=1e-6)

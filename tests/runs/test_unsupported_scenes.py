@@ -106,13 +106,6 @@ REFUSALS = [
         r"structure.interface\[2\].law: law 'convolution' with other interfaces is not supported",
     ),
     (
-        CHAIN.replace(
-            CHAIN[CHAIN.index("[structure.interface.c") : CHAIN.rindex("[[s")], 'load = "9 N"\n'
-        ),
-        "structure.interface.1.law=tanh; structure.interface.1.reference_speed=1 mm/s; accuracy.method=harmonic",
-        "accuracy.method: 'harmonic' with several inter",
-    ),
-    (
         COULOMB_RIG,
         FREE + "structure.travel=0.4 mm; accuracy.method=exact",
         r"starts beyond this travel",

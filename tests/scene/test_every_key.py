@@ -53,7 +53,6 @@ WORDS = {
     "accuracy.merge": [0.3, 1e-3],
     "accuracy.tail": [1e-2, 1e-8],
     "accuracy.steps_per_cycle": [60, 17],
-    "accuracy.harmonics": [9],
     "wear.jumps": [3],
     **{f"contact.{shape}.on": ["lower"] for shape in ("tilt", "crown", "step")},
 }

@@ -43,7 +43,7 @@ def unbounded_keys(model, at):
     "text, key",
     [
         (PATCH, "contact.pairs"),
-        (RIG, "accuracy.harmonics"),
+        (RIG, "accuracy.shear_modes"),
         (BENCH + "[wear]\ncycles = 9\n", "wear.jumps"),
     ],
 )

@@ -21,7 +21,6 @@ OWN_PATCH = "{patch}.length=10_mm {patch}.width=10_mm {patch}.height=5_mm {patch
 WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
 # Assignments that give a scene a feature, separated by blanks; _ stands for the blank in a quantity.
 SETS = {
-    "accuracy.harmonics": "accuracy.harmonics=9",
     "accuracy.method=harmonic": "accuracy.method=harmonic",
     "accuracy.quadrature=recursion": "accuracy.quadrature=recursion",
     "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
@@ -94,7 +93,6 @@ PROPERTY = re.compile(r"\\\{.*?\}")
 MORE_SETS = {
     "structure.measured=stuck, mode with yaw": "{patch}.strips.count=4",
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
-    "accuracy.harmonics, accuracy.method=harmonic, grooves": "{law}.law=coulomb",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
     "shape on the lower piece, interface": BONDS,
     "mode with yaw, patch.strips, rig, law for one interface": f"{BONDS} {{law}}.order=2",
@@ -160,7 +158,11 @@ def list_refusals(names: str) -> list[str]:
     return []
 
 
-@pytest.mark.parametrize("names, instead", support.SUPPORT, ids=[row[0] for row in support.SUPPORT])
+@pytest.mark.parametrize(
+    "names, instead",
+    support.UNSUPPORTED_COMBINATIONS,
+    ids=[row[0] for row in support.UNSUPPORTED_COMBINATIONS],
+)
 def test_refuses_each_row_of_support(names, instead):
     """A scene with the features of a row is refused for this row alone, with its advice.
 

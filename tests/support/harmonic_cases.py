@@ -1,11 +1,11 @@
-"""Structures and a simple time march for tests of harmonic balance."""
+"""Structures for tests of harmonic balance."""
 
 import numpy as np
 from modal_bases import make_modal_basis
 from scipy.linalg import expm
 
 from patchfem.dynamics.harmonic.laws import FlowLaw
-from patchfem.friction import Bonds, LuGre, points_element
+from patchfem.friction import Bonds, LuGre
 from patchfem.friction.laws.tanh import TanhLaw
 
 
@@ -16,7 +16,7 @@ def make_speed_law(limit, speed):
 
 def make_bond_law(limit, length):
     """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
-    return FlowLaw(points_element(Bonds(limit, length), 1.0))
+    return FlowLaw(Bonds(limit, length).element(1.0))
 
 
 def make_lugre_law():

@@ -13,11 +13,12 @@ from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import JointMode
 from .records import EQUAL_AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
-N_SAMPLES = 4096  # Number of samples of a friction loop per cycle; half as many give the error.
+# Number of samples of a friction loop per cycle; half as many give the error.
+N_LOOP_SAMPLES = 4096
 # Largest number of corrections of the displacement until the amplitude is the requested one.
-MAX_AMPLITUDE_STEPS = 60
+MAX_AMPLITUDE_CORRECTIONS = 60
 # Relative error that is added to the estimated errors of a computed friction loop.
-MIN_FLOOR = 1e-10
+MIN_RELATIVE_LOOP_ERROR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
@@ -54,11 +55,11 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
         return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)
 
     # The sampling error is the change from half the samples.
-    best = tabulate(laws, N_SAMPLES)
+    best = tabulate(laws, N_LOOP_SAMPLES)
     has_amplitude = np.abs(best[0] / amplitudes - 1) < EQUAL_AMPLITUDE_TOL
     best[0] = np.where(has_amplitude, amplitudes, best[0])
-    error = np.abs(best - tabulate(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
-    error += joint.spatial_discretization_errors(lambda _, group: tabulate(group, N_SAMPLES))
+    error = np.abs(best - tabulate(laws, N_LOOP_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
+    error += joint.spatial_discretization_errors(lambda _, group: tabulate(group, N_LOOP_SAMPLES))
     return _select_rising_part(best, error)
 
 
@@ -101,7 +102,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     # damping ratio, loss and force.
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
-    for _ in range(MAX_AMPLITUDE_STEPS):
+    for _ in range(MAX_AMPLITUDE_CORRECTIONS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
@@ -152,7 +153,9 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     for slide in slides:
         steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
         changes = estimate_bench_errors(steady.model, patches, steady.run, steady.steps)
-        measures = add_errors(steady.run.values, changes.errors, min_relative_error=MIN_FLOOR)
+        measures = add_errors(
+            steady.run.values, changes.errors, min_relative_error=MIN_RELATIVE_LOOP_ERROR
+        )
         stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, steady.change)

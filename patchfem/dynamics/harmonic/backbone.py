@@ -18,8 +18,7 @@ from ...core import NotConverged
 from ...formatting import format_length
 from .equations import HarmonicBalance, solve_damped, split_equations
 from .laws import MAX_SAMPLES_PER_CYCLE
-from .motion import find_loss
-from .series import N_SAMPLES, evaluate_series, half_range, pack_harmonics
+from .series import N_SAMPLES, evaluate_series, find_loss, half_range, pack_harmonics
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_STEP_HALVINGS = 6

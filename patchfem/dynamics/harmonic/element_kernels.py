@@ -25,9 +25,9 @@ def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
         Number of the reversal at a node, -1 at other nodes.
     first : int
         Node of the largest slide, to which the elements are loaded from 0.
-    out : (3 + r, M) array
-        Force [N], stretch times limit [N m], stiffness [N/m], and derivatives by the slides at the r reversals [N/m].
-        The values of the elements are added.
+    out : (2 + r, M) array
+        Force [N], stiffness [N/m], and derivatives by the slides at the r reversals [N/m]. The values of the elements are
+        added.
     """
     n = q.size
     for k, limit in zip(stiffness, limit_slide):
@@ -48,8 +48,7 @@ def follow_elements(stiffness, limit_slide, q, reversal_of_node, first, out):
                 continue
 
             out[0, i] += k * stretch
-            out[1, i] += k * limit * stretch
             if not slips:
-                out[2, i] += k
+                out[1, i] += k
                 if reversal >= 0:
-                    out[3 + reversal, i] -= k
+                    out[2 + reversal, i] -= k

@@ -2,12 +2,13 @@
 
 With theta = omega t every coordinate is Re sum_k Z_k exp(i k theta), k = 0 to H. The modal equations
 
-    S_k Z_k + rows^T F_k/m = i a base (k = 1),    S_k = Omega^2 - k^2 omega^2 + i k omega D,
+    S_k Z_k + rows^T F_k/m = e_k,    S_k = Omega^2 - k^2 omega^2 + i k omega D,
 
-are condensed to the slides Q_k = rows Z_k. A spring and damper sigma (1 + i) of any size acts on the rows, and
-its force is taken off the friction: with P_k = S_k + rows^T sigma (1 + i) rows/m the residual is
+with the exciting accelerations e_k of the coordinates, are condensed to the slides Q_k = rows Z_k. A spring and damper
+sigma (1 + i) of any size acts on the rows, and its force is taken off the friction: with P_k = S_k + rows^T sigma (1 +
+i) rows/m the residual is
 
-    Q_k - rows P_k^-1 (drive - rows^T (F_k - sigma (1 + i) Q_k)/m).
+    Q_k - rows P_k^-1 (e_k - rows^T (F_k - sigma (1 + i) Q_k)/m).
 
 P_k is regular also for a rigid mode (k = 0) and for an undamped mode at its natural frequency.
 
@@ -19,20 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from ...core import ModalBasis, NotConverged, PatchfemError
+from ...core import ModalBasis, PatchfemError
 from .forces import LawGroup
-from .series import find_harmonics, unpack_harmonics
+from .series import unpack_harmonics
 
 RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
-UNDAMPED_RESONANCE_TOL = (
-    1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
-)
 SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
 BALANCE_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
 MIN_FRACTION = 0.02  # smallest fraction of a Newton step
-MAX_RESIDUAL = (
-    1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
-)
 MAX_DAMPED_STEPS = 40  # largest number of Newton steps
 
 
@@ -51,22 +46,6 @@ class Motion(NamedTuple):
     inverse: np.ndarray
     by_unknowns: np.ndarray
     by_omega: np.ndarray
-
-
-class Equations(NamedTuple):
-    """Equations of a harmonic balance at a set of N unknowns.
-
-    - residual (N,): what a solution makes zero
-    - jacobian (N, N): its derivatives by the unknowns
-    - by_omega, by_level (N,): its derivatives by circular frequency and drive level
-    - motion: motion of the modes with these unknowns
-    """
-
-    residual: np.ndarray
-    jacobian: np.ndarray
-    by_omega: np.ndarray
-    by_level: np.ndarray
-    motion: Motion
 
 
 def split_equations(equations) -> np.ndarray:
@@ -170,113 +149,6 @@ class HarmonicBalance:
         by_omega = -np.einsum("kab,kbc,kc->ka", inverse, change, modal)
         by_omega += np.einsum("kar,rk->ka", by_force, contact.by_omega)
         return Motion(modal, contact.force, inverse, by_unknowns, by_omega)
-
-    def evaluate(self, x, omega: float, level: float) -> Equations:
-        """Evaluate the balance.
-
-        Parameters
-        ----------
-        x : (N,) array
-            Unknowns.
-        omega, level : float
-            Frequency [rad/s] and amplitude [m s-2] of the drive.
-        """
-        h = (x.size // len(self.rows) - 1) // 2
-        unit = 1j * np.outer(np.arange(h + 1) == 1, self.modes.base)
-        motion = self.find_motion(x, omega, level * unit)
-        by_level = np.einsum("kab,kb->ka", motion.inverse, unit)
-        return Equations(
-            x - split_equations(motion.modal @ self.rows.T),
-            np.eye(x.size) - split_equations(self.rows @ motion.by_unknowns),
-            -split_equations(motion.by_omega @ self.rows.T),
-            -split_equations(by_level @ self.rows.T),
-            motion,
-        )
-
-    def solve(
-        self, x, omega: float, level: float, max_steps: int = MAX_DAMPED_STEPS
-    ) -> tuple[np.ndarray, Equations, int]:
-        """Solve the balance from unknowns x (N,).
-
-        Parameters
-        ----------
-        x : (N,) array
-            First guess of the packed slides [m].
-        omega : float
-            Circular frequency [rad/s].
-        level : float
-            Amplitude of the acceleration of the drive [m s-2].
-        max_steps : int
-            Largest number of Newton steps.
-
-        Returns
-        -------
-        x : (N,) array
-            Packed slides of the solution [m].
-        equations : Equations
-            Those before the last step.
-        n_steps : int
-            Number of Newton steps.
-
-        Raises
-        ------
-        NotConverged
-            If Newton's method ends at no solution.
-        """
-
-        def is_solved(equations, residual, size) -> bool:
-            """Return whether the residual is small beside the slides and the drive after the last step.
-
-            Parameters
-            ----------
-            equations : Equations
-                Equations before the step, with their derivatives by the drive level.
-            residual : (N,) array
-                Their linearised residual after it [m].
-            size : float
-                Norm of the packed slides [m].
-            """
-            drive = abs(level) * float(np.linalg.norm(equations.by_level))
-            return float(np.linalg.norm(residual)) <= MAX_RESIDUAL * (size + drive)
-
-        # A step also vanishes at a least-squares minimum that is no solution, which `is_solved` refuses
-        solution = solve_damped(lambda v: self.evaluate(v, omega, level), x, is_solved, max_steps)
-        if solution is None:
-            count = (x.size // len(self.rows) - 1) // 2
-            conditions = f"{count} harmonics at {omega / (2 * np.pi):.6g} Hz"
-            raise NotConverged(
-                f"accuracy.harmonics: harmonic balance with {conditions} did not converge in {max_steps} iterations; "
-                "give a motion to start from, or begin at a lower drive level"
-            )
-        return solution
-
-    def solve_stuck(self, omega: float, level: float, harmonics: int) -> np.ndarray:
-        """Return the unknowns of the motion in which all contacts stick.
-
-        Parameters
-        ----------
-        omega, level : float
-            Frequency [rad/s] and amplitude [m s-2] of the drive.
-        harmonics : int
-            Number of harmonics H.
-        """
-        equations = self.evaluate(np.zeros(len(self.rows) * (2 * harmonics + 1)), omega, level)
-        return -factor(equations.jacobian)(equations.residual)
-
-    def find_higher_harmonics(self, q, omega: float) -> np.ndarray:
-        """Return harmonics H + 1 to 2 H (i, H) of the slides that follow from the forces of slides q (i, H + 1) [m]."""
-        h = q.shape[1] - 1
-        force = find_harmonics(self.group.compute_forces(q, omega, self.samples), 2 * h)
-        stiffness = self.make_stiffness(omega, 2 * h)[h + 1 :]
-        modal_force = -force[:, h + 1 :].T @ self.rows / self.modes.mass
-        return np.einsum("ia,kab,kb->ik", self.rows, invert_matrices(stiffness), modal_force)
-
-
-def has_undamped_resonance(modes: ModalBasis, omega: float) -> bool:
-    """Return whether an undamped mode is driven at its natural frequency omega [rad/s]."""
-    stiffness = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
-    largest = float(modes.omega.max()) ** 2 + omega**2
-    return bool(np.linalg.svd(stiffness, compute_uv=False)[-1] < UNDAMPED_RESONANCE_TOL * largest)
 
 
 def invert_matrices(matrices) -> np.ndarray:

@@ -49,15 +49,12 @@ class LawForce(NamedTuple):
     - force: (M,) [N]
     - slope: (M,) derivative by the slide [N/m], or 0
     - holds: (r, M) derivatives by the slides at the reversals of the interface [N/m], or 0
-    - limit, stretch: friction limit [N], and the elastic stretch times it (M,) [N m]
     - states: states of a law whose memory is no slide at a reversal; its derivatives follow from them alone
     """
 
     force: np.ndarray
     slope: np.ndarray | float = 0.0
     holds: np.ndarray | float = 0.0
-    limit: float = 0.0
-    stretch: np.ndarray | float = 0.0
     states: FlowStates | None = None
 
 
@@ -124,11 +121,11 @@ class Jenkins(Law):
         # The largest slide erases the memory of all others; the cycle begins there.
         first = int(turns[np.argmax(np.abs(q[turns]))]) if turns.size else 0
 
-        # Rows: force, stretch times limit, stiffness, and derivatives of the force by the slides at the reversals.
-        out = np.zeros((3 + turns.size, q.size))
+        # Rows: force, stiffness, and derivatives of the force by the slides at the reversals.
+        out = np.zeros((2 + turns.size, q.size))
         kernels = load_compiled_module("dynamics.harmonic.element_kernels")
         kernels.follow_elements(self.stiffness, self.limit_slide, q, reversal_of_node, first, out)
-        return LawForce(out[0], out[2], out[3:], self.limit, out[1])
+        return LawForce(out[0], out[1], out[2:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,8 +201,7 @@ class FlowLaw(Law):
             kernels.solve_cycle(
                 numbers, q, velocity, dt, stretch, states.steps, force, states.slopes
             )
-        limit = self.element.limit
-        return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
+        return LawForce(force, states=states)
 
     def differentiate(
         self, slides: Slides, row: int, states: FlowStates
@@ -296,13 +292,10 @@ def make_law(element: Element | None) -> Law:
         return FlowLaw(element)
     if form == "rigid":
         raise PatchfemError(
-            'accuracy.method: "harmonic" '
-            "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "
-            'solution from event to event, or friction.law = "elastic-plastic" with a short '
-            "friction.bond_length"
+            "harmonic balance cannot treat rigid friction, because the force of rigid friction jumps; use the exact "
+            'solution from event to event, or friction.law = "elastic-plastic" with a short friction.bond_length'
         )
     raise PatchfemError(
-        'accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
-        "friction.order = 1, a constant bond length and pieces that are rigid "
-        'in shear; use accuracy.method = "march"'
+        'harmonic balance can treat bonds only with friction.reading = "stretch", friction.order = 1, a constant bond '
+        "length and pieces that are rigid in shear; run the scene in time instead"
     )

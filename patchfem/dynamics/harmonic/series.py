@@ -37,14 +37,6 @@ def unpack_harmonics(packed, rows: int) -> np.ndarray:
     return x
 
 
-def pad_harmonics(x, harmonics: int) -> np.ndarray:
-    """Return harmonics (r, K + 1) cut off at H, or padded with zeros up to H."""
-    padded = np.zeros((len(x), harmonics + 1), complex)
-    count = min(harmonics + 1, x.shape[1])
-    padded[:, :count] = x[:, :count]
-    return padded
-
-
 def find_peak(y) -> float:
     """Return the maximum of a sampled cycle (N,), interpolated by a parabola.
 
@@ -62,3 +54,9 @@ def half_range(x) -> float:
     """Return half the peak-to-peak value of a motion given by its harmonics (H + 1,)."""
     motion = evaluate_series(np.asarray(x), N_SAMPLES)
     return (find_peak(motion) + find_peak(-motion)) / 2
+
+
+def find_loss(slides, forces) -> float:
+    """Return the work per cycle [J] of forces [N] on slides [m], both (i, H + 1) harmonics."""
+    k = np.arange(slides.shape[1])
+    return np.pi * float(np.sum(k * (slides.conj() * forces).imag))

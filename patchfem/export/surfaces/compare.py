@@ -12,11 +12,11 @@ from ...campaigns.compare import SurfaceRuns
 from ...core import PatchfemError
 from ...surface.areal import level
 from ...surface.compare import compare
-from ...surface.compare.compare import DEFAULTS, Options
+from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
-from ...surface.quantity import LEVEL, SIDE, Quantity
-from ...surface.spectrum import BAND
+from ...surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
+from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
@@ -41,7 +41,7 @@ MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 def answer_files(
     before: Path,
     after: Path,
-    options: Options = DEFAULTS,
+    options: Options = COMPARE_DEFAULTS,
     predicted: Path | None = None,
     piece: str = "",
 ) -> Answer:
@@ -127,7 +127,7 @@ def make_answer(comparison: Comparison) -> Answer:
         data=_make_data(comparison),
         details={
             "code": comparison.verdict.code,
-            "band": BAND,
+            "band": WAVE_BAND,
             "direction": comparison.direction or None,
             **_describe_place(comparison),
             "other_tracks": [to_answers(other.values) for other in comparison.tracks[1:]],
@@ -176,7 +176,7 @@ def build_answer(
         "patchfem": __version__,
         "verdict": words.verdict[0],
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
-        "confidence": LEVEL,
+        "confidence": CONFIDENCE_LEVEL,
         **dict(zip(SURFACE_NAMES, sources, strict=True)),
         **to_answers(values),
         "track": to_answers(track) or None,
@@ -242,7 +242,7 @@ def _make_data(comparison: Comparison) -> Variables:
         )
     else:
         data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= make_band("x", "depth", curves.depth, SIDE * curves.noise)
+        data |= make_band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
         data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)

@@ -7,7 +7,7 @@ from ... import __version__
 from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
-from ...surface.compare.compare import DEFAULTS, Options
+from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ..answer import Answer, JsonObject, Variables, make_columns
 from . import compare, worn
 from .variables import VARIABLE_TEXTS
@@ -17,7 +17,7 @@ CHARTED_QUANTITIES = {"worn_depth_mean": "m", "amplitude_ratio": "1"}
 
 
 def answer_pairs(
-    table: Path, options: Options = DEFAULTS, report_progress: Callable | None = None
+    table: Path, options: Options = COMPARE_DEFAULTS, report_progress: Callable | None = None
 ) -> Answer:
     """Compare the two files or results folders of each line of a table.
 

@@ -9,7 +9,7 @@ from ...core import PatchfemError
 from ...formatting import format_length, format_number
 from ...scene.keys.quantities import parse_quantity
 from ...surface.compare.records import Comparison
-from ...surface.quantity import SIDE
+from ...surface.quantity import HALF_WIDTH_95
 from ...wear import predicted
 from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
@@ -81,7 +81,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         computed_depth=depths.computed,
         depth_difference=depths.measured - depths.computed,
     )
-    data |= make_band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
+    data |= make_band("x_patch", "measured_depth", depths.measured, HALF_WIDTH_95 * depths.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),
@@ -112,7 +112,7 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     # what the interval of the lost area adds to all depths alike
     known = np.isfinite(curves.depth)
     x = curves.x[known]
-    datum_error = (area.high - area.low) / (2 * SIDE) / np.ptp(x)
+    datum_error = (area.high - area.low) / (2 * HALF_WIDTH_95) / np.ptp(x)
     track = comparison.track
     width = None if track is None or any(track.cut) else track.values["width"].value
     correlation = curves.errors.correlation

@@ -9,11 +9,11 @@ from ... import __version__
 from ...core import PatchfemError
 from ...formatting import format_length
 from ...surface.files.read import read_surface
-from ...surface.quantity import LEVEL, Quantity
+from ...surface.quantity import CONFIDENCE_LEVEL, Quantity
 from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
-from ...surface.spectrum import BAND
+from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..quantities import format_value
 from . import sentences
@@ -121,7 +121,7 @@ def _average_parameters(members: list[RoughnessReport]) -> dict[str, Mean]:
     from scipy.special import stdtrit
 
     count = len(members)
-    student = stdtrit(count - 1, (1 + LEVEL) / 2)
+    student = stdtrit(count - 1, (1 + CONFIDENCE_LEVEL) / 2)
     means = {}
     for quantity in members[0].values:
         name = quantity.name
@@ -163,7 +163,7 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     measures = {}
     for name, mean in means.items():
         measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
-    content = {"kind": kind, "files": count, "confidence": LEVEL, "notes": notes}
+    content = {"kind": kind, "files": count, "confidence": CONFIDENCE_LEVEL, "notes": notes}
     return content | {"measures": measures}
 
 
@@ -226,7 +226,7 @@ def report_to_dict(roughness: RoughnessReport) -> JsonObject:
     }
     if roughness.kind == "areal":
         return content
-    return content | {"band": BAND, "asperities": _find_moments(roughness)}
+    return content | {"band": WAVE_BAND, "asperities": _find_moments(roughness)}
 
 
 def _find_moments(roughness: RoughnessReport) -> dict | None:

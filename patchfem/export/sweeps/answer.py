@@ -13,7 +13,7 @@ from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...response import rows
-from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
@@ -21,7 +21,7 @@ from ..runs import list_versions
 from .words import describe_place, make_peak_quantities, make_verdict
 
 # place of a measure in the reference
-MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
+MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.MOTION_TABLE))}
 MAX_MEASURE_RANGES = 3  # measures whose largest and smallest values are quantities
 MAX_FAILURE_MESSAGES = 5  # messages of failed cases among the warnings
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
-from ...campaigns.sweeps.limits import DOUBLING, KeyLimit
+from ...campaigns.sweeps.limits import DOUBLED_VALUE_CHANGE, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
@@ -76,13 +76,13 @@ def _format_measure(name: str, unit: str, value: float) -> str:
 
 def _describe_limit(limits: list[KeyLimit]) -> str:
     """Return how far the key may go before a measure changes by 5 %; "" if no such limit exists."""
-    small = [limit for limit in limits if abs(limit.change) < DOUBLING]
+    small = [limit for limit in limits if abs(limit.change) < DOUBLED_VALUE_CHANGE]
     open_ended = [limit for limit in small if not limit.is_never_reached]
     if not open_ended:
         names = " and ".join(_name_in_words(limit.measure) for limit in small)
         return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
     # limits of a motion come before those of its patch, which change before the motion does
-    moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
+    moving = [limit for limit in open_ended if limit.measure in rows.MOTION_TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
     numbers = (first.low, first.high, first.value)
     low, high, value = (format_value(number, first.unit, 3) for number in numbers)

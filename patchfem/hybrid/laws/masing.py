@@ -13,6 +13,7 @@ turn there without an event: the piece is left at its end, or at the reversal fr
 ALL_REVERSALS each turn is an event all the same.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +22,13 @@ from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
 HELPERS = ("find_branch", "forget_loop")
+LIMIT = 2  # the slip force among the numbers
 POINTS = 5  # first of the n + 1 displacements among the numbers
 TURNS_FREELY = (
     -1.0
 )  # beta of a linear curve whose first piece is left without an event at reversals
 ALL_REVERSALS = -2.0  # beta of a linear curve that has an event at each reversal
+SAME_END = 1e-6  # distance of reversals that are one end of a loop, relative to its width
 MIN_BRANCH = 1e-13  # shortest branch between two reversals, relative to phi_max
 
 
@@ -95,15 +98,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     direction = memory[Memory.DIRECTION]
     if memory[Memory.CONTACT] < 0:
@@ -143,15 +146,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     direction = memory[Memory.DIRECTION]
     margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
@@ -180,13 +183,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -248,6 +251,92 @@ def switch(p, memory, point, s, which):
     return False
 
 
+def load_first(p, x) -> np.ndarray:
+    """Return the force [N] of first loading at displacements x >= 0 [m] for the numbers p of a law."""
+    pieces = int(p[4])
+    points = p[POINTS : POINTS + pieces + 1]
+    if p[1] < 0:
+        return np.interp(x, points, p[POINTS + pieces + 1 : POINTS + 2 * pieces + 2])
+    ratio = np.minimum(np.asarray(x) / p[3], 1.0)
+    scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2))
+    smooth = scale * ratio * (p[1] + 1 - ratio ** (p[0] + 1) / (p[0] + 2))
+    return np.where(np.asarray(x) < p[3], smooth, p[2])
+
+
+def remember_loop(p, memory, slides, slide: float) -> None:
+    """Replace the memory of a law by that of a loop between two slides, which begins from an unloaded interface.
+
+    Its larger reversal is on the curve of first loading. Inner loops after the last of both reversals are kept.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`, which is changed.
+    slides : (float, float)
+        Smallest and largest slide of the loop [m].
+    slide : float
+        Slide at the present instant [m].
+    """
+    count = int(memory[Memory.COUNT])
+    direction = memory[Memory.DIRECTION]
+    low, high = np.asarray(slides) - memory[Memory.ORIGIN]
+    stack = memory[Memory.STACK :].reshape(-1, 2)
+
+    # Inner loops follow the last reversal at an end of the loop.
+    reversals = stack[:count, 0].copy()
+    is_end = np.minimum(np.abs(reversals - low), np.abs(reversals - high)) < SAME_END * (high - low)
+    last = int(np.flatnonzero(is_end)[-1]) if is_end.any() else count - 1
+    inner = reversals[last + 1 :]
+    side = direction if inner.size % 2 == 0 else -direction
+    ends = (low, high) if side > 0 else (high, low)
+
+    # The loop of an elastic interface is its curve of first loading.
+    largest = max(ends, key=abs)
+    if p[1] < 0 and abs(largest) <= p[POINTS + 1]:
+        memory[Memory.COUNT] = 0
+        memory[Memory.VIRGIN] = 1.0
+        memory[Memory.FLAG] = 0
+        return
+
+    points = [-largest, largest]
+    if ends[0] != largest:
+        points.append(ends[0])
+    points += list(inner)
+    stack[: len(points), 0] = points
+    memory[Memory.COUNT] = len(points)
+    memory[Memory.VIRGIN] = 1.0
+    load_reversals(p, memory, slide)
+
+
+def load_reversals(p, memory, slide: float) -> None:
+    """Set the forces at the reversals of a loop, each on the branch before it, and the piece of the curve.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory` that `remember_loop` has left, which is changed.
+    slide : float
+        Slide at the present instant [m].
+    """
+    stack = memory[Memory.STACK :].reshape(-1, 2)[: int(memory[Memory.COUNT])]
+    if len(stack) < 2:
+        return
+    stack[0, 0] = -stack[1, 0]
+    stack[1, 1] = np.sign(stack[1, 0]) * load_first(p, abs(stack[1, 0]))
+    stack[0, 1] = -stack[1, 1]
+    for before, after in pairwise(stack[1:]):
+        step = after[0] - before[0]
+        after[1] = before[1] + 2 * np.sign(step) * load_first(p, abs(step) / 2)
+
+    x = 0.5 * memory[Memory.DIRECTION] * (slide - memory[Memory.ORIGIN] - stack[-1, 0])
+    ends = p[POINTS + 1 : POINTS + 1 + int(p[4])]
+    memory[Memory.FLAG] = np.searchsorted(ends, x, side="right")
+
+
 def from_elements(stiffness, yield_displacement):
     """Return the law of parallel Jenkins elements of given stiffness [N/m] and yield displacement [m].
 
@@ -282,26 +371,23 @@ def has_many_elements(law: LawNumbers) -> bool:
     return law.law == "masing" and law.numbers[4] > 1
 
 
-def from_keys(friction, load, speed):
+def has_power_law(law: LawNumbers) -> bool:
+    """Return whether the curve of first loading of a law is Segalman's, which is smooth."""
+    return law.law == "masing" and law.numbers[1] >= 0
+
+
+def from_law(law, load):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.elastic_plastic.ElasticPlastic or friction.laws.iwan.Iwan
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    limit = friction.static * load
-    if friction.law == "iwan":
-        from ...friction.laws.iwan import max_yield_displacement
-
-        chi = friction.chi
-        beta = friction.beta
-        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
-        numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
-        return LawNumbers("masing", numbers, length=limit / friction.stiffness)
-    length = friction.bond_length or limit / friction.stiffness
-    return from_elements([limit / length], [length])
+    limit = law.static * load
+    if hasattr(law, "chi"):
+        numbers = (law.chi, law.beta, limit, law.phi_max, 1, 0.0, law.phi_max, 0.0, limit)
+        return LawNumbers("masing", numbers, length=law.static / law.stiffness)
+    return from_elements([limit / law.length], [law.length])

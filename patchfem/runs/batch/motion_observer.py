@@ -10,19 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 
-from ...core import NotConverged, Outcome
-from ..rig.engines import ENGINES, choose_steady_method
+from ...core import NotConverged
+from ..results.result import UNBOUNDED_OUTCOMES
+from ..rig.engines import ENGINES
 from ..rig.numerics import choose_numerics
 from ..rig.solve import solve_rig
 from ..rig.steady.curves import COLUMN_MEASURES, ObservedMotion
-from ..rig.steady.steady import FINDERS
-
-UNBOUNDED_OUTCOMES = (
-    Outcome.GROWS,
-    Outcome.NOT_CONVERGED,
-    Outcome.EXCEEDS_TRAVEL,
-    Outcome.LEAVES_GROOVES,
-)
+from ..rig.steady.shooting import ShootingFinder
 
 
 class MotionObserver:
@@ -57,8 +51,7 @@ class MotionObserver:
     @cached_property
     def finder(self):
         """Finder of periodic motions; the motions of other engines are those of runs from rest."""
-        finder_class = FINDERS[choose_steady_method(self.model)]
-        return finder_class(self.model, self.numerics, self.patch, 0, self.report)
+        return ShootingFinder(self.model, self.numerics, self.patch, 0, self.report)
 
     def __call__(self, drive, initial_guess=None) -> ObservedMotion | None:
         """Compute the motion under a drive.

@@ -11,16 +11,13 @@ import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
 from ...elasticity import mortar
-from ...elasticity.elasticity import (
-    Piece,
-    compute_interface_compliance,
-)
+from ...elasticity.elasticity import Piece, compute_interface_compliance
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 from . import store
 
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
-COUPLING_ROUND_OFF = 1e-7
+RELATIVE_COUPLING_ROUND_OFF = 1e-7
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -128,7 +125,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
 
     # The compliances hold per unit width; pairs of equal pieces act in parallel.
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
-    if np.abs(closing).max() <= COUPLING_ROUND_OFF * np.abs(tangential).max():
+    if np.abs(closing).max() <= RELATIVE_COUPLING_ROUND_OFF * np.abs(tangential).max():
         closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
 

@@ -31,11 +31,12 @@ from .costs import prefers_time_steps
 from .solution import first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
-MERGE_WIDTH_FACTOR = 0.5
+COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
+# Ratio of the neglected tail in the comparison run to that in the run itself.
+COMPARISON_TAIL_FACTOR = 0.1
 
 
 class Engine(NamedTuple):
@@ -71,17 +72,16 @@ def find_obstacle_of_map(name: str, model: Model) -> str:
     return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
-def choose_steady_method(model: Model) -> str:
-    """Return the engine whose method computes the steady motion of a model: "hybrid" for shooting, or "harmonic".
+def may_fold(model: Model) -> bool:
+    """Return whether a response curve of a model may turn back over frequency, so that it is followed along its arc length.
 
-    Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
-    forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
-    `harmonics`.
+    With Coulomb friction, elastic-plastic elements and grooves there is one steady motion at each frequency.
     """
-    is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
-    if model.accuracy.harmonics is None:
-        is_shot |= not find_obstacle_of_map("piecewise", model)
-    return "hybrid" if is_shot else "harmonic"
+    return bool(
+        model.grooves is None
+        and find_obstacle_of_map("exact", model)
+        and find_obstacle_of_map("piecewise", model)
+    )
 
 
 # ---- comparison runs
@@ -103,8 +103,9 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
 
 
 def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
-    """List numerical settings with a coarser mesh: of the patch of [contact], or of one interface patch each.
+    """List numerical settings in which one patch of a model has a coarser mesh: that of [contact], or of an interface.
 
+    Interfaces with equal patches are coarsened together.
     `numerics` are the settings of the run, and `has_coarse_patch` tells whether the patch of [contact] matters.
     """
     meshes = [replace(numerics, coarse_patch=True)] * has_coarse_patch
@@ -200,7 +201,9 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
         finer = replace(
-            choice, merge=MERGE_WIDTH_FACTOR * choice.merge, tail=TAIL_FACTOR * choice.tail
+            choice,
+            merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
+            tail=COMPARISON_TAIL_FACTOR * choice.tail,
         )
         narrow = replace(quarter, choice=finer)
         same = replace(quarter, choice=choice)
@@ -269,8 +272,6 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     with the errors that its finder knows by measure.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
-    if choose_steady_method(model) == "harmonic":
-        return [own]
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
 
 
@@ -307,10 +308,9 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:
-        used = choose_steady_method(model)
+        used = "hybrid"
     reasons = {
         "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
-        "harmonics": "if the steady motion is found by the exact solution from event to event",
     }
     sentences = []
     for key in list_fixed_settings(model.accuracy):

@@ -14,7 +14,7 @@ from ..bench import averaged_law
 from ..bench import shear as bench_shear
 from ..results.patch_rows import Arrays
 from ..results.result import (
-    N_FRAMES,
+    N_INTERFACE_FRAMES,
     SlipRule,
     collect_rest_frame,
     compute_status,
@@ -48,7 +48,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     snapshots = solution.snapshots
     n_samples = len(window.time)
     first = max(0, n_samples - 1 - n_samples // numerics.window)
-    samples = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
+    samples = np.linspace(first, n_samples - 1, N_INTERFACE_FRAMES).round().astype(int)
 
     def list_frames(name: str) -> np.ndarray:
         """Return time [s], slide [m], force [N] or slip [m] in each frame (f,)."""

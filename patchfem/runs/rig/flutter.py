@@ -11,15 +11,15 @@ from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...dynamics import limit_cycles
 from ...effects import law_has_trait
 from ...formatting import format_length
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response.measures import Measures
-from ...response.rows import TABLE
+from ...response.rows import MOTION_TABLE
 from .engines import find_obstacle_of_map
 from .joints import make_law_group, make_single_law
 from .solution import first_interface_load
 
 FLUTTER_MEASURE = "flutter_amplitude"
-NO_INTERFACE_NOTE = (
+NO_MOVING_INTERFACE_NOTE = (
     "no mode with negative damping moves an interface, so friction cannot dissipate the energy "
     "of such a mode"
 )
@@ -32,7 +32,7 @@ NO_SMALLER_CYCLE_NOTE = (
     f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_SLIDING_RATIO:g} and "
     f"{limit_cycles.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
 )
-UNSUPPORTED_LAW_REASON = (
+UNSUPPORTED_BOND_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
     "bond length and pieces that are rigid in shear"
 )
@@ -40,7 +40,7 @@ NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
     "gains"
 )
-RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
+RIGID_FRICTION_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
 
 
 class Flutter(NamedTuple):
@@ -55,18 +55,22 @@ class Flutter(NamedTuple):
 
 
 def compute_flutter_amplitude(run) -> Flutter:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig."""
+    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig, above which a motion grows.
+
+    `run` is the `rig.CoupledRun` of the rig, whose model has a mode of negative damping. Without an unstable cycle the
+    measure has no value, but the reason.
+    """
     model = run.model
-    unit = TABLE[FLUTTER_MEASURE].unit
-    floor = TABLE[FLUTTER_MEASURE].floor
+    unit = MOTION_TABLE[FLUTTER_MEASURE].unit
+    floor = MOTION_TABLE[FLUTTER_MEASURE].floor
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
 
     end_notes = []
     outcome = run.solution.outcome
-    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL:
+    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
         end_time = run.solution.response.time[-1]
         end_notes.append(
-            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
+            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_COMPUTED_DISPLACEMENT:g} m"
         )
 
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
@@ -125,14 +129,15 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     the interface, or None for an interface without one.
     """
     rig = model.rig
-    f = model.friction
-    if len(rig.friction.interfaces) != 1 or f is None:
+    law = model.friction
+    if len(rig.friction.interfaces) != 1 or law is None:
         return LimitCycles([], "limit cycles can be computed for one interface only")
 
     modes = rig.modes
+    # Slide of the interface per unit of each mode.
     row = modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
-        return LimitCycles([], NO_INTERFACE_NOTE)
+        return LimitCycles([], NO_MOVING_INTERFACE_NOTE)
 
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
@@ -142,9 +147,9 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         # Rigid friction is a relay: the force has one magnitude during slip.
         if element is not None and element.form == "rigid":
             if rig.springs.is_nonlinear:
-                return LimitCycles([], f"{RIGID_LAW_REASON} a nonlinear spring")
+                return LimitCycles([], f"{RIGID_FRICTION_REASON} a nonlinear spring")
             if not modes.omega.all():
-                return LimitCycles([], f"{RIGID_LAW_REASON} a mode of 0 Hz")
+                return LimitCycles([], f"{RIGID_FRICTION_REASON} a mode of 0 Hz")
             static, kinetic = element.numbers[1:3]
             cycles = limit_cycles.find_relay_cycles(modes, row, kinetic, static)
             return LimitCycles(cycles, NO_SLIDING_NOTE)
@@ -152,11 +157,11 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         # All other laws have smooth loops, which harmonic balance finds.
         group = make_law_group(model, numerics, patch)
         cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
-            modes, group, row, f.static * first_interface_load(model, patch)
+            modes, group, row, law.static * first_interface_load(model, patch)
         )
         reason = NO_SMALLER_CYCLE_NOTE if smallest_amplitude else NO_CYCLE_NOTE
         return LimitCycles(cycles, reason, smallest_amplitude)
     except NotConverged as missing:
         return LimitCycles([], str(missing))
     except PatchfemError:
-        return LimitCycles([], UNSUPPORTED_LAW_REASON)
+        return LimitCycles([], UNSUPPORTED_BOND_LAW_REASON)

@@ -6,8 +6,8 @@ from .types import Fraction, Table, key, number, optional, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
-# Largest number of harmonics or shear modes; more make the dense matrices too large.
-MAX_MODES = 10_000
+# Largest number of shear modes; more make the dense matrices too large.
+MAX_HARMONICS_OR_SHEAR_MODES = 10_000
 
 
 class Accuracy(Table):
@@ -42,11 +42,7 @@ class Accuracy(Table):
         Fraction,
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
     )
-    harmonics: optional(
-        whole_number(1, MAX_MODES),
-        "number of harmonics in the harmonic balance; default: set by the tolerance",
-    )
     shear_modes: optional(
-        whole_number(1, MAX_MODES),
+        whole_number(1, MAX_HARMONICS_OR_SHEAR_MODES),
         "number of shear modes of the pieces; default: set by the tolerance",
     )

@@ -46,7 +46,7 @@ from .values import TomlValue
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
 MAX_MASS_NUMBER = 1_000_000  # largest number of a mass in a key
-MAX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
+MAX_MATRIX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
 
 
 class Normal(Table):
@@ -314,7 +314,7 @@ class Interface(Friction):
         return key.replace("contact", "structure.interface.contact", 1)
 
 
-Coordinate = whole_number(1, MAX_ROW_NUMBER) | Text
+Coordinate = whole_number(1, MAX_MATRIX_ROW_NUMBER) | Text
 
 
 class Reduced(Table):

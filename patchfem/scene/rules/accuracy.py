@@ -30,7 +30,6 @@ SETTING_SCOPES: dict[str, SettingScope] = {
     "steps_per_cycle": SettingScope("bench rig linear", "auto bench march harmonic"),
     "tail": SettingScope("bench rig", "auto bench march", "bonds"),
     "merge": SettingScope("bench rig", "auto bench march", "bonds"),
-    "harmonics": SettingScope("rig", "harmonic"),
     "shear_modes": SettingScope("bench rig", "auto bench march"),
 }
 

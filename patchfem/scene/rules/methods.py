@@ -112,7 +112,7 @@ ENGINE_SUPPORT = {
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
 # Key of the engine that computes the motion
-METHOD_KEY = "accuracy.method"
+ENGINE_KEY = "accuracy.method"
 
 
 def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> str:
@@ -182,7 +182,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     return True
 
 
-def check_method(draft: SceneDraft, kind: str) -> None:
+def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
     """Report an accuracy.method that cannot solve the scene of a draft.
 
     A method that is not used in this `kind` of scene gets a remark.
@@ -190,12 +190,12 @@ def check_method(draft: SceneDraft, kind: str) -> None:
     method = draft.values.accuracy.method
     if method in list_unused_methods(kind):
         draft.add_remark(
-            METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
+            ENGINE_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
     if method and kind in ("rig", "linear"):
         reason = _find_obstacle(method, find_motion_features(draft.tables, kind))
         if reason:
-            draft.add_mistake(METHOD_KEY, reason)
+            draft.add_mistake(ENGINE_KEY, reason)
 
 
 def list_unused_methods(kind: str) -> tuple[str, ...]:
@@ -339,7 +339,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> str:
-    """Return why harmonic balance cannot find the steady motion of a scene, or "" if it can.
+    """Return why the steady motion of a scene cannot be found by the map of a period, or "" if it can.
 
     `limits` has, for each engine, the feature of the `motion` that it does not support, or "".
     """
@@ -355,30 +355,14 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
+    # The motion over a period is computed from event to event.
     feature = limits["harmonic"]
-    # The steady motion over grooves is found by the map of a period from event to event.
-    if not feature and motion.has_grooves and limits["hybrid"]:
-        feature = f"with {motion.spring} {limits['hybrid']}"
-    if feature:
-        return describe_unsupported(f"'harmonic' {feature}", "march")
-    if motion.has_grooves or not (motion.joints and limits["exact"] and limits["piecewise"]):
-        return ""
-
-    # What harmonic balance lacks where no map of a period solves the motion exactly.
-    law = motion.joints[0].law
-    beside = ""
-    remedy = "march"
-    if len(motion.joints) > 1:
-        beside = "several interfaces and a law without exact solution or a nonlinear spring"
-    elif law_has_trait(law.law, "set-valued"):
-        if not motion.compliance:
-            beside = f"law '{law.law}', whose force jumps, and {motion.spring}"
-            remedy = "march or stiff"
-    elif not law_supports(law, "harmonic"):
-        beside = describe_law(law)
-        remedy = f"use 'march', or {suggest_laws('harmonic', friction=law)}"
-    elif law_has_trait(law.law, "bonds"):
-        growth = "friction.rest_growth" if law.rest_growth else ""
-        cause = growth or motion.compliance or motion.lower_shape
-        beside = cause and f"law '{law.law}' and {cause}"
-    return beside and describe_unsupported(f"'harmonic' with {beside}", remedy)
+    if not feature and limits["hybrid"]:
+        feature = limits["hybrid"]
+        if motion.has_grooves:
+            feature = f"with {motion.spring} {feature}"
+        joint = _find_unsupported_joint(ENGINE_SUPPORT["hybrid"], motion)
+        if joint is not None and not (motion.has_grooves or law_supports(joint.law, "harmonic")):
+            remedy = f"use 'march', or {suggest_laws('harmonic', friction=joint.law)}"
+            return describe_unsupported(f"'harmonic' with {describe_law(joint.law)}", remedy)
+    return feature and describe_unsupported(f"'harmonic' {feature}", "march")

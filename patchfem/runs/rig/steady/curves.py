@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....core import Response, SineDrive
+from ....formatting import format_quantity
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
@@ -19,8 +20,19 @@ COLUMN_MEASURES = {
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
 }
+SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental")  # what sensors see
 # Round-off of the third harmonic of the acceleration relative to the first one.
 HARMONIC_ROUND_OFF = 1e-12
+# Relative error of the measures of an event-driven motion, which has round-off only.
+EXACT_RELATIVE_ERROR = 1e-9
+# Reasons why a curve ends before the last frequency, by the value of `CurvePath.ended`
+REASONS_OF_END = {
+    "start": "it turns back to its first frequency",
+    "loop": "it is closed",
+    "points": "it has too many points",
+    "step": "no neighbouring motion was found there",
+    "cost": "its motions take too many steps, because a law or a mode is much faster than the drive",
+}
 # Largest relative error of linear interpolation between the points of a response curve.
 INTERPOLATION_TOL = 0.01
 
@@ -113,3 +125,38 @@ def tabulate_curve(points, folds=()) -> Arrays:
         "multiplier": np.array([point.multiplier for point in points]),
         "folds": np.array(folds),
     }
+
+
+def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
+    """Return the errors of the measures of a point of a response curve from the relative error of the motion.
+
+    The ratio of two harmonics has the error of the first.
+    """
+    scale = EXACT_RELATIVE_ERROR + relative
+    errors = {name: scale * abs(value) for name, value in values.items()}
+    if "acceleration_distortion" in errors:
+        errors["acceleration_distortion"] += HARMONIC_ROUND_OFF + relative
+    return errors
+
+
+def note_end_of_curve(points: list[CurvePoint], ended: str, last: float) -> list[str]:
+    """Return a note if a curve ends before the end of the sweep, else an empty list.
+
+    Parameters
+    ----------
+    points : list of CurvePoint
+        Points of the curve.
+    ended : str
+        Why it ends, see `hybrid.continuation.CurvePath`.
+    last : float
+        Last frequency of the sweep [Hz].
+    """
+    if ended == "end":
+        return []
+    frequencies = [point.drive.omega / (2 * np.pi) for point in points]
+    reached = min(frequencies, key=lambda frequency: abs(frequency - last))
+    return [
+        f"the curve of steady motions reaches {format_quantity(reached, 'Hz', 4)} and not the end of the sweep at "
+        f"{format_quantity(last, 'Hz', 4)}: {REASONS_OF_END[ended]}; the largest motion is that of this part, so "
+        "change drive.from or drive.to"
+    ]

@@ -1,7 +1,7 @@
 """Steady motion of a rig by shooting with the map of a period of the engine `hybrid`.
 
-In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over frequency or drive
-level (`hybrid.periodic`).
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine (`hybrid.periodic`), and the response curve over
+frequency, by continuation through its folds where it may have some (`hybrid.periodic_curves`).
 """
 
 from dataclasses import replace
@@ -13,61 +13,52 @@ import numpy as np
 from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....dynamics.curve_points import sample_adaptively
+from ....formatting import format_length
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
-from ....hybrid.laws import is_rigid
+from ....hybrid.continuation import PathPoint, PathSettings
+from ....hybrid.laws import is_rigid, masing
+from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
 from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
+from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ...results.result import Settings, SteadyData
-from ..engines import estimate_hybrid_errors
+from ..engines import estimate_hybrid_errors, may_fold
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
 from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
-    HARMONIC_ROUND_OFF,
     INTERPOLATION_TOL,
+    SENSED_COLUMNS,
     CurvePoint,
     ObservedMotion,
     ResponseCurve,
     describe_instability,
+    estimate_point_errors,
+    note_end_of_curve,
 )
 
-# Relative error of the measures of an event-driven motion, which has round-off only.
-EXACT_RELATIVE_ERROR = 1e-9
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
-SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental")  # what sensors see
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
-FULL_SLIP_TOL = (
-    1e-9  # relative distance from its friction limit at which an interface slips as a whole
-)
-
-
-class PeriodMap:
-    """Map of a period of a rig by the engine `hybrid`."""
-
-    def __init__(self, model, numerics, patch, say=None):
-        compiled.load_compiled_module("hybrid.engine_kernels", say)
-        self.rig = model.rig
-        self.joints = make_joints(model, numerics, patch)
-
-    def make_case(self, drive) -> cases.Case:
-        """Return the case of a period from rest under sinusoidal drive."""
-        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
-        return cases.make_rig_case(self.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
-
-    def find_multipliers(self, drive, modal_state) -> np.ndarray:
-        """Return the Floquet multipliers of a motion from its modal state (2 n,) at phase 0 of the drive."""
-        return periodic.find_multipliers(self.make_case(drive), modal_state)
+# Relative distance from its friction limit at which an interface slips as a whole
+FULL_SLIP_TOL = 1e-9
+# Steps along a response curve over frequency
+FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
+# Weakest and strongest drive between which the motions are followed that coexist under a drive, relative to it, and the
+# steps along this curve
+WEAK_DRIVE = 1e-2
+MAX_LEVEL_RATIO = 10.0
+LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
 
 
 class ShootingFinder:
@@ -81,9 +72,21 @@ class ShootingFinder:
         self.numerics = replace(
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
-        self.period_map = PeriodMap(model, self.numerics, patch, say)
-        self.joints = self.period_map.joints
+        compiled.load_compiled_module("hybrid.engine_kernels", say)
+        self.joints = make_joints(model, self.numerics, patch)
+        self.may_fold = may_fold(model)
+        # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
+        laws = [law for law, _ in self.joints.laws]
+        is_smooth = any(masing.has_power_law(law) for law in laws)
+        is_smooth &= all(law.law == "masing" for law in laws)
+        self.follows_curve = self.may_fold or (is_smooth and self._max_growth_rate < 0)
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
+
+    def make_case(self, drive) -> cases.Case:
+        """Return the case of a period from rest under sinusoidal drive."""
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        rig = self.model.rig
+        return cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
 
     def find_periodic_motion(self, drive, guess=None) -> periodic.PeriodicMotion:
         """Find the periodic motion under sinusoidal drive, from rest or from a similar motion.
@@ -100,10 +103,14 @@ class ShootingFinder:
         NotConverged
             If no motion is found that repeats after each cycle.
         """
-        case = self.period_map.make_case(drive)
+        case = self.make_case(drive)
         n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
         motion = periodic.find_periodic_motion(
-            case, start=guess, n_first=n_first, has_kinks=self.joints.has_kinks
+            case,
+            start=guess,
+            n_first=n_first,
+            has_kinks=self.joints.has_kinks,
+            is_undamped=self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL,
         )
         if motion.grows:
             return motion
@@ -128,7 +135,7 @@ class ShootingFinder:
             periodic_data = SteadyData("leaves its grooves", np.zeros(0))
             return replace(solution, errors=errors, periodic=periodic_data)
 
-        motion = self.find_periodic_motion(drive, guess)
+        motion, notes = self._find_stable_motion(drive, guess)
         state = None if motion.grows else motion.run.final
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
         run = self.evaluator.resume(drive, cycles, state, self.frames)
@@ -162,9 +169,77 @@ class ShootingFinder:
             outcome=outcome,
             message=solution.message if is_stable else describe_instability(motion.multipliers),
             errors=errors,
+            notes=(*solution.notes, *notes),
             settings=Settings(map="shooting"),
             periodic=SteadyData(regime, motion.multipliers, motion.change),
         )
+
+    def _find_stable_motion(self, drive, guess) -> tuple[periodic.PeriodicMotion, tuple[str, ...]]:
+        """Return a periodic motion, and notes on others under the same drive.
+
+        An unstable motion is not seen in a test. Where the curve of the motions may have folds, all of them are then
+        compared, and the smallest stable one is returned, or the first one if there is none.
+
+        Parameters
+        ----------
+        drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
+        guess : State, PathPoint or None
+            State of a similar motion, or the point of a response curve that has this drive.
+        """
+        if isinstance(guess, PathPoint):
+            motion = guess.equations.details
+        else:
+            try:
+                motion = self.find_periodic_motion(drive, guess)
+            except NotConverged:
+                if not self.may_fold:
+                    raise
+                motion = None
+        if not self.may_fold or (motion is not None and (motion.is_stable or motion.grows)):
+            return motion, ()
+
+        motions = self._list_coexisting_motions(drive)
+        stable_motions = [other for other in motions if other.is_stable]
+        if not stable_motions:
+            motions = motions if motion is None else [motion]
+            if not motions:
+                raise NotConverged(
+                    "no periodic motion was found, neither from rest nor from weaker drives; use accuracy.method = "
+                    '"march"'
+                )
+            return motions[0], ()
+
+        amplitudes = [other.run.values[AMPLITUDE] for other in motions]
+        sizes = ", ".join(format_length(amplitude, 3) for amplitude in amplitudes)
+        note = (
+            f"at this drive {len(motions)} steady motions exist (amplitudes {sizes}), "
+            f"{len(stable_motions)} of them stable"
+        )
+        if len(stable_motions) > 1:
+            note += (
+                "; the stable motion of smallest amplitude is shown; accuracy.method = "
+                '"march" gives the motion that is reached from rest'
+            )
+        return stable_motions[0], (note,)
+
+    def _list_coexisting_motions(self, drive) -> list[periodic.PeriodicMotion]:
+        """Return the periodic motions under a drive in increasing amplitude.
+
+        The curve of the motions over the drive level begins near rest and passes the level once for each of them, through
+        its folds up to MAX_LEVEL_RATIO of the level.
+        """
+        level = drive.acceleration
+        weak = replace(drive, acceleration=WEAK_DRIVE * level)
+        start = CurveStart(self.find_periodic_motion(weak).run.final, weak.acceleration)
+        equations = PeriodEquations(
+            lambda level: self.make_case(replace(drive, acceleration=level)),
+            start,
+            has_kinks=self.joints.has_kinks,
+        )
+        path = equations.follow((0.0, MAX_LEVEL_RATIO * level), LEVEL_PATH)
+        motions = [point.equations.details for point in equations.list_crossings(path, level)]
+        return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
 
     def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
         """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point.
@@ -218,6 +293,8 @@ class ShootingFinder:
             forces = motion.run.record.get_face_extremes(Probe.FORCE)[: len(laws)]
             slides = (np.abs(forces).max(axis=1) >= limits * (1 - FULL_SLIP_TOL)).all()
             return "slides" if slides else "partial slip"
+        if self.may_fold:
+            return "slides" if laws else "no friction"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
         lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
@@ -229,7 +306,8 @@ class ShootingFinder:
 
         Without friction it has a closed form, except for an undamped resonance.
         """
-        point = None if self.joints.laws else self._compute_linear_point(drive)
+        is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
+        point = self._compute_linear_point(drive) if is_linear else None
         if point is not None:
             return point
         if self._leave_grooves(drive) is not None:
@@ -320,11 +398,13 @@ class ShootingFinder:
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, which has no folds, with more points where it bends.
+        """Compute the response curve over frequency, by continuation if it may have folds or if the law is Iwan's.
 
-        The curve starts with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
+        Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
         the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
         """
+        if self.follows_curve:
+            return self._follow_curve(drive)
 
         def sample(frequency, before):
             """Return the amplitude [m] at a frequency [Hz], and the curve point."""
@@ -336,8 +416,58 @@ class ShootingFinder:
         samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)
         return ResponseCurve([point for _, point in samples])
 
+    def _follow_curve(self, drive) -> ResponseCurve:
+        """Compute the response curve over frequency through its folds."""
+        first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
+        motion, _ = self._find_stable_motion(first, None)
+        if motion.grows:
+            raise NotConverged(
+                "accuracy.method: the motion at the first frequency of the sweep grows for ever; change drive.from"
+            )
+        self._equations = PeriodEquations(
+            lambda omega: self.make_case(replace(first, omega=omega)),
+            CurveStart(motion.run.final, first.omega),
+            has_kinks=self.joints.has_kinks,
+        )
+        ends = 2 * np.pi * np.array([drive.low, drive.high])
+        bounds = (float(ends.min()), float(ends.max()))
+        path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
+        points = [self._make_curve_point(point) for point in path.points]
+        folds = tuple(fold / (2 * np.pi) for fold in path.folds)
+        return ResponseCurve(
+            points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
+        )
+
+    def _make_curve_point(self, point: PathPoint) -> CurvePoint:
+        """Return a point of a response curve that has been followed."""
+        signal = self.model.rig.drive.signal
+        motion = point.equations.details
+        regime = "stable" if motion.is_stable else "unstable"
+        if not self.may_fold:
+            regime = self._name_regime(motion, is_stuck=False) + ", unstable" * (
+                not motion.is_stable
+            )
+        values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
+        values = {name: value for name, value in values.items() if np.isfinite(value)}
+        return CurvePoint(
+            drive=SineDrive(signal.acceleration, float(point.w[-1]), signal.moving),
+            values=values,
+            errors=estimate_point_errors(values, find_relative_error(motion)),
+            regime=regime,
+            multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
+            stable=motion.is_stable,
+            guess=point,
+        )
+
+    def _sweep_width(self) -> float:
+        """Return the width of the swept frequency range [rad/s]."""
+        drive = self.model.rig.drive.signal
+        return 2 * np.pi * abs(drive.high - drive.low)
+
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
-        """Return the distance [rad/s] between two points of a response curve."""
+        """Return the distance between two points of a response curve: its scaled arc length, or [rad/s] if it is sampled."""
+        if self.follows_curve:
+            return measure_distance(first.guess, second.guess, self._sweep_width())
         return abs(second.drive.omega - first.drive.omega)
 
     def compute_point_between(
@@ -352,6 +482,15 @@ class ShootingFinder:
         fraction : float
             Fraction of the distance between the points, from the first one.
         """
+        if self.follows_curve:
+            point = self._equations.find_between(
+                first.guess, second.guess, fraction, self._sweep_width()
+            )
+            if point is None:
+                raise NotConverged(
+                    "accuracy.method: no steady motion was found between two neighbouring points of the curve"
+                )
+            return self._make_curve_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
         return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
 
@@ -374,15 +513,3 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
     return motion.error + STEPS_ERROR * RTOL
-
-
-def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
-    """Return the errors of the measures of a point of a response curve from the relative error of the motion.
-
-    The ratio of two harmonics has the error of the first.
-    """
-    scale = EXACT_RELATIVE_ERROR + relative
-    errors = {name: scale * abs(value) for name, value in values.items()}
-    if "acceleration_distortion" in errors:
-        errors["acceleration_distortion"] += HARMONIC_ROUND_OFF + relative
-    return errors

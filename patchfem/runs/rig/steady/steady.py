@@ -1,19 +1,13 @@
 """Steady motion of a rig under a sine, and the largest one over a sweep.
 
 In: a Model, its Numerics and its Patch. Out: the Solution of the periodic motion with its regime,
-Floquet multipliers and stability. Coulomb interfaces, elastic-plastic elements and grooves are solved by shooting with
-the map of a period (`shooting`), and other laws by harmonic balance (`balance`).
+Floquet multipliers and stability, by shooting with the map of a period (`shooting`).
 """
 
 from ....core import SineDrive
-from ..engines import choose_steady_method
 from ..solution import Solution
-from .balance import BalanceFinder
 from .peak import solve_peak
 from .shooting import ShootingFinder
-
-# Classes that find steady motions, by the name of the engine from `choose_steady_method`
-FINDERS = {"hybrid": ShootingFinder, "harmonic": BalanceFinder}
 
 
 def solve_steady_motion(
@@ -28,7 +22,7 @@ def solve_steady_motion(
     model : Model
         Rig, drive and friction laws.
     numerics : Numerics
-        Settings of the run, from which each method makes its own.
+        Settings of the run, from which the finder makes its own.
     patch : Patch or None
         None under [normal] and between masses.
     frames : int
@@ -40,8 +34,7 @@ def solve_steady_motion(
     -------
     Solution
     """
-    finder_class = FINDERS[choose_steady_method(model)]
-    finder = finder_class(model, numerics, patch, frames, say)
+    finder = ShootingFinder(model, numerics, patch, frames, say)
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
         return finder.compute_steady_motion(drive)
