@@ -63,7 +63,6 @@ PUBLIC = {
         "relaxation_length",
     ),
     "laws.stretch": ("points_element",),
-    "laws.stretch_kernels": ("relax_stretch",),
     "path_work": (
         "mean_slip_phase",
         "sampled_work",

@@ -132,4 +132,5 @@ def from_keys(friction, load, speed):
         growth = (friction.rest_growth, friction.slip_growth, rest_speed)
     numbers = (friction.static, length, ratio * length, *growth)
     scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
-    return LawNumbers("bonds", numbers, (friction.initial_bonds, 0.0, 0.0, length), scales)
+    states = (friction.initial_bonds, 0.0, 0.0, length)
+    return LawNumbers("bonds", numbers, states, scales, stiffness=friction.static * load / length)

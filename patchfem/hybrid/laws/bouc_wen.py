@@ -89,4 +89,4 @@ def from_keys(friction, load, speed):
     """
     length = friction.static * load / friction.stiffness
     numbers = friction.static, length, friction.exponent, friction.shape
-    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,))
+    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,), stiffness=friction.stiffness)

@@ -3,6 +3,8 @@
 Numbers: mu_s, mu_k. The averaged law of Oden and Pires is Coulomb friction with the average pressure.
 """
 
+from math import inf
+
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = True
@@ -96,4 +98,4 @@ def from_keys(friction, load, speed):
         Expected peak speed [m/s].
     """
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    return LawNumbers("coulomb", (friction.static, kinetic))
+    return LawNumbers("coulomb", (friction.static, kinetic), stiffness=inf)

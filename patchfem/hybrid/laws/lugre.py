@@ -99,4 +99,5 @@ def from_keys(friction, load, speed):
         friction.static, kinetic, stiffness, friction.stribeck_speed,
         friction.micro_damping / load, friction.viscous / load,
     )  # fmt: skip
-    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * friction.static / stiffness,))
+    scale = 1e-2 * friction.static / stiffness
+    return LawNumbers("lugre", numbers, (0.0,), (scale,), stiffness=friction.stiffness)
