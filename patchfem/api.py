@@ -448,7 +448,7 @@ def cost(
     ('200', True)
     """
     model = build(scene, **sets)
-    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
+    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)
@@ -464,8 +464,8 @@ def _save(make_answer: Callable[[Path], Any], out: str | Path) -> Any:
     """
     with Folder(Path(out)) as folder:
         answer = make_answer(folder.path)
-        store.write(answer, folder.path)
-        page.write_page(folder.path)
+        store.write_answer(answer, folder.path)
+        page.write_report(folder.path)
     return answer
 
 
@@ -652,7 +652,7 @@ def sweep(
     # the cases are those of the command line, whose words the answer names
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
-    request = parse_request.Request(ranges, None, draw, sobol, seed)
+    request = parse_request.CaseRequest(ranges, None, draw, sobol, seed)
     command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets, request.list_options())
     cases = replace(parse_request.read_cases(sweep_scene, request), command=command)
 
@@ -968,7 +968,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(page.write_report(_require_paths(folders, "report"), target))
+    return page.write_report(*_require_paths(folders, "report"), out=target)
 
 
 def export(

@@ -24,6 +24,7 @@ from .formatting import format_value
 
 __all__ = [
     "G_N",
+    "MIN_LOAD",
     "Compliance",
     "ContactState",
     "DriveSegment",
@@ -44,6 +45,7 @@ __all__ = [
 ]
 
 G_N = 9.80665  # standard gravity [m s-2]
+MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness of a friction law refers
 # relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
 _STIFFENING_ROUND_OFF = 1e-9
 # lower limit of the overlap of two mode shapes, which keeps its logarithm finite
@@ -70,11 +72,11 @@ class Outcome(StrEnum):
     @property
     def sentence(self) -> str:
         """Description of the outcome for the user, with advice where it exists."""
-        return _SENTENCES[self]
+        return _OUTCOME_SENTENCES[self]
 
 
 # Sentence about each outcome of a run
-_SENTENCES = {
+_OUTCOME_SENTENCES = {
     Outcome.DONE: "The run finished as requested.",
     Outcome.STEADY: "The motion is steady: it repeats within the tolerance.",
     Outcome.STUCK: "During the last cycles of the run the whole interface sticks all the time.",

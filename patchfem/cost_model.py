@@ -7,14 +7,14 @@ are counted in `runs.rig.costs`. `measure_cpu_time` is the clock that decides wh
 from time import process_time
 
 # Steps of constant length.
-CYCLE_SECONDS = 3e-4  # CPU time [s] per cycle of time stepping with elements
-STEP_SECONDS = 4.3e-7  # CPU time [s] per time step with elements
-STEP_ELEMENT_SECONDS = 9e-10  # additional CPU time [s] per time step and element
+MARCH_CYCLE_SECONDS = 3e-4  # CPU time [s] per cycle of time stepping with elements
+MARCH_STEP_SECONDS = 4.3e-7  # CPU time [s] per time step with elements
+MARCH_ELEMENT_STEP_SECONDS = 9e-10  # additional CPU time [s] per time step and element
 
 # Steps from event to event.
 HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event
-HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
-HYBRID_INTERFACES_SECONDS = 1e-6  # additional CPU time [s] per such step and pair of interfaces
+HYBRID_MODE_PAIR_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
+HYBRID_INTERFACE_PAIR_SECONDS = 1e-6  # additional CPU time [s] per such step and pair of interfaces
 
 COMPILE_CPU_SECONDS = [0.0]  # CPU time [s] in which this process compiled code
 

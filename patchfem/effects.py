@@ -40,7 +40,7 @@ from .exceptions import PatchfemError
 
 # largest number of masses or modes of a rig, whose matrices are dense; defined here because parsing a scene must not
 # import numpy
-MAX_COORDINATES = 2000
+MAX_RIG_COORDINATES = 2000
 
 
 class Effect(NamedTuple):
@@ -124,7 +124,7 @@ GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )
 # keys of the table [drive] for the amplitude of a drive
-_DRIVE_SIZE_KEYS = "acceleration|displacement force"
+_DRIVE_AMPLITUDE_KEYS = "acceleration|displacement force"
 
 
 def _make_law(
@@ -300,18 +300,18 @@ EFFECTS = {
     "drive.kind=free": Effect("patchfem.structure.starts", "z(0), z'(0) given, G = 0"),
     "drive.waveform=sine": _make_waveform(
         "a(t) = a sin(2 pi f t)",
-        (f"frequency {_DRIVE_SIZE_KEYS}", ""),
+        (f"frequency {_DRIVE_AMPLITUDE_KEYS}", ""),
         "sine endless",
         "patchfem.structure.drive_sizes",
     ),
     "drive.waveform=step": _make_waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
-        (_DRIVE_SIZE_KEYS, ""),
+        (_DRIVE_AMPLITUDE_KEYS, ""),
         "step endless",
     ),
     "drive.waveform=sweep": _make_waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-        (f"from to rate|log_rate {_DRIVE_SIZE_KEYS}", ""),
+        (f"from to rate|log_rate {_DRIVE_AMPLITUDE_KEYS}", ""),
         "swept",
     ),
     "drive.waveform=levels": _make_waveform(

@@ -68,13 +68,13 @@ def test_exact_other_files_are_not_removed(tmp_path):
 def test_exact_new_folder_removes_old_ones(tmp_path):
     """A new folder removes the oldest folders beyond the limit, and each use updates the time of a folder."""
     folders = make_code_folders(
-        tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)]
+        tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_CACHE_FOLDERS + 3)]
     )
     current = make_current_folder(tmp_path)
     cache_limit.mark_used(current)
-    assert [folder.exists() for folder in folders] == [True] * cache_limit.MAX_OTHER_FOLDERS + [
-        False
-    ] * 3
+    assert [folder.exists() for folder in folders] == [
+        True
+    ] * cache_limit.MAX_OTHER_CACHE_FOLDERS + [False] * 3
     (current / "code").mkdir()
     old = make_code_folders(tmp_path / "more", [99])[0]
     cache_limit.mark_used(

@@ -46,7 +46,7 @@ def test_exact_page_names_command(tmp_path):
     loaded = pf.load(scene, **{"drive.cycles": 10})
     pf.sweep(loaded, {"friction.static": "0.1..0.3"}, draw=2, seed=4, out=tmp_path / "drawn")
     command = "patchfem sweep rig.toml --set drive.cycles=10 --over friction.static=0.1..0.3 --random 2 --seed 4"
-    assert store.read(tmp_path / "drawn").origin["command"] == command
+    assert store.read_answer(tmp_path / "drawn").origin["command"] == command
     assert command in read_page(tmp_path / "drawn")
 
 
@@ -55,7 +55,7 @@ def test_exact_page_of_scene_without_file_names_no_command(tmp_path):
     pf.sweep(BENCH, {"friction.static": [0.1, 0.3]}, out=tmp_path / "swept")
     pf.run(BENCH).save(tmp_path / "run")
     for name in ("swept", "run"):
-        assert not store.read(tmp_path / name).origin["command"]
+        assert not store.read_answer(tmp_path / name).origin["command"]
         assert "To repeat it" not in read_page(tmp_path / name)
 
 

@@ -18,7 +18,7 @@ PUBLIC = {
     "cost": (
         "Cost",
         "Judgement",
-        "TOLERANCE",
+        "TOLERANCE_SETTING",
         "describe_best_setting",
         "compute_setting_costs",
     ),
@@ -44,7 +44,7 @@ PUBLIC = {
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
     "sweeps.parse_request": (
-        "Request",
+        "CaseRequest",
         "read_cases",
         "read_sweep",
     ),

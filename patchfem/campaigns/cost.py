@@ -23,13 +23,13 @@ from ..runs.plan import plan
 from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
-    TOLERANCE,
+    TOLERANCE_SETTING,
     Setting,
     find_applicable_settings,
     make_setting_values,
 )
 
-MIN_RUNS = 3  # smallest number of runs of a curve over a setting
+MIN_RUNS_PER_CURVE = 3  # smallest number of runs of a curve over a setting
 # Number of timings of a short run; the shortest one is used, because disturbances only add time.
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
@@ -101,7 +101,7 @@ def compute_setting_costs(
     model : Model
         Model of the scene with its own settings.
     setting_name : str
-        One of NUMERICAL_SETTINGS, or TOLERANCE for several tolerances, which include that of the scene.
+        One of NUMERICAL_SETTINGS, or TOLERANCE_SETTING for several tolerances, which include that of the scene.
     say : callable, optional
         Called with a line of text for each run.
 
@@ -119,14 +119,14 @@ def compute_setting_costs(
     """
     with locate_errors(model.source):
         possible = find_applicable_settings(model)
-        if setting_name not in (TOLERANCE, *possible):
+        if setting_name not in (TOLERANCE_SETTING, *possible):
             raise PatchfemError(
                 f"cost --over {setting_name}: the cost of this setting cannot be measured for this scene; "
                 f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
         runs = _time_settings(make_setting_values(model, setting_name), say)
-    if not runs or (len(runs) < MIN_RUNS and setting_name != TOLERANCE):
+    if not runs or (len(runs) < MIN_RUNS_PER_CURVE and setting_name != TOLERANCE_SETTING):
         raise NotConverged(
             f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
         )

@@ -9,8 +9,8 @@ from ..core import PatchfemError
 from ..inputs.damage import shorten
 from ..scene.keys.quantities import parse_quantity
 
-MAX_LISTED_LENGTH = 200  # largest number of characters of a list of values in a message
-EQUAL_TOL = 1e-9  # largest relative difference at which two numbers count as equal
+MAX_LISTED_VALUES_CHARACTERS = 200  # largest number of characters of a list of values in a message
+EQUAL_NUMBERS_TOL = 1e-9  # largest relative difference at which two numbers count as equal
 # Kind of quantity and unit of each column of numbers by which rows can be selected
 NUMBER_UNITS = {"frequency": ("frequency", "Hz"), "input": ("acceleration", "m/s^2")}
 
@@ -81,7 +81,7 @@ def select_held_out(
             known = ", ".join(dict.fromkeys(format_cell(name, cell) for cell in cells))
             raise PatchfemError(
                 f"--hold {name}={text}: none of the rows of {path.name} with a reading has this value in the column "
-                f"{name}; its values are {shorten(known, MAX_LISTED_LENGTH)}"
+                f"{name}; its values are {shorten(known, MAX_LISTED_VALUES_CHARACTERS)}"
             )
         selected |= has_value
     return selected
@@ -111,4 +111,4 @@ def _has_value(name: str, cell: float | str, text: str) -> bool:
         value = parse_quantity(text, NUMBER_UNITS[name][0])
     except ValueError as error:
         raise PatchfemError(f"--hold {name}={text}: {error}") from None
-    return abs(cell - value) <= EQUAL_TOL * abs(value)
+    return abs(cell - value) <= EQUAL_NUMBERS_TOL * abs(value)

@@ -18,11 +18,11 @@ NUMERICAL_SETTINGS = ("element_size", *COUNT_LIMITS)
 # Factors by which a count of the scene is varied
 COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 # Factors by which the number of cells of a uniform mesh is varied
-CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
-CELL_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
-DEFAULT_COUNT = 8  # middle value of a count that the scene does not set
+CELL_COUNT_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
+CELL_COUNT_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
+DEFAULT_MIDDLE_COUNT = 8  # middle value of a count that the scene does not set
 # Name of the accuracy of all settings together, which a curve may vary in place of a single one.
-TOLERANCE = "tolerance"
+TOLERANCE_SETTING = "tolerance"
 # Tolerances for a series of runs; smaller ones take long and are rarely met.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
 
@@ -69,15 +69,16 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
     The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
     values if the value of the scene is small.
 
-    `name` is that of the setting, such as "element_size", or TOLERANCE.
+    `name` is that of the setting, such as "element_size", or TOLERANCE_SETTING.
     """
     words = name.replace("_", " ")
-    if name == TOLERANCE:
+    if name == TOLERANCE_SETTING:
         values = sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True)
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)
-        values = [length / count for count in _scale_count(cells, CELL_FACTORS, CELL_LIMITS)]
+        counts = _scale_count(cells, CELL_COUNT_FACTORS, CELL_COUNT_LIMITS)
+        values = [length / count for count in counts]
     else:
         values = _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name])
 
@@ -86,7 +87,7 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
         label = f"{1e6 * value:.4g} um" if name == "element_size" else f"{value:g}"
         changed = _change_setting(model, name, value)
         settings.append(Setting(label, float(value), f"{words} {label}", changed))
-    if name == TOLERANCE:
+    if name == TOLERANCE_SETTING:
         return settings
     automatic = _change_setting(model, name, None)
     return [*settings, Setting("by tolerance", None, f"{words} set by the tolerance", automatic)]
@@ -110,13 +111,13 @@ def _change_setting(model: Model, name: str, value: float | None) -> Model:
 def _find_count(model: Model, name: str) -> int:
     """Return the number of steps, modes or jumps that a run of the model takes by default.
 
-    `name` is that of the setting. It is DEFAULT_COUNT if only the run itself finds the number.
+    `name` is that of the setting. It is DEFAULT_MIDDLE_COUNT if only the run itself finds the number.
     """
     if name == "steps_per_cycle":
         if model.kind == "bench":
             return engine.steps_per_cycle(model)
         return numerics.choose_numerics(model).steps
-    return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_COUNT
+    return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_MIDDLE_COUNT
 
 
 def _scale_count(middle: int, factors: tuple[float, ...], limits: tuple[float, float]) -> list[int]:

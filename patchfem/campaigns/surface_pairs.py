@@ -7,9 +7,9 @@ from typing import NamedTuple
 from ..core import PatchfemError
 from ..inputs.tables import TableFormat, find_factors, read_text
 
-COLUMNS = ("before", "after")  # columns that every table has
+REQUIRED_COLUMNS = ("before", "after")  # columns that every table has
 # Possible cells of the column `direction`, "" if it is not known
-DIRECTIONS = ("", "x", "y")
+DIRECTION_CELLS = ("", "x", "y")
 
 
 class TableLine(NamedTuple):
@@ -54,18 +54,18 @@ def read_pairs(table: Path) -> list[TableLine]:
     path = Path(table)
     text = read_text(path, "the table")
     # No column is a number; the call refuses a header without the columns of the files.
-    find_factors(text, TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table"))
+    find_factors(text, TableFormat({}, REQUIRED_COLUMNS, ",".join(REQUIRED_COLUMNS), "the table"))
 
     lines = []
     for number, row in text.iterate_rows(skips_blank=True):
         cells = dict(zip(text.names, row))
-        names = tuple(cells.pop(column) for column in COLUMNS)
+        names = tuple(cells.pop(column) for column in REQUIRED_COLUMNS)
         direction = cells.pop("direction", "")
 
         if not all(names):
-            column = COLUMNS[names.index("")]
+            column = REQUIRED_COLUMNS[names.index("")]
             raise PatchfemError(f"{path}:{number}: {column}: the name of a file is needed")
-        if direction not in DIRECTIONS:
+        if direction not in DIRECTION_CELLS:
             raise PatchfemError(
                 f"{path}:{number}: direction: must be x, y or empty, not '{direction[:40]}'"
             )

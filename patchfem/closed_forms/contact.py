@@ -22,7 +22,7 @@ def subtract_sine(x):
 
 
 def find_rounded_angle(line_load, flat, radius, modulus) -> float:
-    """Return pi/2 - phi_0 of the rounded punch, with sin phi_0 = flat/(contact half width).
+    """Return the angle pi/2 - phi_0 [rad] of the rounded edges in contact, with sin phi_0 = flat/(contact half width).
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def find_rounded_angle(line_load, flat, radius, modulus) -> float:
     from scipy.optimize import brentq
 
     return brentq(
-        lambda angle: _compute_scaled_load(angle) - scaled_load,
+        lambda edge_angle: _compute_scaled_load(edge_angle) - scaled_load,
         0.0,
         max_angle,
         xtol=1e-18,
@@ -58,12 +58,12 @@ def find_rounded_angle(line_load, flat, radius, modulus) -> float:
     )
 
 
-def _compute_scaled_load(angle) -> float:
+def _compute_scaled_load(edge_angle) -> float:
     """Return the load 2 P R/(a_f^2 E*), without unit, at which a rounded punch touches over a given angle of its edges.
 
-    `angle` is pi/2 - phi_0 [rad], with phi_0 of `rounded_punch_half_width`.
+    `edge_angle` is pi/2 - phi_0 [rad], with phi_0 of `rounded_punch_half_width`.
     """
-    return subtract_sine(2 * angle) / (2 * np.cos(angle) ** 2)
+    return subtract_sine(2 * edge_angle) / (2 * np.cos(edge_angle) ** 2)
 
 
 def rounded_punch_half_width(line_load, flat, radius, modulus) -> float:

@@ -10,7 +10,7 @@ from ..export.surfaces import worn
 from ..surface.compare.compare import Options
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     Output,
     OutputGroup,
@@ -129,7 +129,7 @@ def _compare_pairs(table: Path, options, output: Output) -> None:
     for row in failed:
         print_message(make_printable(f"{table}:{row['line']}: {row['message']}"))
     if failed:
-        raise CommandExit(2 if len(failed) == len(rows) else NOT_CONVERGED)
+        raise CommandExit(2 if len(failed) == len(rows) else NOT_CONVERGED_EXIT_CODE)
 
 
 def _compare_in_scene(

@@ -35,7 +35,7 @@ from .shared import (
 
 # Tables [contact.profile] and [contact.asperities] of a scene; each match ends before the
 # comments above the next table.
-SPLIT_TABLES = re.compile(
+SURFACE_TABLES_PATTERN = re.compile(
     r"^[ \t]*\[contact\.(?:profile|asperities)\].*?(?=(?:^[ \t]*(?:#[^\n]*)?\n)*^[ \t]*\[|\Z)",
     re.MULTILINE | re.DOTALL,
 )
@@ -140,7 +140,7 @@ def _write_split(text: str, tables: str, scene_path: Path, out: Path) -> None:
     `text` is the scene in the file `scene_path`, and `tables` are the new tables as text. Raises UsageError if the
     scene has such tables inside [contact].
     """
-    remaining_text = SPLIT_TABLES.sub("", text).rstrip()
+    remaining_text = SURFACE_TABLES_PATTERN.sub("", text).rstrip()
     if {"profile", "asperities"} & tomllib.loads(remaining_text)["contact"].keys():
         raise UsageError(
             f"profile --split: {scene_path} has profile or asperities inside [contact]; write them as tables "

@@ -8,7 +8,7 @@ from ..export import run_folder, store
 from ..runs import plan
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     Output,
     OutputGroup,
@@ -84,7 +84,7 @@ def _report_complete_run(target: Path, output: Output) -> None:
         print_message(
             f"{target}: this run is already complete; to run it again, leave out --resume"
         )
-    answer = store.read(target)
+    answer = store.read_answer(target)
     if output.json_:
         print(json.dumps(store.make_summary(answer), ensure_ascii=False), flush=True)
     _end_run(answer, output.quiet)
@@ -99,7 +99,7 @@ def _end_run(answer, is_quiet: bool) -> None:
         return
     for text in answer.remarks.warnings if is_quiet else ():
         print_message(f"warning: {text}")
-    raise CommandExit(NOT_CONVERGED)
+    raise CommandExit(NOT_CONVERGED_EXIT_CODE)
 
 
 def _report_missing_page(fault: BaseException, target: Path) -> None:
@@ -110,7 +110,7 @@ def _report_missing_page(fault: BaseException, target: Path) -> None:
     if isinstance(fault, KeyboardInterrupt):
         reason = "interrupted while the page was drawn"
     elif isinstance(fault, MemoryError):
-        reason = f"{target / store.PAGE}: out of memory"
+        reason = f"{target / store.PAGE_FILE}: out of memory"
     elif isinstance(fault, core.PatchfemError | OSError):
         reason = str(fault)
     else:

@@ -155,7 +155,7 @@ def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> No
         print(text)
 
     for name, value in plan_data["groups"].items():
-        text, unit = plans.GROUPS.get(name, (_format_size_name(name), "1"))
+        text, unit = plans.DIMENSIONLESS_GROUPS.get(name, (_format_size_name(name), "1"))
         print(f"group    {format_quantity(value, unit, 4):<10} {text}")
     if verbose:
         absent = list_displayed_absent_effects(plan_data["not_in_scene"], plan_data["engine"])

@@ -23,7 +23,8 @@ from .streams import make_printable
 if TYPE_CHECKING:
     from ..export.answer import Answer
 
-NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if some cases failed
+# Exit code if a numerical method did not converge, or if some cases failed
+NOT_CONVERGED_EXIT_CODE = 3
 
 
 def flag_option(text: str, *names: str) -> type:
@@ -139,9 +140,9 @@ def save(make_answer: Callable[[Path], "Answer"], output: Output) -> "Answer":
         versions = {"versions": runs.list_versions()}
         origin = versions | answer.origin | {"command": describe_command()}
         answer = replace(answer, origin=origin)
-        store.write(answer, folder.path)
+        store.write_answer(answer, folder.path)
         if not output.no_page:
-            page.write_page(folder.path)
+            page.write_report(folder.path)
     present(answer, output)
     return answer
 

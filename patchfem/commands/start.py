@@ -50,7 +50,7 @@ def new(
             print(f"{name:<{width}}  {description}")
         return
     description = starting.TEMPLATE_DESCRIPTIONS.get(kind, "")
-    verb = starting.NEXT_VERBS.get(kind, "run")
+    verb = starting.NEXT_VERB_BY_KIND.get(kind, "run")
     _write_scene(starting.read_template(kind), out, [description], verb)
 
 
@@ -85,8 +85,10 @@ def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
     if kind != "joint":
         raise UsageError("--ask, --know and --want are for a joint: patchfem new joint --ask")
     refuse_existing(out)
-    known = known or _ask("--know", "What do you know about the joint?", joint_laws.KNOWLEDGE)
-    wanted = wanted or _ask("--want", "What do you want to compute?", joint_laws.WISHES)
+    known = known or _ask(
+        "--know", "What do you know about the joint?", joint_laws.KNOWLEDGE_OF_JOINT
+    )
+    wanted = wanted or _ask("--want", "What do you want to compute?", joint_laws.WISHES_FOR_LAW)
     choice = joint_laws.choose_law(known, wanted)
     _write_scene(
         joint_laws.compose_scene(choice), out, joint_laws.describe_choice(choice), verb="run"

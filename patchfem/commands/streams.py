@@ -8,7 +8,7 @@ import warnings
 
 # Word of more than 400 characters, longer than any readable path; a key or a value
 # can be megabytes long.
-LONG_WORD = re.compile(r"\S{401,}")
+LONG_WORD_PATTERN = re.compile(r"\S{401,}")
 
 
 class _OutputPipe(io.FileIO):
@@ -63,7 +63,7 @@ def make_printable(text: str) -> str:
 
     A word of more than 400 characters is shortened to its beginning and its end.
     """
-    shortened = LONG_WORD.sub(
+    shortened = LONG_WORD_PATTERN.sub(
         lambda match: f"{match[0][:60]}...{match[0][-20:]} ({len(match[0])} letters)", text
     )
     return "".join(character if character.isprintable() else "?" for character in shortened)

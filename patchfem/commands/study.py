@@ -14,7 +14,7 @@ from ..model import model
 from ..scene.scene import remember_written
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     OutputGroup,
     Progress,
@@ -48,7 +48,7 @@ def cost(
     settings = numerical_settings.NUMERICAL_SETTINGS
     if over and over not in settings:
         raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
-    names = [over or cost_curves.TOLERANCE]
+    names = [over or cost_curves.TOLERANCE_SETTING]
     if output_options.verbose and not over:
         names += numerical_settings.find_applicable_settings(scene_model)
     output = output_options.into(f"{scene_model.source.path.stem}-cost")
@@ -114,7 +114,7 @@ def backbone(
     answer = save(lambda _: backbones.compute_answer(build_model, request, report), output)
     cases = answer.details.get("cases", [answer.details])
     if not all(case["curves"] for case in cases):
-        raise CommandExit(NOT_CONVERGED)
+        raise CommandExit(NOT_CONVERGED_EXIT_CODE)
 
 
 def fit(
@@ -168,4 +168,4 @@ def fit(
             output,
         )
     if answer.details["outcome"] == "not_converged":
-        raise CommandExit(NOT_CONVERGED)
+        raise CommandExit(NOT_CONVERGED_EXIT_CODE)

@@ -14,7 +14,7 @@ from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
 from .shared import (
     DEFAULT_OUTPUT,
-    NOT_CONVERGED,
+    NOT_CONVERGED_EXIT_CODE,
     CommandExit,
     OutputGroup,
     Progress,
@@ -76,7 +76,7 @@ class CaseOptions:
             raise UsageError(
                 "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"
             )
-        return parse_request.Request(
+        return parse_request.CaseRequest(
             self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed
         )
 
@@ -148,7 +148,7 @@ def sweep(
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     cases = replace(cases, command=describe_command())
 
-    # a shard has no answer, because its tables would lack the cases of the others
+    # `answer` is None for a shard, because its tables would lack the cases of the other shards
     if by.collect:
         answer = run.collect_shards(sweep_scene, cases, target, not output.no_page)
     else:
@@ -163,7 +163,7 @@ def sweep(
         if counts["failed"] == counts["count"]:
             raise UsageError("sweep: no case could be run")
         if counts["failed"] or "not_converged" in counts["outcomes"]:
-            raise CommandExit(NOT_CONVERGED)
+            raise CommandExit(NOT_CONVERGED_EXIT_CODE)
     elif output.json_:
         print(json.dumps({"cases": len(cases), "folder": str(target)}))
     elif not output.quiet:

@@ -88,4 +88,4 @@ def report(
 
     Example: patchfem report out/rig out/six -o both.html
     """
-    print(page.write_report(list(folders), out))
+    print(page.write_report(*folders, out=out))

@@ -1,10 +1,10 @@
 """Compiled kernels and the cache of their machine code, one folder per state of the sources.
 
-`load` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in which some
-imports are replaced. The module, and with it numba, is imported only if a function is called whose machine code is not
-stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `prebuilt` finds the
-machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read `load`, `instantiate` and
-`KernelFunction` first.
+`load_compiled_module` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in
+which some imports are replaced. The module, and with it numba, is imported only if a function is called whose machine
+code is not stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code,
+`prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
+`load_compiled_module`, `instantiate` and `KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
 stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
@@ -65,15 +65,15 @@ TUPLE_MODULES = (
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
-MAX_LOCK_WAIT = 300.0
+MAX_LOCK_WAIT_SECONDS = 300.0
 # Time between two attempts to take the lock [s], short compared with a compilation.
-LOCK_CHECK_INTERVAL = 0.05
+LOCK_CHECK_SECONDS = 0.05
 # Functions called by this process whose machine code cannot be stored, so that every
 # process imports numba for them.
 UNCACHED_FUNCTIONS = set()
 # Lock that lets one thread at a time load code, because loading a function twice at the
 # same time crashes the process.
-LOADING_LOCK = RLock()
+CODE_LOADING_LOCK = RLock()
 _MESSAGE_CALLBACKS = []  # callbacks that receive a message when a function is compiled
 ARITHMETIC_OPERATORS = {
     ast.Add: add,
@@ -234,7 +234,7 @@ def pause_garbage_collection():
 def lock_exclusively(path: Path):
     """Let one process at a time run the block, by a lock on the file `path`.
 
-    The operating system releases the lock if the process is killed. Other processes wait for at most `MAX_LOCK_WAIT`
+    The operating system releases the lock if the process is killed. Other processes wait for at most `MAX_LOCK_WAIT_SECONDS`
     seconds, because the lock of a machine that has disappeared may remain on a network file system. On a file system
     without locks no process waits.
     """
@@ -248,13 +248,13 @@ def lock_exclusively(path: Path):
         return
     try:
         # Ask again and again. A lock that waits by itself could not be given up.
-        end = monotonic() + MAX_LOCK_WAIT
+        end = monotonic() + MAX_LOCK_WAIT_SECONDS
         while monotonic() < end:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                sleep(LOCK_CHECK_INTERVAL)
+                sleep(LOCK_CHECK_SECONDS)
             except OSError:
                 break
         yield
@@ -330,7 +330,7 @@ class KernelFunction:
             return self.get_dispatcher()(*arguments)
         function = self.loaded_functions.get(type_codes)
         if function is None:
-            with LOADING_LOCK:
+            with CODE_LOADING_LOCK:
                 # Another thread may have loaded it in the meantime.
                 function = self.loaded_functions.get(type_codes)
                 if function is None:
@@ -442,7 +442,7 @@ def _evaluate(node: ast.expr, names: dict[str, object]):
     raise KeyError(ast.unparse(node))
 
 
-def load(module: str, report=None):
+def load_compiled_module(module: str, report=None):
     """Load a module of the package, whose compiled code is cached on disk.
 
     Parameters
@@ -475,7 +475,7 @@ def _find_source(module: str) -> Path:
     return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
 
 
-_INSTANCES = {}  # `KernelModule` for each name that `instantiate` has made
+_KERNEL_MODULES = {}  # `KernelModule` for each name that `instantiate` has made
 
 
 def instantiate(
@@ -519,9 +519,9 @@ def instantiate(
 
     # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.
     name = f"{module}_{hash_text(text)}"
-    if name not in _INSTANCES:
-        _INSTANCES[name] = write_kernel_module(name, text, report, imported)
-    return _INSTANCES[name]
+    if name not in _KERNEL_MODULES:
+        _KERNEL_MODULES[name] = write_kernel_module(name, text, report, imported)
+    return _KERNEL_MODULES[name]
 
 
 def hash_text(text: str) -> str:

@@ -13,13 +13,15 @@ from time import time
 
 # Largest number of folders besides the one in use: several releases, environments and
 # machines may share a home folder.
-MAX_OTHER_FOLDERS = 8
+MAX_OTHER_CACHE_FOLDERS = 8
 # Smallest time [s] since the last use of a folder that is removed; one used later
 # may belong to a running process.
-MIN_UNUSED_TIME = 3600.0
-MARK_INTERVAL = 60.0  # smallest age [s] of a mark that is renewed
-STATE_NAME = re.compile(r"[0-9a-f]{16}")
-REMOVED_NAME = re.compile(r"\.[0-9a-f]{16}\.\d+\.gone")  # name of a folder that is being removed
+MIN_UNUSED_SECONDS = 3600.0
+MIN_MARK_AGE_SECONDS = 60.0  # smallest age [s] of a mark that is renewed
+CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
+REMOVED_FOLDER_PATTERN = re.compile(
+    r"\.[0-9a-f]{16}\.\d+\.gone"
+)  # name of a folder that is being removed
 
 
 def mark_used(folder: Path) -> None:
@@ -29,13 +31,13 @@ def mark_used(folder: Path) -> None:
     """
     with suppress(OSError):
         is_new = not any(folder.iterdir())
-        if is_new or time() - folder.stat().st_mtime > MARK_INTERVAL:
+        if is_new or time() - folder.stat().st_mtime > MIN_MARK_AGE_SECONDS:
             os.utime(folder)
         if is_new:
             remove_old_folders(folder)
 
 
-def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
+def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_CACHE_FOLDERS) -> None:
     """Remove the least recently used folders of compiled code beside this one.
 
     The `max_others` most recently used ones and those used in the last hour stay. Several processes may do this at the
@@ -43,16 +45,16 @@ def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> Non
     """
     others = {}
     for entry in os.scandir(folder.parent):
-        if REMOVED_NAME.fullmatch(entry.name):  # a killed process left the folder
+        if REMOVED_FOLDER_PATTERN.fullmatch(entry.name):  # a killed process left the folder
             shutil.rmtree(entry.path, ignore_errors=True)
         elif (
-            STATE_NAME.fullmatch(entry.name)
+            CACHE_FOLDER_PATTERN.fullmatch(entry.name)
             and entry.name != folder.name
             and entry.is_dir(follow_symlinks=False)
         ):
             others[Path(entry.path)] = find_last_use(Path(entry.path))
     for other in sorted(others, key=others.get, reverse=True)[max_others:]:
-        if time() - others[other] > MIN_UNUSED_TIME:
+        if time() - others[other] > MIN_UNUSED_SECONDS:
             _remove(other)
 
 
@@ -70,7 +72,7 @@ def _remove(folder: Path) -> None:
     removed = folder.with_name(f".{folder.name}.{os.getpid()}.gone")
     with suppress(OSError):  # another process removed the folder first
         os.rename(folder, removed)
-        if time() - find_last_use(removed) < MIN_UNUSED_TIME and not folder.exists():
+        if time() - find_last_use(removed) < MIN_UNUSED_SECONDS and not folder.exists():
             os.rename(removed, folder)
             return
         shutil.rmtree(removed, ignore_errors=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
-ROOT = Path(__file__).parents[2]
+REPOSITORY_FOLDER = Path(__file__).parents[2]
 # Program that prints the name of the common CPU in LLVM and the folder name KEY.
 CPU_AND_KEY_PROGRAM = """import platform, numba
 from patchfem.compiled import hash_sources, prebuilt
@@ -24,7 +24,7 @@ if not prebuilt.is_cpu_sufficient():
     raise SystemExit('this CPU lacks instruction sets of the machine code')
 print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
 # Scene of a rig whose kernels are compiled
-RIG_TEXT = """
+RIG_SCENE_TEXT = """
 [normal]
 load = "26 lbf"
 [structure]
@@ -35,10 +35,10 @@ frequency = "143 Hz"
 damping = 0.003
 slide = 1.0
 """
-SECOND_MODE_TEXT = (
+SECOND_MODE_TABLE_TEXT = (
     '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
 )
-DRIVE_TEXT = """[drive]
+DRIVE_TABLE_TEXT = """[drive]
 kind = "base"
 frequency = "143 Hz"
 acceleration = "5 g"
@@ -47,7 +47,7 @@ cycles = 20
 static = 0.3
 law = """
 # Laws whose kernels are compiled, as the table [friction] gives them
-LAW_TEXTS = (
+FRICTION_LAW_TEXTS = (
     '"coulomb"',
     '"elastic-plastic"\nbond_length = "1 um"',
     '"nonlocal"\nbond_length = "1 um"',
@@ -64,10 +64,12 @@ def list_usual_commands(folder: Path):
     These are runs of the rig in `studies`, runs of rigs with each friction law, and two sweeps. Their scenes are written
     into this folder.
     """
-    yield "run", ROOT / "studies" / "rig" / "rig.toml"
-    for number, (modes, law) in enumerate(product(("", SECOND_MODE_TEXT), LAW_TEXTS)):
+    yield "run", REPOSITORY_FOLDER / "studies" / "rig" / "rig.toml"
+    for number, (modes, law) in enumerate(
+        product(("", SECOND_MODE_TABLE_TEXT), FRICTION_LAW_TEXTS)
+    ):
         scene = folder / f"{number}.toml"
-        scene.write_text(f"{RIG_TEXT}{modes}{DRIVE_TEXT}{law}\n", "utf-8")
+        scene.write_text(f"{RIG_SCENE_TEXT}{modes}{DRIVE_TABLE_TEXT}{law}\n", "utf-8")
         yield "run", scene
     for number in range(2):  # for these laws, a sweep integrates many cases at once
         yield "sweep", folder / f"{number}.toml", "--over", "drive.acceleration=3 g..6 g:64"
@@ -95,7 +97,7 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
         environment = os.environ | {
             "NUMBA_CPU_FEATURES": "",
             "PATCHFEM_CACHE": str(cache),
-            "PYTHONPATH": str(ROOT),
+            "PYTHONPATH": str(REPOSITORY_FOLDER),
         }
         cpu, key = subprocess.run(
             [*python, "-c", CPU_AND_KEY_PROGRAM],

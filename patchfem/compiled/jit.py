@@ -64,7 +64,7 @@ NUMBA_PASSES = [
     for name in names
 ]
 # Private methods of numba's JITCodeLibrary that the libraries below replace or call.
-LIBRARY_METHODS = (
+NUMBA_LIBRARY_METHODS = (
     "_optimize_final_module",
     "_finalize_final_module",
     "_finalize_dynamic_globals",
@@ -81,7 +81,7 @@ def njit(cache: bool = False, **options):
     ----------
     cache : bool
         Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
-        callers; if this version of numba lacks the methods `LIBRARY_METHODS`, `numba.njit` compiles them.
+        callers; if this version of numba lacks the methods `NUMBA_LIBRARY_METHODS`, `numba.njit` compiles them.
     **options
         Options of `numba.njit`. Numba hands `forceinline=True` on to every function that the decorated one calls, and to
         those that these call, unless they set `forceinline=False`. Only functions that call little may set it: the bond
@@ -89,7 +89,7 @@ def njit(cache: bool = False, **options):
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function
-    if cache or not all(hasattr(JITCodeLibrary, name) for name in LIBRARY_METHODS):
+    if cache or not all(hasattr(JITCodeLibrary, name) for name in NUMBA_LIBRARY_METHODS):
         decorate = numba.njit(**NO_C_WRAPPER, **options)
         return (lambda function: store_on_disk(decorate(function))) if cache else decorate
     options = {"nopython": True, "boundscheck": None, **options}
@@ -192,11 +192,11 @@ def compile_optimised(function, arguments: tuple[object, ...]) -> tuple[BaseCont
     Raises
     ------
     NotImplementedError
-        If this version of numba lacks the methods `LIBRARY_METHODS`.
+        If this version of numba lacks the methods `NUMBA_LIBRARY_METHODS`.
     """
-    if not all(hasattr(JITCodeLibrary, name) for name in LIBRARY_METHODS):
+    if not all(hasattr(JITCodeLibrary, name) for name in NUMBA_LIBRARY_METHODS):
         raise NotImplementedError(
-            f"this version of numba lacks some of {', '.join(LIBRARY_METHODS)}"
+            f"this version of numba lacks some of {', '.join(NUMBA_LIBRARY_METHODS)}"
         )
     options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
     dispatcher = CPUDispatcher(function.py_func, function.locals, options, OptimisedCompiler)

@@ -25,9 +25,10 @@ import numpy as np
 
 from ..disk import user_cache
 
-SUCCESS_CODES = (0, -2)  # status codes of numba for success: a function returned a value, or None
+# Status codes of a function that returned a value, and of one that returned None
+NUMBA_SUCCESS_CODES = (0, -2)
 # Type code of `struct` for each type of number that a function takes.
-NUMBER_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
+STRUCT_TYPE_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
 _ARRAY_FORMATS = {}  # `ArrayFormat` for each (dtype, number of dimensions, flags) of an array
 # Number of tuples whose words are cached; a run passes the same few in many calls.
 MAX_CACHED_TUPLES = 12
@@ -50,7 +51,7 @@ class ArgumentConverter:
         Raises UnsupportedError for a type that compiled code cannot take. A tuple that contains only numbers is not
         cached.
         """
-        code = NUMBER_CODES.get(type(value))
+        code = STRUCT_TYPE_CODES.get(type(value))
         if code is not None:
             return code, struct.pack(code, value)
         if isinstance(value, np.ndarray):
@@ -65,7 +66,7 @@ class ArgumentConverter:
             # The tuple itself is cached too, so that no other object gets its `id`.
             known = value, f"{type(value).__name__}({','.join(codes)})", b"".join(words)
             # A tuple of numbers is made for a single call and would displace others from the cache.
-            if all(map(NUMBER_CODES.__contains__, map(type, value))):
+            if all(map(STRUCT_TYPE_CODES.__contains__, map(type, value))):
                 return known[1:]
             with self.lock:
                 self.known_tuples[id(value)] = known
@@ -146,7 +147,7 @@ class LoadedFunction:
         buffer = bytearray(self.header + words)
         self.call(ctypes.addressof(ctypes.c_char.from_buffer(buffer)))
         status = struct.unpack_from("q", buffer)[0]
-        if status not in SUCCESS_CODES:
+        if status not in NUMBA_SUCCESS_CODES:
             raise RuntimeError(f"compiled code ended with status {status}")
         values = struct.unpack_from(self.flat_format, buffer, 8)
         return _build_result(self.result_format, iter(values))

@@ -16,7 +16,7 @@ of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
 
 # Names that other folders use, by module
 PUBLIC = {
-    "active_set": ("patch_problem",),
+    "active_set": ("make_patch_problem",),
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
@@ -25,9 +25,9 @@ PUBLIC = {
     "conjugate_gradients": ("fit_motion", "solve_by_gradients"),
     "contact_sets": ("ContactSets",),
     "edges": (
-        "MIN_RELATIVE_PRESSURE",
+        "MIN_CONTACT_PRESSURE_RATIO",
         "contact_intervals",
-        "edge_offset",
+        "compute_edge_offset",
         "find_pressure_edges",
         "parabola_change",
         "snap_to_steps",
@@ -47,7 +47,7 @@ PUBLIC = {
         "StripModel",
         "press_strips",
         "split_into_strips",
-        "strip_offsets",
+        "compute_strip_offsets",
     ),
     "press_kernels": (
         "compute_energy",
@@ -56,8 +56,8 @@ PUBLIC = {
     ),
     "press_path_kernels": ("path_mean",),
     "set_arrays": (
-        "REFERENCE_LOAD",
-        "REFERENCE_MOMENT",
+        "REFERENCE_LOAD_INDEX",
+        "REFERENCE_MOMENT_INDEX",
         "SetArrays",
         "make_set_arrays",
         "hash_set",
@@ -67,5 +67,5 @@ PUBLIC = {
         "tangential_stiffness",
     ),
     "strip_compliance": ("StripCompliance",),
-    "unilateral": ("INDEFINITE_MESSAGE",),
+    "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

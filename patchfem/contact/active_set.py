@@ -21,8 +21,8 @@ import numpy as np
 from ..core import NotConverged
 
 # Rounding error of an opening, relative to the sum of the magnitudes of its terms
-OPENING_NOISE = 1e-14
-N_REFINEMENTS = 2  # number of steps of iterative refinement; a third step changes nothing
+OPENING_ROUND_OFF = 1e-14
+N_REFINEMENT_STEPS = 2  # number of steps of iterative refinement; a third step changes nothing
 
 
 class ContactProblem(NamedTuple):
@@ -52,7 +52,7 @@ class ContactProblem(NamedTuple):
         return 1 + len(self.free_rotations)
 
 
-def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
+def make_patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
     """Return the contact problem of a patch that consists of a single strip.
 
     Parameters
@@ -206,13 +206,13 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
     # The solution is refined only if an opening exceeds a tenth of the overlap at which a node
     # enters the set.
     error = np.abs(solution.opening[active])
-    if not (error > OPENING_NOISE / 10 * solution.scale[active]).any():
+    if not (error > OPENING_ROUND_OFF / 10 * solution.scale[active]).any():
         return solution
-    refined = solve_on_set(compliance, problem, active, N_REFINEMENTS)
-    return refined if relative_violation(refined) < relative_violation(solution) else solution
+    refined = solve_on_set(compliance, problem, active, N_REFINEMENT_STEPS)
+    return min(solution, refined, key=compute_relative_violation)
 
 
-def relative_violation(solution: SetSolution) -> float:
+def compute_relative_violation(solution: SetSolution) -> float:
     """Return the largest relative violation of the contact conditions [1] by a `SetSolution`.
 
     Openings in contact and overlaps are relative to the terms of the opening, tensile forces to the load.
@@ -285,7 +285,7 @@ def solve_primal_dual(
             solution = solve_on_set(compliance, problem, active)
         except np.linalg.LinAlgError:
             return None, iteration
-        overlaps = solution.opening < -OPENING_NOISE * solution.scale
+        overlaps = solution.opening < -OPENING_ROUND_OFF * solution.scale
         next_active = np.where(active, solution.force > 0, overlaps)
         if next_active.tobytes() == key:
             return refine_solution(compliance, problem, solution, active), iteration
@@ -354,7 +354,7 @@ def solve_primal(
         force = solution.force
         overlap = np.where(active, np.inf, solution.opening / solution.scale)
         entering = int(np.argmin(overlap))
-        if overlap[entering] >= -OPENING_NOISE:
+        if overlap[entering] >= -OPENING_ROUND_OFF:
             return refine_solution(compliance, problem, solution, active), iteration
         active[entering] = True
     raise NotConverged(

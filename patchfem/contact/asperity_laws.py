@@ -165,21 +165,21 @@ def peak_integral(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     # Below h = -8 the series of the moments
     depth = np.where(h < -8, -h, 8.0)
-    moment_3_2 = _moment(1.5, depth)
-    moment_1_2 = _moment(0.5, depth)
+    moment_3_2 = _compute_moment(1.5, depth)
+    moment_1_2 = _compute_moment(0.5, depth)
     return np.where(h < -8, 1.5 * np.log(depth) + np.log(moment_3_2), log), np.where(
         h < -8, 1.5 * moment_1_2 / moment_3_2 / depth, decay_rate
     )
 
 
-def _moment(n: float, a: np.ndarray) -> np.ndarray:
-    """Return the expectation of (1 + z/a)^n for a standard normal variable z and large a.
+def _compute_moment(power: float, distance: np.ndarray) -> np.ndarray:
+    """Return the expectation of (1 + z/distance)^power for a standard normal variable z and a large distance [1].
 
-    It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.
+    It is the sum of binom(power, 2k) (2k - 1)!! distance^-2k.
     """
-    out = np.zeros_like(a)
-    term = np.ones_like(a)
+    out = np.zeros_like(distance)
+    term = np.ones_like(distance)
     for k in range(0, 24, 2):
         out += term
-        term = term * ((n - k) * (n - k - 1) / (k + 2)) / a**2
+        term = term * ((power - k) * (power - k - 1) / (k + 2)) / distance**2
     return out

@@ -21,21 +21,21 @@ from .strip_compliance import StripCompliance
 from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
-MAX_LAYER_STEPS = 60
-DIVERGED_MESSAGE = (
+MAX_LAYER_NEWTON_STEPS = 60
+LAYER_DIVERGED_MESSAGE = (
     "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
     'deviation, or set law = "linear"'
 )
 # Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
-MIN_LOG_PRESSURE = -300.0
+MAX_UNTOUCHED_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
 MAX_LOG_FORCE = 600.0
 # Smallest slope, relative to the largest slope, for which a Newton step changes the force
 MIN_RELATIVE_SLOPE = 1e-18
 # Relative imbalance and relative change of pressure at which Newton's method has converged
-LAYER_TOL = 1e-12
+LAYER_NEWTON_TOL = 1e-12
 # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
-MAX_PRESSURE_RISE = 0.01
+MAX_PRESSURE_RISE_PER_STEP = 0.01
 # Smallest depth [m] in a divisor; it keeps the residual of a flat gap finite
 MIN_GAP_DEPTH = 1e-150
 
@@ -146,11 +146,11 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     Raises
     ------
     NotConverged
-        After `MAX_LAYER_STEPS` steps, or if a step cannot be computed.
+        After `MAX_LAYER_NEWTON_STEPS` steps, or if a step cannot be computed.
     """
     contact = problem.contact
     asperities = problem.asperities
-    for iteration in range(1, MAX_LAYER_STEPS + 1):
+    for iteration in range(1, MAX_LAYER_NEWTON_STEPS + 1):
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -175,7 +175,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
-        noise = LAYER_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
+        noise = LAYER_NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
             # The force of a nearly unloaded node is computed from the pressure law of the asperity
@@ -191,9 +191,11 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
-        risen = asperities.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
+        risen = asperities.separation(
+            np.array(MAX_PRESSURE_RISE_PER_STEP * load / problem.area.sum())
+        )
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
-    raise NotConverged(DIVERGED_MESSAGE)
+    raise NotConverged(LAYER_DIVERGED_MESSAGE)
 
 
 def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
@@ -205,7 +207,7 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
     asperities = problem.asperities
     gap = problem.contact.gap
     no_motion = np.zeros(0)
-    if asperities.log_pressure(gap)[0].max() <= MIN_LOG_PRESSURE:
+    if asperities.log_pressure(gap)[0].max() <= MAX_UNTOUCHED_LOG_PRESSURE:
         return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
 
     # No node can carry more force than the one that flattens its overlap
@@ -215,7 +217,7 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
         overlap = np.maximum(-gap, np.abs(gap).max() * 1e-3)
         max_pressure = overlap / (np.resize(diagonal, gap.size) * problem.area)
         separation = np.maximum(gap, asperities.separation(max_pressure))
-    if asperities.log_pressure(separation)[0].max() > -MIN_LOG_PRESSURE:
+    if asperities.log_pressure(separation)[0].max() > -MAX_UNTOUCHED_LOG_PRESSURE:
         raise PatchfemError(
             "contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
             "distance"
@@ -278,9 +280,9 @@ def compute_law_residuals(
     force = solution.force
     opening = solution.separation
     depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_GAP_DEPTH
-    largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
+    largest = max(force.max(), np.exp(MAX_UNTOUCHED_LOG_PRESSURE))
     mismatch = np.abs(force - area * asperities.pressure(opening))
-    mismatch -= area * np.exp(MIN_LOG_PRESSURE)
+    mismatch -= area * np.exp(MAX_UNTOUCHED_LOG_PRESSURE)
     gain = 1e-5 * depth * (area * asperities.stiffness(opening)).max()
     return {
         "tension": float(max(0.0, -force.min()) / largest),

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .active_set import OPENING_NOISE, ContactProblem
+from .active_set import OPENING_ROUND_OFF, ContactProblem
 
 # Rounding error of the energy, relative to the sum of the magnitudes of its terms
-ENERGY_NOISE = 1e-13
+ENERGY_ROUND_OFF = 1e-13
 # Largest error of a resultant, relative to the load, for which the forces are not projected again
 RESULTANT_TOL = 1e-12
 
@@ -206,7 +206,7 @@ def solve_by_gradients(
         # The energy f . C f/2 + g . f must fall; conjugate steps after a change of the set do not guarantee it
         displacement = product(force)
         energy = force @ (gap + displacement / 2)
-        noise = ENERGY_NOISE * (np.abs(force * gap).sum() + force @ displacement)
+        noise = ENERGY_ROUND_OFF * (np.abs(force * gap).sum() + force @ displacement)
         if energy > min_energy + noise:
             # A projected gradient step of this length always lowers the energy.
             gradient_force = best_force - descent_step * (gap + product(best_force))
@@ -222,7 +222,7 @@ def solve_by_gradients(
         slope = _energy_slope(program, in_contact, displacement)
         square = slope[in_contact] @ slope[in_contact]
         residual = max(np.abs(slope[in_contact]).max(initial=0.0), -slope.min())
-        noise = OPENING_NOISE * np.abs(gap[in_contact]).max(initial=0.0)
+        noise = OPENING_ROUND_OFF * np.abs(gap[in_contact]).max(initial=0.0)
         if residual <= tolerance * np.abs(displacement).max() + noise:
             return force[:n_nodes], iteration
 

@@ -16,8 +16,8 @@ from ..core import PatchfemError, frozen_array
 from .set_arrays import SetArrays, make_set_arrays
 
 # Largest memory [bytes] of the stored contact sets; when it is full, the oldest set is replaced
-MAX_STORED_BYTES = 64e6
-MAX_SLOTS = 100_000  # largest number of stored contact sets; no problem needs more
+MAX_STORED_SETS_BYTES = 64e6
+MAX_STORED_SETS = 100_000  # largest number of stored contact sets; no problem needs more
 
 
 class ContactSets:
@@ -66,13 +66,13 @@ class ContactSets:
         self.energy = float(response @ self.opening) / 2
         self.size = float(np.abs(self.opening).max() + np.abs(self.c @ force).max())
 
-    def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
+    def make_arrays(self, max_bytes: float = MAX_STORED_SETS_BYTES) -> SetArrays:
         """Return the arrays in which compiled code searches contact sets, starting from the preloaded one.
 
         `max_bytes` is the largest memory for the stored contact sets [bytes].
         """
         # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
-        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_SLOTS)))
+        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_STORED_SETS)))
         return make_set_arrays(
             self.c,
             self.x,

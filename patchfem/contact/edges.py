@@ -14,14 +14,14 @@ from .strip_compliance import StripCompliance
 
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
-MIN_RELATIVE_PRESSURE = 1e-13
+MIN_CONTACT_PRESSURE_RATIO = 1e-13
 # Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
-MIN_PRESSURE_FRACTION = 1e-287
-# Largest ratio of first-row height to cell length for which `edge_offset` was measured
+MIN_EDGE_PRESSURE_RATIO = 1e-287
+# Largest ratio of first-row height to cell length for which `compute_edge_offset` was measured
 MAX_CELL_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
 # triangles and quadrilaterals with aspects 0.3 to 2.4, within 0.03
-QUADRATIC_OFFSET = 0.345
+QUADRATIC_EDGE_OFFSET_FRACTION = 0.345
 
 
 class ContactEdge(NamedTuple):
@@ -40,7 +40,7 @@ class ContactEdge(NamedTuple):
     position: float
 
 
-def edge_offset(
+def compute_edge_offset(
     inner, outer, fraction, row_height: float | None = None, *, is_quadratic: bool = False
 ):
     """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
@@ -65,7 +65,7 @@ def edge_offset(
     """
     cell = (1 - fraction) * inner + fraction * outer
     if is_quadratic:
-        return QUADRATIC_OFFSET * cell
+        return QUADRATIC_EDGE_OFFSET_FRACTION * cell
     aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_CELL_ASPECT)
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
 
@@ -164,7 +164,7 @@ def find_edges(
         `inner` and `outer` are the lengths [m] of the cells before and beyond the node. An asperity layer reduces the
         offset by its part of the compliance, because it has its edge at the node itself.
         """
-        offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
+        offset = compute_edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
         return (
             offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
         )
@@ -172,7 +172,7 @@ def find_edges(
     return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
 
 
-def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[ContactEdge]:
+def place_edges(x, force, gap, force_rate, gap_rate, compute_offset) -> list[ContactEdge]:
     """Place the edges of a contact set between its nodes.
 
     Parameters
@@ -181,7 +181,7 @@ def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[Contac
         Positions [m], forces [N] and gap under load [m].
     force_rate, gap_rate : (m,) ndarray
         Increase of the forces [N/m] and decrease of the gaps per approach.
-    find_offset : callable
+    compute_offset : callable
         Function of the last node, the lengths [m] of its cells inside and outside, and the fraction of the latter
         that returns the inward offset [m] of the edge.
 
@@ -200,13 +200,13 @@ def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[Contac
             force[node], force_rate[node], gap[outside], gap_rate[outside]
         )
         cell = x[outside] - x[node]
-        offset = find_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
+        offset = compute_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
         position = x[node] + fraction * cell - side * offset
         edges.append(ContactEdge(node, side, fraction, float(position)))
     return edges
 
 
-def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
+def snap_to_steps(edges: list[ContactEdge], x, gap, step_positions) -> list[ContactEdge]:
     """Move a contact edge to a step at which the gap opens if it is less than one cell away from it.
 
     Parameters
@@ -215,13 +215,13 @@ def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
         Edges of one contact set.
     x, gap : (m,) ndarray
         Positions [m] and gap of the unloaded surfaces [m].
-    jumps : sequence
+    step_positions : sequence
         Positions of the steps [m], each at a node.
     """
     moved_edges = []
     for edge in edges:
         for node in (edge.node, edge.node + edge.side):
-            is_step = 0 < node < x.size - 1 and x[node] in jumps
+            is_step = 0 < node < x.size - 1 and x[node] in step_positions
             if is_step and gap[node + edge.side] > gap[node - edge.side]:
                 cell = x[edge.node + edge.side] - x[edge.node]
                 change = (x[node] - edge.position) / cell
@@ -252,7 +252,9 @@ def find_pressure_edges(x, pressure, threshold: float) -> list[ContactEdge]:
         By increasing x.
     """
     with np.errstate(divide="ignore"):
-        height = np.log(np.maximum(pressure, MIN_PRESSURE_FRACTION * threshold)) - np.log(threshold)
+        height = np.log(np.maximum(pressure, MIN_EDGE_PRESSURE_RATIO * threshold)) - np.log(
+            threshold
+        )
     edges = []
     for node, side in _find_ends(pressure > threshold):
         cell_fraction = height[node] / (height[node] - height[node + side])
@@ -327,16 +329,16 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
     return stiffness
 
 
-def parabola_change(shift: float, gain: float, loss: float) -> float:
+def parabola_change(edge_shift: float, gain: float, loss: float) -> float:
     """Return the change of a stiffness with the place of a contact edge, interpolated by a parabola.
 
     The change is `gain` at a shift of 1, -`loss` at -1 and 0 at 0.
 
     Parameters
     ----------
-    shift : float or ndarray
+    edge_shift : float or ndarray
         Shift of the edge from the middle of a cell, in cells.
     gain, loss : float or ndarray
         Increase of the stiffness by one node more in contact, and decrease by one node less [N/m] or [N m/rad].
     """
-    return shift * (gain + loss) / 2 + shift**2 * (gain - loss) / 2
+    return edge_shift * (gain + loss) / 2 + edge_shift**2 * (gain - loss) / 2

@@ -23,8 +23,8 @@ from . import asperity_laws
 from .active_set import ContactProblem
 from .strip_compliance import StripCompliance
 from .unilateral import (
-    INDEFINITE_MESSAGE,
-    RESIDUAL_TOL,
+    CONTACT_RESIDUAL_TOL,
+    INDEFINITE_COMPLIANCE_MESSAGE,
     ContactSolution,
     compute_residuals,
     explain_singular_set,
@@ -35,7 +35,7 @@ from .unilateral import (
 # Largest relative residual of strips and of smooth asperity laws; rounding errors of steep laws stay below it
 STRIP_RESIDUAL_TOL = 1e-9
 # Smallest force of a loaded node relative to the largest force; smaller forces are rounding errors
-MIN_RELATIVE_FORCE = 1e-12
+MIN_LOADED_FORCE_RATIO = 1e-12
 # Smallest load [N] or overlap [m] for which the products in the check of the solution do not underflow
 MIN_COMPUTABLE_LOAD = 1e-200
 # Note on what strips neglect
@@ -49,7 +49,7 @@ LOOSE_ROLL_MESSAGE = (
     "contact.strips.count or prescribe contact.strips.roll"
 )
 # Ends of the messages about a residual, by whether the pieces have a smooth asperity layer
-RESIDUAL_REMEDIES = {
+RESIDUAL_KEY_AND_REMEDY = {
     True: (
         "contact.asperities",
         "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out",
@@ -176,7 +176,7 @@ class StripsState:
         return self.roll_moment / self.load if self.load else 0.0
 
 
-def strip_offsets(width: float, count: int) -> np.ndarray:
+def compute_strip_offsets(width: float, count: int) -> np.ndarray:
     """Return the centres y (count,) [m] of equal strips that divide the width [m] of a pair of pieces.
 
     y is 0 in the middle of the width.
@@ -278,8 +278,8 @@ def press_strips(strips: StripModel, gap, holder: Holder, start=None) -> StripsS
 
     # A solution with large residuals is refused, and one whose nodes in contact leave a rotation undetermined
     is_strict = offsets.size == 1 and not strips.is_smooth
-    place, remedy = RESIDUAL_REMEDIES[strips.is_smooth]
-    tolerance = RESIDUAL_TOL if is_strict else STRIP_RESIDUAL_TOL
+    place, remedy = RESIDUAL_KEY_AND_REMEDY[strips.is_smooth]
+    tolerance = CONTACT_RESIDUAL_TOL if is_strict else STRIP_RESIDUAL_TOL
     refuse_residuals(residuals, tolerance, place, remedy)
     force = solution.force.reshape(gap.shape)
     if offsets.size > 1 and not strips.is_smooth:
@@ -330,7 +330,7 @@ def _press_bare(compliance: StripCompliance, problem: ContactProblem, start) -> 
         message = explain_singular_set(compliance.common, problem)
         # The column of the roll is the last one, and it is the only one that is constant along a strip.
         rolls = np.ptp(problem.motions[: len(compliance.common), -1:]) == 0
-        if rolls and problem.target.size > 1 and message != INDEFINITE_MESSAGE:
+        if rolls and problem.target.size > 1 and message != INDEFINITE_COMPLIANCE_MESSAGE:
             message = LOOSE_ROLL_MESSAGE
         raise NotConverged(message) from None
 
@@ -374,7 +374,7 @@ def _refuse_loose_holder(force, holder: Holder) -> None:
     `force` (s, m) [N] are the nodal forces of the strips. A rotation of the `holder` is released if it has a moment
     but no spring.
     """
-    is_loaded = force > MIN_RELATIVE_FORCE * force.max()
+    is_loaded = force > MIN_LOADED_FORCE_RATIO * force.max()
     is_rotation_free = holder.moment is not None and holder.spring == 0
     if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
         raise NotConverged(

@@ -5,7 +5,7 @@ closing d [m] and rotation t [rad]. The unknowns y of a set are the forces of it
 the gaps of the others. The linear complementarity problem w = b + t x - d + C f then reads
 y = R (1, d, t). A node that enters or leaves the set is a principal pivot of the tableau [T | R].
 
-A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so a state on a stored
+A set is stored under a 64-bit hash, the exclusive or of the hashes of its nodes, so a state on a stored
 set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block
 pivoting), and after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive
 definite C (Murty, Opsearch 11, 1974). `sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored
@@ -17,18 +17,18 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import (
-    N_STORED,
-    OLDEST_SLOT,
-    PRESENT_SLOT,
-    REFERENCE_ENERGY,
-    REFERENCE_LOAD,
-    REFERENCE_MOMENT,
-    REFERENCE_OPENING,
+    MAX_OPENING_INDEX,
+    OLDEST_SLOT_INDEX,
+    PRESENT_SLOT_INDEX,
+    REFERENCE_ENERGY_INDEX,
+    REFERENCE_LOAD_INDEX,
+    REFERENCE_MOMENT_INDEX,
+    STORED_COUNT_INDEX,
     EnergyTerm,
 )
 
 # Fast-math flags with which the compiler vectorizes loops that search for a minimum
-FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
+FASTMATH_MINIMUM_SEARCH_FLAGS = FASTMATH_FLAGS | {"nnan", "nsz"}
 # Largest number of sets for which all violating nodes are exchanged at once; beyond it the
 # exchanges may cycle
 N_BLOCK_EXCHANGES = 12
@@ -221,20 +221,20 @@ def take_slot(sets):
     A slot is a row of the arrays of `sets.stored`. A set that loses its slot also leaves the list of sets of equal hash.
     """
     stored = sets.stored
-    n_slots = stored.names.size
-    slot = sets.counters[N_STORED]
+    n_slots = stored.hashes.size
+    slot = sets.counters[STORED_COUNT_INDEX]
     if slot < n_slots:
-        sets.counters[N_STORED] += 1
+        sets.counters[STORED_COUNT_INDEX] += 1
         return slot
 
     # Every trial of a step starts from the present set, which is therefore kept
-    slot = sets.counters[OLDEST_SLOT]
-    if slot == sets.counters[PRESENT_SLOT]:
+    slot = sets.counters[OLDEST_SLOT_INDEX]
+    if slot == sets.counters[PRESENT_SLOT_INDEX]:
         slot = (slot + 1) % n_slots
-    sets.counters[OLDEST_SLOT] = (slot + 1) % n_slots
+    sets.counters[OLDEST_SLOT_INDEX] = (slot + 1) % n_slots
 
     # The set that the slot holds leaves the chain of its hash
-    bucket = stored.names[slot] & (stored.heads.size - 1)
+    bucket = stored.hashes[slot] & (stored.heads.size - 1)
     k = stored.heads[bucket]
     if k == slot:
         stored.heads[bucket] = stored.links[slot]
@@ -246,7 +246,7 @@ def take_slot(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store_set(sets, name):
+def store_set(sets, set_hash):
     """Store the contact set to which the tableau is pivoted.
 
     Parameters
@@ -255,7 +255,7 @@ def store_set(sets, name):
         Its `stored` gets the nodes in contact (m,), forces [N] or gaps [m] of all nodes per unit of 1, of the closing
         d and of the rotation t (3, m), and the six coefficients of the energy [J] as a quadratic function of d and t
         (`EnergyTerm`).
-    name : int
+    set_hash : int
         64-bit hash of the set.
 
     Returns
@@ -271,9 +271,9 @@ def store_set(sets, name):
     # Energy beyond that of the reference state and the work of its forces: E - E0 - N0 d + M0 t
     energy = stored.energy[slot]
     energy[:] = 0.0
-    energy[EnergyTerm.CONSTANT] = -sets.reference[REFERENCE_ENERGY]
-    energy[EnergyTerm.BY_D] = -sets.reference[REFERENCE_LOAD]
-    energy[EnergyTerm.BY_T] = sets.reference[REFERENCE_MOMENT]
+    energy[EnergyTerm.CONSTANT] = -sets.reference[REFERENCE_ENERGY_INDEX]
+    energy[EnergyTerm.BY_D] = -sets.reference[REFERENCE_LOAD_INDEX]
+    energy[EnergyTerm.BY_T] = sets.reference[REFERENCE_MOMENT_INDEX]
 
     # Unknowns of every node. The forces f = constant + by_d d + by_t t give E = -f . (opening - d + x t)/2, of which
     # each coefficient is a sum over the nodes in contact, since C is symmetric.
@@ -294,8 +294,8 @@ def store_set(sets, name):
             energy[EnergyTerm.BY_TT] -= by_t * sets.x[i]
 
     # The set becomes the first one in the chain of its hash
-    stored.names[slot] = name
-    bucket = name & (stored.heads.size - 1)
+    stored.hashes[slot] = set_hash
+    bucket = set_hash & (stored.heads.size - 1)
     stored.links[slot] = stored.heads[bucket]
     stored.heads[bucket] = slot
     return slot
@@ -315,29 +315,29 @@ def pivot_to_target(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def build_set(sets, name):
+def build_set(sets, set_hash):
     """Pivot the tableau to its target contact set, store the set, and return its slot.
 
     If the tableau has lost its digits, it is computed anew and pivoted once more. The slot is -1 if the compliance is
-    not positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. `name` is the 64-bit
+    not positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. `set_hash` is the 64-bit
     hash of the set.
     """
     if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
         reset_tableau(sets)
         if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
-    return store_set(sets, name)
+    return store_set(sets, set_hash)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_stored(sets, name):
+def find_stored(sets, set_hash):
     """Return the slot in which the target contact set is stored, or -1.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
         Preloaded interface with its stored contact sets.
-    name : int
+    set_hash : int
         Hash of the target set. Different sets may have equal hashes, so that sets are also compared node by node.
 
     Returns
@@ -345,9 +345,9 @@ def find_stored(sets, name):
     int
     """
     stored = sets.stored
-    slot = stored.heads[name & (stored.heads.size - 1)]
+    slot = stored.heads[set_hash & (stored.heads.size - 1)]
     while slot >= 0:
-        if stored.names[slot] == name:
+        if stored.hashes[slot] == set_hash:
             is_equal = True
             for i in range(sets.x.size):
                 if stored.in_contact[slot, i] != sets.tableau.target[i]:
@@ -359,7 +359,7 @@ def find_stored(sets, name):
     return slot
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM_SEARCH_FLAGS, **NJIT_NO_REFCOUNT)
 def check_contact_conditions(sets, slot, d, t):
     """Check whether a set meets the contact conditions at a rigid displacement (d, t).
 
@@ -400,7 +400,7 @@ def check_contact_conditions(sets, slot, d, t):
 
     min_force = -CONDITION_ROUND_OFF * scale
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
-    min_gap = -CONDITION_ROUND_OFF * (sets.reference[REFERENCE_OPENING] + abs(d) + abs(t) * arm)
+    min_gap = -CONDITION_ROUND_OFF * (sets.reference[MAX_OPENING_INDEX] + abs(d) + abs(t) * arm)
     holds = smallest_force >= min_force and smallest_gap >= min_gap
     return holds, ContactBounds(min_force, min_gap)
 
@@ -434,7 +434,7 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
         Hash of the new set, by which `find_stored` looks it up.
     """
     stored = sets.stored
-    name = stored.names[slot]
+    set_hash = stored.hashes[slot]
     is_searching = True
     for i in range(sets.x.size):
         in_contact = stored.in_contact[slot, i]
@@ -442,10 +442,10 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
         value += stored.unknowns[slot, 2, i] * t
         is_violated = is_searching and value < (bounds.min_force if in_contact else bounds.min_gap)
         if is_violated:
-            name ^= stored.node_names[i]
+            set_hash ^= stored.node_hashes[i]
             is_searching = not is_single
         sets.tableau.target[i] = in_contact != is_violated
-    return name
+    return set_hash
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -476,17 +476,17 @@ def find_set(sets, slot, d, t):
         if holds:
             return slot
         is_single = count >= N_BLOCK_EXCHANGES
-        name = exchange_violating_nodes(sets, slot, d, t, bounds, is_single)
-        slot = find_stored(sets, name)
+        set_hash = exchange_violating_nodes(sets, slot, d, t, bounds, is_single)
+        slot = find_stored(sets, set_hash)
         if slot < 0:
-            slot = build_set(sets, name)
+            slot = build_set(sets, set_hash)
         if slot < 0:
             return slot
     return -1
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def build_first_set(sets, name):
+def build_first_set(sets, set_hash):
     """Compute the target contact set from an empty tableau, and return its slot.
 
     The slot is -1 if the compliance is not positive definite on the set.
@@ -495,11 +495,11 @@ def build_first_set(sets, name):
     ----------
     sets : set_arrays.SetArrays
         Preloaded interface with its stored contact sets.
-    name : int
+    set_hash : int
         Hash of the target set.
     """
     reset_tableau(sets)
-    return build_set(sets, name)
+    return build_set(sets, set_hash)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -561,6 +561,6 @@ def press_state(sets, slot, d, t, force):
     for i in range(force.size):
         value = unknowns[slot, 0, i] + unknowns[slot, 1, i] * d + unknowns[slot, 2, i] * t
         force[i] = max(value, 0.0) if sets.stored.in_contact[slot, i] else 0.0
-    load = sets.reference[REFERENCE_LOAD] - energy.heave_slope
-    moment = sets.reference[REFERENCE_MOMENT] - energy.rotation_slope
+    load = sets.reference[REFERENCE_LOAD_INDEX] - energy.heave_slope
+    moment = sets.reference[REFERENCE_MOMENT_INDEX] - energy.rotation_slope
     return PressedState(load, moment, energy.value)

@@ -10,7 +10,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .press_kernels import (
-    FASTMATH_MINIMUM,
+    FASTMATH_MINIMUM_SEARCH_FLAGS,
     ContactBounds,
     check_contact_conditions,
     compute_energy,
@@ -20,7 +20,7 @@ from .set_arrays import EnergyTerm, PathMean
 
 # Distance beyond a border at which the next set is determined, as a fraction of the increment; it
 # is larger than rounding errors
-BORDER_STEP = 1e-10
+BORDER_CROSSING_FRACTION = 1e-10
 
 
 class HolderMotion(NamedTuple):
@@ -30,7 +30,7 @@ class HolderMotion(NamedTuple):
     rotation: float
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM_SEARCH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_first_violation(sets, slot, motion, change, bounds):
     """Return the fraction of an increment after which a node first violates its condition.
 
@@ -143,7 +143,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     change = HolderMotion(heave_change, rotation_change)
     out[:] = 0.0
     start = 0.0
-    border_step = BORDER_STEP
+    border_step = BORDER_CROSSING_FRACTION
 
     # The number of sets is limited, because rounding errors may make a path return to the same
     # sets.
@@ -177,7 +177,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return slot
 
         # The set beyond the border. It may be stored in the slot of the set before the border.
-        name = sets.stored.names[slot]
+        set_hash = sets.stored.hashes[slot]
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
         next_slot = find_set(sets, slot, d, rotation + beyond * rotation_change)
@@ -185,10 +185,10 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return next_slot
 
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
-        if sets.stored.names[next_slot] == name:
+        if sets.stored.hashes[next_slot] == set_hash:
             border_step *= 10
             start = beyond
         else:
-            border_step = BORDER_STEP
+            border_step = BORDER_CROSSING_FRACTION
         slot = next_slot
     return -1

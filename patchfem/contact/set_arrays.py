@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-REFERENCE_LOAD = 0  # index into `SetArrays.reference` of the load of the reference state [N]
+REFERENCE_LOAD_INDEX = 0  # index into `SetArrays.reference` of the load of the reference state [N]
 # Index into `SetArrays.reference` of the moment of the reference state about x = 0 [N m]
-REFERENCE_MOMENT = 1
+REFERENCE_MOMENT_INDEX = 1
 # Index into `SetArrays.reference` of the elastic energy of the reference state [J]
-REFERENCE_ENERGY = 2
+REFERENCE_ENERGY_INDEX = 2
 # Index into `SetArrays.reference` of the largest magnitude of the openings [m]
-REFERENCE_OPENING = 3
-N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
-OLDEST_SLOT = 1  # index into `SetArrays.counters` of the slot that is replaced next
+MAX_OPENING_INDEX = 3
+STORED_COUNT_INDEX = 0  # index into `SetArrays.counters` of the number of stored sets
+OLDEST_SLOT_INDEX = 1  # index into `SetArrays.counters` of the slot that is replaced next
 # Index into `SetArrays.counters` of the slot of the present contact set, -1 if none is found
-PRESENT_SLOT = 2
+PRESENT_SLOT_INDEX = 2
 
 
 class EnergyTerm(IntEnum):
@@ -69,22 +69,23 @@ class Tableau(NamedTuple):
 
 
 class StoredSets(NamedTuple):
-    """Contact sets in k slots, which are looked up by 64-bit names (hashes of their nodes).
+    """Contact sets in k slots, which are looked up by 64-bit hashes.
 
-    The name of a set is the exclusive or of the names of its nodes.
+    The hash of a set is the exclusive or of the hashes of its nodes. The sets whose hashes have the same last bits form a
+    chain: `heads` has its first slot, at the index of these bits, and `links` the slot that follows each slot; -1 ends it.
 
     - in_contact (k, m): nodes in contact.
     - unknowns (k, 3, m): force [N] of nodes in contact and gap [m] of the others per (1, d, t).
     - energy (k, 6): coefficients of the energy of the preloaded contact, in the order of `EnergyTerm`.
-    - names (k,): names of the sets; node_names (m,): names of the nodes.
-    - heads, links (k,): hash chains of the names.
+    - hashes (k,): hashes of the sets; node_hashes (m,): hashes of the nodes.
+    - heads (2^n,), links (k,): chains of the sets, 2^n > k.
     """
 
     in_contact: np.ndarray
     unknowns: np.ndarray
     energy: np.ndarray
-    names: np.ndarray
-    node_names: np.ndarray
+    hashes: np.ndarray
+    node_hashes: np.ndarray
     heads: np.ndarray
     links: np.ndarray
 
@@ -94,9 +95,9 @@ class SetArrays(NamedTuple):
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
-    - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
+    - reference (4,): properties of the reference state, from `REFERENCE_LOAD_INDEX` to `MAX_OPENING_INDEX`.
     - tableau, stored: see there.
-    - counters (3,): from `N_STORED` to `PRESENT_SLOT`.
+    - counters (3,): from `STORED_COUNT_INDEX` to `PRESENT_SLOT_INDEX`.
     """
 
     compliance: np.ndarray
@@ -108,12 +109,12 @@ class SetArrays(NamedTuple):
     counters: np.ndarray
 
 
-def _make_names(count: int) -> np.ndarray:
+def _make_node_hashes(count: int) -> np.ndarray:
     """Return integers (count,) that look random: the generator SplitMix64 (numpy.random takes long to import)."""
-    names = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    names = (names ^ (names >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    names = (names ^ (names >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return (names ^ (names >> np.uint64(31))).astype(np.int64)
+    hashes = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    hashes = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    hashes = (hashes ^ (hashes >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return (hashes ^ (hashes >> np.uint64(31))).astype(np.int64)
 
 
 def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
@@ -126,7 +127,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
     x, opening : (m,) ndarray
         Positions, and openings of the reference state without forces [m].
     reference : (4,) sequence of float
-        Properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
+        Properties of the reference state, from `REFERENCE_LOAD_INDEX` to `MAX_OPENING_INDEX`.
     in_contact : (m,) bool ndarray
         Contact set of the reference state, the first target of the search.
     n_slots : int
@@ -151,8 +152,8 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         in_contact=np.zeros((n_slots, m), bool),
         unknowns=np.zeros((n_slots, 3, m)),
         energy=np.zeros((n_slots, len(EnergyTerm))),
-        names=np.zeros(n_slots, np.int64),
-        node_names=_make_names(m),
+        hashes=np.zeros(n_slots, np.int64),
+        node_hashes=_make_node_hashes(m),
         heads=np.full(1 << n_slots.bit_length(), -1, np.int64),
         links=np.zeros(n_slots, np.int64),
     )
@@ -171,6 +172,6 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
 def hash_set(sets: SetArrays, in_contact) -> int:
     """Return the 64-bit hash of the contact set of the nodes `in_contact` (m,) of bool.
 
-    It is the exclusive or of the names of these nodes.
+    It is the exclusive or of the hashes of these nodes.
     """
-    return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))
+    return int(np.bitwise_xor.reduce(sets.stored.node_hashes[in_contact], initial=0))

@@ -17,21 +17,21 @@ import numpy as np
 from ..core import NotConverged
 from . import conjugate_gradients
 from .active_set import (
-    OPENING_NOISE,
+    OPENING_ROUND_OFF,
     ContactProblem,
     SetSolution,
+    compute_relative_violation,
     find_rest_motion,
     guess_contact_set,
-    relative_violation,
     solve_primal,
     solve_primal_dual,
 )
 from .strip_compliance import StripCompliance, factorise
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
-RESIDUAL_TOL = 1e-12
+CONTACT_RESIDUAL_TOL = 1e-12
 # Message about a compliance that is not positive definite
-INDEFINITE_MESSAGE = (
+INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
@@ -78,7 +78,7 @@ def _solve_by_fallbacks(
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
-    if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
+    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
         return solution, n_first
 
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
@@ -86,7 +86,7 @@ def _solve_by_fallbacks(
     is_loaded = force > 1e-9 * force.max()
     solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
     n_iterations = n_first + n_second + n_third
-    if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
+    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
         return solution, n_iterations
     solution, n_last = solve_primal(compliance, problem, force)
     return solution, n_iterations + n_last
@@ -120,7 +120,7 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     displacement = compliance.product(force)
     arm = position - position[node]
     height = gap - gap[node] + displacement - displacement[node]
-    noise = OPENING_NOISE * (np.abs(gap) + abs(displacement[node]))
+    noise = OPENING_ROUND_OFF * (np.abs(gap) + abs(displacement[node]))
     with np.errstate(divide="ignore", invalid="ignore"):
         bound = (height + noise) / arm
 
@@ -194,7 +194,7 @@ def solve(
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
         solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
-        if solution is None or not relative_violation(solution) <= RESIDUAL_TOL:
+        if solution is None or not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more
     return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)
@@ -286,7 +286,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
     try:
         factorise(np.array(c, order="C"))
     except np.linalg.LinAlgError:
-        return INDEFINITE_MESSAGE
+        return INDEFINITE_COMPLIANCE_MESSAGE
     if problem.target.size < 2:
         return (
             "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "

@@ -17,10 +17,10 @@ from pathlib import Path
 
 from ..core import Missing
 
-PLACED_PATHS = deque(maxlen=100)  # last completed files; the message on an interrupt names them
+COMPLETED_PATHS = deque(maxlen=100)  # last completed files; the message on an interrupt names them
 RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
 # Largest number of characters of a name within its partial name; file systems allow 255 bytes.
-MAX_NAME_LENGTH = 150
+MAX_NAME_CHARACTERS = 150
 
 
 class WriteError(Missing):
@@ -47,7 +47,7 @@ def write_atomically(path) -> Iterator[Path]:
         if not is_special:
             # The rename is atomic: other processes see the old file or the complete new one
             os.replace(partial, path)
-            PLACED_PATHS.append(path)
+            COMPLETED_PATHS.append(path)
     except OSError as error:
         raise explain_write_error(error, path) from None
     finally:
@@ -78,7 +78,7 @@ def write_bytes(path, data) -> None:
 
 def forget_placed_paths() -> None:
     """Clear the lists of completed files and checkpoint folders at the start of a command."""
-    PLACED_PATHS.clear()
+    COMPLETED_PATHS.clear()
     RESUMABLE_FOLDERS.clear()
 
 
@@ -86,15 +86,15 @@ def list_placed_paths() -> list[str]:
     """List the files that this process has completed and that still exist."""
     return [
         format_path(path)
-        for path in dict.fromkeys(PLACED_PATHS)
+        for path in dict.fromkeys(COMPLETED_PATHS)
         if path.exists() and not path.parent.name.endswith(".partial")
     ]
 
 
 def make_partial_path(path: Path) -> Path:
     """Return a new path for the partial file of `path`."""
-    stem = path.stem[:MAX_NAME_LENGTH]
-    suffix = path.suffix[:MAX_NAME_LENGTH]
+    stem = path.stem[:MAX_NAME_CHARACTERS]
+    suffix = path.suffix[:MAX_NAME_CHARACTERS]
     return path.with_name(f".{stem}.{secrets.token_hex(8)}.partial{suffix}")
 
 

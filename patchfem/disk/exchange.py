@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .atomic_write import PLACED_PATHS
+from .atomic_write import COMPLETED_PATHS
 
-END_SIGNALS = tuple(
+TERMINATION_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 
@@ -33,7 +33,7 @@ def replace_folder(new: Path, target: Path) -> None:
         except OSError:
             restore_folder(target)
             raise
-        PLACED_PATHS.append(target)
+        COMPLETED_PATHS.append(target)
         shutil.rmtree(old, ignore_errors=True)
 
 
@@ -66,7 +66,7 @@ def defer_signals() -> Iterator[None]:
     received = []
     handlers = {}
     try:
-        for number in END_SIGNALS:
+        for number in TERMINATION_SIGNALS:
             if signal.getsignal(number) not in (signal.SIG_IGN, None):
                 handlers[number] = signal.signal(number, lambda number, _: received.append(number))
         yield

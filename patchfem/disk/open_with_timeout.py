@@ -8,7 +8,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-PIPE_TIMEOUT = 5.0  # time to wait for the first data of a pipe [s]
+PIPE_WAIT_SECONDS = 5.0  # until the first data
 
 
 def open_for_reading(path: str | Path) -> BinaryIO:
@@ -22,10 +22,10 @@ def open_for_reading(path: str | Path) -> BinaryIO:
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select
 
-        if not select.select([file], [], [], PIPE_TIMEOUT)[0]:
+        if not select.select([file], [], [], PIPE_WAIT_SECONDS)[0]:
             file.close()
             raise TimeoutError(
-                0, f"this is a pipe, and no data came through it within {PIPE_TIMEOUT:.0f} s"
+                0, f"this is a pipe, and no data came through it within {PIPE_WAIT_SECONDS:.0f} s"
             )
     os.set_blocking(file.fileno(), True)
     return file

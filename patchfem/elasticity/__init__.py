@@ -24,8 +24,8 @@ PUBLIC = {
         "Layers",
         "Piece",
         "compute_displacement",
-        "interface_compliance",
-        "lame",
+        "compute_interface_compliance",
+        "lame_constants",
         "von_mises",
     ),
     "lapack": (
@@ -44,7 +44,7 @@ PUBLIC = {
     "recovery": (
         "Cells",
         "StressError",
-        "centre_stress",
+        "compute_centre_stress",
         "estimate_error",
         "fit_recovery",
         "get_cells",

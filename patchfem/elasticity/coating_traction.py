@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.grading import LENGTH_TOL
+from ..mesh.grading import EQUAL_LENGTH_TOL
 from ..mesh.pieces import find_edges
-from .elasticity import CellPoints, hooke
+from .elasticity import CellPoints, compute_stress
 from .recovery import Cells, make_points
 
 
@@ -107,7 +107,7 @@ def _nodal_forces(coating: Cells, gauss_points: list[CellPoints], u) -> np.ndarr
     for nodes, points in zip(coating.groups.values(), gauss_points):
         strain = points.strain(u[nodes])
         xx, yy, _, xy = np.moveaxis(
-            hooke(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
+            compute_stress(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
         )
         tensor = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
         forces = (points.weights[..., None, None] * tensor @ points.gradients).sum(axis=1)
@@ -138,7 +138,7 @@ def interpolate_coating_traction(
     if traction is None:
         return {}
     line_x = cells.points[traction.node, 0]
-    tolerance = LENGTH_TOL * np.ptp(line_x)
+    tolerance = EQUAL_LENGTH_TOL * np.ptp(line_x)
     is_outside = (x < line_x[0] - tolerance) | (x > line_x[-1] + tolerance)
     out = {}
     for name, values in (("normal_bond", traction.normal), ("shear_bond", traction.shear)):

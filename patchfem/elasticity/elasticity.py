@@ -13,7 +13,7 @@ from ..core import NotConverged, frozen_array
 from ..formatting import format_length
 from ..mesh import pieces
 from ..mesh.elements import ELEMENTS, Element
-from .fronts import CellBlock, Fronts, condense
+from .fronts import CellBlock, Fronts, condense_to_interface
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -28,13 +28,13 @@ class Layers:
     substrate: tuple[float, float]
     plane: str
 
-    def lame(self, is_coating) -> np.ndarray:
+    def lame_constants(self, is_coating) -> np.ndarray:
         """Return lambda and mu (2, ...) [Pa] of cells; `is_coating` (...) marks those of the coating."""
-        constants = [lame(*pair, self.plane) for pair in (self.substrate, self.coating)]
+        constants = [lame_constants(*pair, self.plane) for pair in (self.substrate, self.coating)]
         return np.moveaxis(np.array(constants)[np.asarray(is_coating, int)], -1, 0)
 
 
-def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
+def lame_constants(young: float, poisson: float, plane: str) -> tuple[float, float]:
     """Return the Lame constants lambda and mu of a plane problem.
 
     Those of plane stress give the stresses in the plane from the strains in the plane.
@@ -180,7 +180,7 @@ class Piece:
                 x = mesh.points[:, 0]
                 is_fixed[(x == x.min()) | (x == x.max()), self.guided] = True
             try:
-                factor = condense(
+                factor = condense_to_interface(
                     self._stiffness_blocks(), mesh.cell_positions, mesh.interface, is_fixed
                 )
                 self.computed["round_off_error"] = factor.estimate_round_off()
@@ -197,7 +197,7 @@ class Piece:
     def _stiffness_blocks(self) -> list[CellBlock]:
         """Return the stiffnesses of the cells."""
         out = []
-        constants = self.layers.lame(self.mesh.is_coating)
+        constants = self.layers.lame_constants(self.mesh.is_coating)
         n_cells = 0
         for kind, cells in self.mesh.blocks.items():
             lam, mu = constants[:, n_cells : n_cells + len(cells)]
@@ -210,7 +210,7 @@ class Piece:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
         mesh = self.mesh
         full_load = np.zeros((mesh.n_nodes, *load.shape[1:]))
-        full_load[mesh.interface] = np.einsum("ij,i...->j...", spread_matrix(mesh), load)
+        full_load[mesh.interface] = np.einsum("ij,i...->j...", compute_spread_matrix(mesh), load)
         u = self.factor.solve(full_load)
         if self.round_off_error:
             u += self.factor.solve(full_load - self.factor.compute_forces(u))
@@ -234,7 +234,7 @@ class Piece:
         )
 
 
-def spread_matrix(mesh) -> np.ndarray:
+def compute_spread_matrix(mesh) -> np.ndarray:
     """Return the matrix T that converts forces f at m pressure nodes into forces T^T f on the n interface nodes.
 
     f_i is the pressure at a node times the tributary length of the node. On elements of first order T = 1. On elements
@@ -282,7 +282,7 @@ def compute_displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) ->
     return piece.solve(load.astype(float))
 
 
-def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
+def compute_stress(strain, is_coating, layers: Layers) -> np.ndarray:
     """Compute the stresses for given plane strains by Hooke's law.
 
     Parameters
@@ -300,7 +300,7 @@ def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
         Stresses xx, yy, zz, xy; zz = 0 in plane stress.
     """
     exx, eyy, exy = strain
-    lam, mu = layers.lame(is_coating)
+    lam, mu = layers.lame_constants(is_coating)
     sxx = lam * (exx + eyy) + 2 * mu * exx
     syy = lam * (exx + eyy) + 2 * mu * eyy
     szz = np.zeros_like(sxx)
@@ -329,13 +329,13 @@ class InterfaceCompliance(NamedTuple):
     nt: np.ndarray
 
 
-def interface_compliance(piece: Piece) -> InterfaceCompliance:
+def compute_interface_compliance(piece: Piece) -> InterfaceCompliance:
     """Compute the compliances of a piece at its interface, per unit width."""
     both = piece.factor.compliance
     along = slice(0, None, 2)
     inward = slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])
-    spread = spread_matrix(piece.mesh)
+    spread = compute_spread_matrix(piece.mesh)
     if spread.shape[0] < spread.shape[1]:
         blocks = [spread @ block @ spread.T for block in blocks]
     return InterfaceCompliance(*(frozen_array(block) for block in blocks))

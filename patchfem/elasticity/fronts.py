@@ -15,12 +15,12 @@ from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
 MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
-DIRECTIONS = np.arange(2)  # numbers of the displacements of a node, along x and inward
+DISPLACEMENT_COMPONENTS = np.arange(2)  # numbers of the displacements of a node, along x and inward
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
 # Largest residual of a solution, relative to the largest load, that is not refined
-SAFE_RESIDUAL = 1e-8
+MAX_UNREFINED_RESIDUAL = 1e-8
 # Largest relative change of the displacements by one step of refinement; factors with a larger
 # change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
@@ -109,7 +109,7 @@ class Fronts:
         -------
         float
             Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
-            `SAFE_RESIDUAL`.
+            `MAX_UNREFINED_RESIDUAL`.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Fronts:
         load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
         u = self.solve(load)
         residual = load - self.compute_forces(u)
-        if np.abs(residual).max() <= SAFE_RESIDUAL * np.abs(load).max():
+        if np.abs(residual).max() <= MAX_UNREFINED_RESIDUAL * np.abs(load).max():
             return 0.0
         change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
         if not change <= MAX_REFINEMENT_CHANGE:
@@ -158,7 +158,7 @@ class _Stiffness(NamedTuple):
     matrix: np.ndarray
 
 
-def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
+def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
     """Halve cells at positions (t, 2) across the longer side of each part.
 
     Returns
@@ -190,7 +190,7 @@ def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
     return parts, leaves
 
 
-def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
+def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
@@ -215,7 +215,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     """
     # A node is eliminated in the smallest part that contains all of its cells
     blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
-    parts, leaves = _dissect(positions)
+    parts, leaves = _bisect_cells(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
     position = np.empty(len(is_fixed) + 1, np.int64)
@@ -229,7 +229,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
                 terms = [stiffnesses.pop(half) for half in part.halves]
             else:
                 terms = _select_cells(blocks, leaves[part.first_leaf])
-            nodes = _unite([term.nodes for term in terms])
+            nodes = _merge_nodes([term.nodes for term in terms])
             is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
             own = nodes[is_own]
             boundary = nodes[~is_own]
@@ -296,23 +296,23 @@ def _select_cells(blocks, cells) -> list[CellBlock]:
     return selected
 
 
-def _unite(parts) -> np.ndarray:
+def _merge_nodes(node_arrays) -> np.ndarray:
     """Return the different nodes of several arrays of nodes, sorted.
 
     `np.unique` takes several times as long for few nodes.
     """
-    nodes = np.sort(np.concatenate(parts, axis=None))
+    nodes = np.sort(np.concatenate(node_arrays, axis=None))
     return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
 
 
-def _assemble_cells(blocks, order, position) -> np.ndarray:
+def _assemble_cells(blocks, nodes_in_order, position) -> np.ndarray:
     """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
 
-    `blocks` are the cells by element, `order` (k,) are the nodes, and `position` (N + 1,) is a workspace for the places
-    of all N nodes in `order`.
+    `blocks` are the cells by element, `nodes_in_order` (k,) are the nodes, and `position` (N + 1,) is a workspace for
+    the places of all N nodes in `nodes_in_order`.
     """
-    position[order] = np.arange(order.size)
-    size = 2 * order.size
+    position[nodes_in_order] = np.arange(nodes_in_order.size)
+    size = 2 * nodes_in_order.size
     total = 0.0
     for nodes, matrices in blocks:
         unknowns = _number_unknowns(position[nodes])
@@ -340,17 +340,19 @@ def _add_stiffnesses(terms, order, position) -> np.ndarray:
 
 def _number_unknowns(nodes) -> np.ndarray:
     """Return the numbers (..., 2 k) of the unknowns of nodes (..., k), node by node along x and inward."""
-    return (2 * nodes[..., None] + DIRECTIONS).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
+    return (2 * nodes[..., None] + DISPLACEMENT_COMPONENTS).reshape(
+        *nodes.shape[:-1], 2 * nodes.shape[-1]
+    )
 
 
-def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:
+def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, _Stiffness]:
     """Eliminate the own nodes of a part.
 
     With K its stiffness, K_oo = L L^T, W = L^-1 K_ob and the Schur complement S = K_bb - W^T W.
 
     Parameters
     ----------
-    own, boundary : (a,) and (b,) ndarray of int
+    own_nodes, boundary : (a,) and (b,) ndarray of int
         Nodes that are eliminated (o), and those that remain (b).
     matrix : (2 a + 2 b + 2, 2 a + 2 b + 2) ndarray
         Stiffness of the part [N/m per m] for the own nodes, the boundary and a last node with zeros.
@@ -362,20 +364,20 @@ def _eliminate(own, boundary, matrix) -> tuple[Front, _Stiffness]:
     remaining : _Stiffness
         S of the boundary.
     """
-    size = 2 * own.size
+    size = 2 * own_nodes.size
     own_boundary = matrix[:size, size:].copy()
     remaining = matrix[size:, size:].copy()
     factor = matrix[:size, :size].copy()
     smallest_pivot = 1.0
     # The coupling W and the remaining stiffness S overwrite their terms
-    if own.size:
+    if own_nodes.size:
         factor, smallest_pivot = _factorise(factor)
         # The arrays are passed transposed, because LAPACK stores columns.
         coupling = own_boundary.T
         dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
         dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
 
-    front = Front(own, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
+    front = Front(own_nodes, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
     return front, _Stiffness(boundary, remaining)
 
 

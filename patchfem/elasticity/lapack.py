@@ -65,14 +65,14 @@ def cho_factor(matrix) -> np.ndarray:
     return lower_factor
 
 
-def cho_solve(lower_factor, right) -> np.ndarray:
+def cho_solve(lower_factor, right_sides) -> np.ndarray:
     """Solve a symmetric system for right-hand sides (n,) or (n, k), with the result of `cho_factor`."""
-    return dpotrs(lower_factor, right, lower=1)[0]
+    return dpotrs(lower_factor, right_sides, lower=1)[0]
 
 
-def cho_inverse(low) -> np.ndarray:
+def cho_inverse(lower_factor) -> np.ndarray:
     """Return the inverse (n, n) of a symmetric matrix from its Cholesky factor, the result of `cho_factor`."""
-    lower_half, _ = _LAPACK.dpotri(np.asfortranarray(low), lower=1)
+    lower_half, _ = _LAPACK.dpotri(np.asfortranarray(lower_factor), lower=1)
     return np.tril(lower_half) + np.tril(lower_half, -1).T
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.grading import LENGTH_TOL, tributary_lengths
+from ..mesh.grading import EQUAL_LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
 
@@ -70,8 +70,8 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     Mortar
     """
     x = _join_nodes(lower.x, upper.x)
-    to_lower = transfer_matrix(x, lower.x)
-    to_upper = transfer_matrix(x, upper.x)
+    to_lower = compute_transfer_matrix(x, lower.x)
+    to_upper = compute_transfer_matrix(x, upper.x)
     nn, tt, nt = (
         to_lower @ low @ to_lower.T + sign * (to_upper @ high @ to_upper.T)
         for low, high, sign in zip(lower.compliance, upper.compliance, (1, 1, -1))
@@ -86,7 +86,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     )
 
 
-def transfer_matrix(x, piece_x) -> np.ndarray:
+def compute_transfer_matrix(x, piece_x) -> np.ndarray:
     """Integrate the matrix T that transfers displacements from the nodes of a body to a grid.
 
     Parameters
@@ -138,7 +138,7 @@ def _join_nodes(lower_x, upper_x) -> np.ndarray:
     of the pieces, which have the same ends.
     """
     end = lower_x[-1]
-    tolerance = LENGTH_TOL * (end - lower_x[0])
+    tolerance = EQUAL_LENGTH_TOL * (end - lower_x[0])
     grid = [lower_x[0]]
     while grid[-1] < end - tolerance:
         following = []

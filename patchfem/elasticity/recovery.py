@@ -13,13 +13,13 @@ import numpy as np
 
 from ..core import frozen_array
 from ..mesh.elements import ELEMENTS
-from .elasticity import CellPoints, Layers, Piece, evaluate_cells, hooke
+from .elasticity import CellPoints, Layers, Piece, compute_stress, evaluate_cells
 
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
 # patch with a smaller one is extended by the neighbouring cells
-MIN_PLANE_DETERMINANT = 0.1
+MIN_PLANE_FIT_DETERMINANT = 0.1
 # Elements of first order by the number of their corners, by which recovered stresses are interpolated
-LINEAR_ELEMENTS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
+ELEMENTS_BY_CORNERS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -75,7 +75,7 @@ def make_points(cells: Cells, kind: str) -> list[CellPoints]:
     return out
 
 
-def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
+def compute_centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     """Compute the stress at the centres of cells, the superconvergent points of bilinear quads.
 
     Parameters
@@ -97,7 +97,7 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
             points.strain(motion[nodes])[..., 0]
             for points, nodes in zip(centres, cells.groups.values())
         ]
-        frame[:] = hooke(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
+        frame[:] = compute_stress(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
     return out
 
 
@@ -129,12 +129,12 @@ class Patches(NamedTuple):
         return self.cell[np.arange(owner.size) + first], owner
 
 
-def collect_patches(point, cell) -> Patches:
+def collect_patches(points, cells) -> Patches:
     """Group pairs of a point and a cell near it by point, each pair once.
 
-    `point` and `cell` (e,) are the numbers of both. All weights are 1.
+    `points` and `cells` (e,) are the numbers of both. All weights are 1.
     """
-    keys = np.unique(np.asarray(point, np.int64) << 32 | cell)
+    keys = np.unique(np.asarray(points, np.int64) << 32 | cells)
     return Patches(keys >> 32, keys & 0xFFFFFFFF, np.ones(keys.size))
 
 
@@ -237,7 +237,7 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
     gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
-    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_DETERMINANT
+    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_FIT_DETERMINANT
 
     # Value of the plane at the node: mean of the values, less the slopes times the mean offset
     mean = gram[:, 0, 1:] / counts[:, None]
@@ -289,7 +289,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
     u : (frames, N, 2) ndarray
         Displacements [m].
     stress : (frames, t, 4) ndarray
-        From `centre_stress` [Pa].
+        From `compute_centre_stress` [Pa].
     gauss_points : list of CellPoints
         Points of `make_points`, by element, at which the error is integrated.
 
@@ -298,7 +298,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
     StressError
     """
     cells = recovery.cells
-    lam, mu = cells.layers.lame(cells.is_coating)
+    lam, mu = cells.layers.lame_constants(cells.is_coating)
     # The energy is (lam + mu) (exx + eyy)^2 + mu (exx - eyy)^2 + 4 mu exy^2, in components whose squares add up.
     bulk = np.sqrt(lam + mu)
     shear = np.sqrt(mu)
@@ -317,7 +317,7 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
             at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
             first_cell = part.stop
             first_corner = first_corner + len(at_corners)
-            shape = LINEAR_ELEMENTS[n_corners].evaluate(ELEMENTS[kind].gauss).values
+            shape = ELEMENTS_BY_CORNERS[n_corners].evaluate(ELEMENTS[kind].gauss).values
             at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
 
             # Squared difference from the computed components, integrated over each cell

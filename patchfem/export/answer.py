@@ -132,7 +132,7 @@ def make_columns(dims: str, columns: dict[str, tuple[Any, ...]]) -> Variables:
     return variables
 
 
-def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
+def encode_texts(dimension: str, texts: list[str], description: str = "") -> Variable:
     """Return texts over one dimension as codes with meanings.
 
     Parameters

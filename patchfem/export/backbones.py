@@ -4,7 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..campaigns.backbone.records import METHODS, VALUES, Backbone, Curve, match_amplitudes
+from ..campaigns.backbone.records import (
+    CURVE_METHODS,
+    CURVE_QUANTITIES,
+    Backbone,
+    Curve,
+    match_amplitudes,
+)
 from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
 from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
@@ -27,17 +33,18 @@ from .netcdf import from_dataset
 from .runs import make_origin
 
 # Columns of a curve and of its band, their units, and words for them in a sentence
-COLUMNS = (
+CURVE_COLUMNS = (
     "amplitude",
-    *(name + end for name in VALUES for end in ("", "_error")),
+    *(name + end for name in CURVE_QUANTITIES for end in ("", "_error")),
     "force_frequency",
 )
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
-NAMES = {"frequency": "frequency", "damping": "damping ratio"}
-DIGITS = {"frequency": 5, "damping": 3}  # significant digits of a value in a sentence on its change
+BACKBONE_UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
+SENTENCE_NAMES = {"frequency": "frequency", "damping": "damping ratio"}
+# Significant digits in a sentence on the change of frequency or damping
+CHANGE_DIGITS = {"frequency": 5, "damping": 3}
 # Largest relative change of a key that is said in percent.
-MAX_PERCENT_CHANGE = 0.995
+MAX_KEY_CHANGE_IN_PERCENT = 0.995
 
 
 def compute_answer(
@@ -117,10 +124,10 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     curve = backbone.best
     if curve is not None:
         largest = int(np.argmax(curve.damping))
-        for name in VALUES:
-            out[f"{name}_at_smallest_amplitude"] = _take(curve, name, 0)
-            out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
-        out["largest_damping"] = _take(curve, "damping", largest)
+        for name in CURVE_QUANTITIES:
+            out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
+            out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
+        out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
         # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
         # curve nothing encloses the peak.
         error = None
@@ -141,19 +148,18 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     return {name: one for name, one in out.items() if one.value is not None or one.reason}
 
 
-def _take(curve: Curve, name: str, k: int) -> Quantity:
-    """Return a value of point k of a curve with its error.
-
-    `name` is a column of the curve, such as "frequency" or "damping".
-    """
-    return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
+def _make_point_quantity(curve: Curve, name: str, k: int) -> Quantity:
+    """Return the value and the error of a column of a curve, such as "frequency" or "damping", at its point k."""
+    return Quantity(
+        getattr(curve, name)[k], BACKBONE_UNITS[name], getattr(curve, f"{name}_error")[k]
+    )
 
 
 def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
-        """Return a quantity as text."""
+        """Return a measure as text, such as "143.2 ± 0.1 Hz"."""
         return quantities.format_quantity(name, measures[name])
 
     curve = backbone.best
@@ -172,7 +178,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     is_range = curve.amplitude.size > 1
     has_peak = False
     changes = []
-    for name, label in NAMES.items():
+    for name, label in SENTENCE_NAMES.items():
         places = [f"{name}_at_{size}_amplitude" for size in ("smallest", "largest")]
         first, last = (measures[place] for place in places)
         low, high = map(show, places)
@@ -209,16 +215,17 @@ def _exceeds(quantity: Quantity, other: Quantity) -> bool:
 
 
 def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Variables:
-    """Return the curves of the methods, each with the band of tests around it if it is recommended.
+    """Return frequency, damping ratio and force of each method over the amplitude, and the band of the recommended one.
 
-    Of several backbones, one for each value of the key `axis`, there are only the recommended curves, at common amplitudes
-    with NaN where a backbone has no motion. The band of a single backbone has variables of its own, too.
+    Names begin with that of the method, such as balance_frequency. A single backbone has the band also as
+    band_frequency_low and so on. Several backbones, one for each value of the key `axis`, have the recommended curves
+    alone, on the union of their amplitudes; NaN stands where a backbone has no motion.
     """
     data = {}
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
     all_bands = [backbone.band for backbone in backbones]
-    for method in METHODS:
+    for method in CURVE_METHODS:
         bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
         if axis is not None:
@@ -231,7 +238,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
         amplitude = np.unique(np.concatenate(known_amplitudes))
         prefix = method.replace("-", "_")
         columns = {f"{prefix}_amplitude": (amplitude, "m")}
-        for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
+        for name in CURVE_COLUMNS[1:] + BAND_COLUMNS[1:]:
             records = bands if name in BAND_COLUMNS else curves
             values = np.full((len(records), amplitude.size), np.nan)
             for row, record in zip(values, records, strict=True):
@@ -250,8 +257,8 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
 
 
 def _find_unit(name: str) -> str:
-    """Return the SI unit of a column."""
-    return UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
+    """Return the SI unit of a column, such as "force_frequency" or "damping_low"."""
+    return BACKBONE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
 def _make_details(backbone: Backbone) -> JsonObject:
@@ -260,7 +267,7 @@ def _make_details(backbone: Backbone) -> JsonObject:
     band = backbone.band
     curves = {}
     for method, curve in backbone.curves.items():
-        curves[method] = {name: getattr(curve, name) for name in COLUMNS}
+        curves[method] = {name: getattr(curve, name) for name in CURVE_COLUMNS}
 
     # A backbone without a band has None in place of its method and columns
     return {
@@ -336,20 +343,25 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     # differences at the common amplitudes, and the largest one
     start, end = first.best.at(here), last.best.at(there)
     changes = {}
-    for name in VALUES:
+    for name in CURVE_QUANTITIES:
         error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
         changes[name] = getattr(end, name) - getattr(start, name), error
-    point = _find_largest_change([changes[name] for name in NAMES])
+    point = _find_largest_change([changes[name] for name in SENTENCE_NAMES])
     if point is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
     amplitude = start.amplitude[point]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
-        measures[f"{name}_change"] = Quantity(step[point], UNITS[name], error[point])
+        measures[f"{name}_change"] = Quantity(step[point], BACKBONE_UNITS[name], error[point])
 
-    ends = {name: [_take(curve, name, point).value for curve in (start, end)] for name in VALUES}
-    parts = [_describe_step(name, measures[f"{name}_change"], ends[name]) for name in NAMES]
+    ends = {
+        name: [_make_point_quantity(curve, name, point).value for curve in (start, end)]
+        for name in CURVE_QUANTITIES
+    }
+    parts = [
+        _describe_step(name, measures[f"{name}_change"], ends[name]) for name in SENTENCE_NAMES
+    ]
     sentences = [f"{subject}, at {format_quantity(amplitude, 'm', 3)}, {parts[0]} and {parts[1]}."]
     if None not in ends["force"]:
         texts = [format_quantity(force, "N", 3) for force in ends["force"]]
@@ -371,17 +383,18 @@ def _find_largest_change(changes: list[tuple[np.ndarray, np.ndarray]]) -> int | 
     return int(np.argmax(score)) if np.any(score) else None
 
 
-def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
+def _describe_step(name: str, step: Quantity, values: list[float]) -> str:
     """Return the change of the frequency or of the damping ratio between two values as a clause.
 
-    `name` is "frequency" or "damping", `step` the change with its error, and `ends` are the first and last value [SI].
+    `name` is "frequency" or "damping", `step` the change with its error, and `values` are the first and the last
+    value [SI].
     """
-    texts = [format_quantity(value, UNITS[name], DIGITS[name]) for value in ends]
+    texts = [format_quantity(value, BACKBONE_UNITS[name], CHANGE_DIGITS[name]) for value in values]
     if abs(step.value) <= step.error:
-        return f"keeps the {NAMES[name]} at {texts[0]}"
+        return f"keeps the {SENTENCE_NAMES[name]} at {texts[0]}"
     verb = "raises" if step.value > 0 else "lowers"
     size = f" by {format_quantity(abs(step.value), step.unit, 2)}" if name == "frequency" else ""
-    return f"{verb} the {NAMES[name]}{size} from {texts[0]} to {texts[1]}"
+    return f"{verb} the {SENTENCE_NAMES[name]}{size} from {texts[0]} to {texts[1]}"
 
 
 def _describe_change(values: Sequence[float | str]) -> str:
@@ -390,6 +403,6 @@ def _describe_change(values: Sequence[float | str]) -> str:
     if not (isinstance(first, float) and isinstance(last, float) and first > 0):
         return ""
     change = last / first - 1
-    if abs(change) > MAX_PERCENT_CHANGE:
+    if abs(change) > MAX_KEY_CHANGE_IN_PERCENT:
         return f" ({format_number(last / first, 3)} times as much)"
     return f" ({format_number(100 * abs(change), 3)} % {'more' if change > 0 else 'less'})"

@@ -12,7 +12,7 @@ import numpy as np
 from ..formatting import format_number
 from . import quantities
 from .answer import Answer, Quantity, Variable
-from .charts.table import CSV_FILES, CSV_UNITS, TABLES, Column, CsvFile, parse_columns
+from .charts.table import CSV_FILES, CSV_UNITS_PER_SI_UNIT, TABLES, Column, CsvFile, parse_columns
 
 # cells of a column of a CSV file by its heading. A missing cell is None or "".
 Lists = dict[str, list[str | float | None]]
@@ -21,7 +21,7 @@ Cells = dict[str, Quantity | str | float]
 # table of a page: `title`, `headings`, and `rows` of strings
 Table = dict[str, str | list[str] | list[list[str]]]
 # endings of the names of arrays with the error or the interval of another array
-ENDS = ("error", "low", "high")
+ERROR_AND_INTERVAL_ENDINGS = ("error", "low", "high")
 
 
 def list_rows(answer: Answer, source: str) -> list[Cells]:
@@ -50,7 +50,7 @@ def list_rows(answer: Answer, source: str) -> list[Cells]:
     columns = {name: list_cells(one) for name, one in variables.items()}
     for name, variable in variables.items():
         if variable.values.dtype.kind == "f":
-            ends = [variables.get(f"{name}_{end}") for end in ENDS]
+            ends = [variables.get(f"{name}_{end}") for end in ERROR_AND_INTERVAL_ENDINGS]
             numbers = [[None] * len(variable.values) if one is None else one.values for one in ends]
             columns[name] = [
                 Quantity(value, variable.unit, *parts)
@@ -85,7 +85,7 @@ def make_quantity(content):
     """Return an object of a JSON file as a quantity if it is one; other content is unchanged."""
     if not isinstance(content, dict) or "value" not in content:
         return content
-    known = ("value", "unit", *ENDS)
+    known = ("value", "unit", *ERROR_AND_INTERVAL_ENDINGS)
     return Quantity(**{key: content[key] for key in known if key in content})
 
 
@@ -123,10 +123,10 @@ def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
     return lists
 
 
-def _list_column(rows: list[Cells], column: Column, part: str = "value") -> Lists:
+def _list_column(rows: list[Cells], column: Column, quantity_part: str = "value") -> Lists:
     """Return a column of numbers or texts: its heading with the unit, and a cell for each row.
 
-    `rows` have the cells by name, and `part` of a quantity is "value", "low" or "high".
+    `rows` have the cells by name, and `quantity_part` of a quantity is "value", "low" or "high".
     """
     heading = column.heading
     cells = [row.get(column.name) for row in rows]
@@ -138,8 +138,8 @@ def _list_column(rows: list[Cells], column: Column, part: str = "value") -> List
     unit = heading.partition("[")[2].rstrip("]")
     if not unit and column.style != "bare" and sized[0].unit not in ("", "1"):
         heading = f"{heading} [{sized[0].unit}]"
-    numbers = [getattr(cell, part, None) for cell in cells]
-    scale = CSV_UNITS.get(unit, 1.0)
+    numbers = [getattr(cell, quantity_part, None) for cell in cells]
+    scale = CSV_UNITS_PER_SI_UNIT.get(unit, 1.0)
     return {heading: [None if cell is None else cell * scale for cell in numbers]}
 
 

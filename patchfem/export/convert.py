@@ -8,8 +8,9 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from . import lab, pieces, store
+from .charts.axes import PICTURE_ENDINGS
 from .fields import grids
-from .fields.vtkhdf import NAME, Frames, find_fields, read_frames
+from .fields.vtkhdf import VTKHDF_FILE, Frames, find_fields, read_frames
 from .lab import write
 
 SERIES_FORMATS = (".pvd", ".vtkhdf")
@@ -44,8 +45,8 @@ def export_results(
         If suffix, frame and histories do not fit together.
     """
     # a .csv contains the fields if there are any
-    has_fields = (folder / NAME).is_file() or not folder.is_dir()
-    is_lab_format = out.suffix.lower() in lab.ENDINGS
+    has_fields = (folder / VTKHDF_FILE).is_file() or not folder.is_dir()
+    is_lab_format = out.suffix.lower() in lab.LAB_FILE_ENDINGS
     if is_lab_format and (out.suffix != ".csv" or histories or not has_fields):
         if frame is not None:
             raise PatchfemError(
@@ -71,12 +72,12 @@ def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> No
     """
     if histories:
         raise PatchfemError(
-            f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
+            f"--histories: histories are written as {', '.join(lab.LAB_FILE_ENDINGS)}, not as "
             f"{out.suffix or out}"
         )
     if out.suffix == ".py":
         raise PatchfemError(
-            f"{out}: the script for ParaView was removed in patchfem 1.2; open {NAME} in ParaView 5.13 or "
+            f"{out}: the script for ParaView was removed in patchfem 1.2; open {VTKHDF_FILE} in ParaView 5.13 or "
             "newer, or write .pvd for older versions"
         )
     if out.suffix not in FIELD_FORMATS:
@@ -120,12 +121,12 @@ def view_results(
     """
     if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
         raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
-    if out is not None and out.suffix not in pieces.PICTURES + pieces.FILMS:
+    if out is not None and out.suffix not in PICTURE_ENDINGS + pieces.FILM_ENDINGS:
         raise PatchfemError(
-            f"{out}: pictures are written as {', '.join(pieces.PICTURES)}, films as "
-            f"{', '.join(pieces.FILMS)}"
+            f"{out}: pictures are written as {', '.join(PICTURE_ENDINGS)}, films as "
+            f"{', '.join(pieces.FILM_ENDINGS)}"
         )
-    is_film = out is not None and out.suffix in pieces.FILMS
+    is_film = out is not None and out.suffix in pieces.FILM_ENDINGS
     if is_film and frame is not None:
         raise PatchfemError(
             f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
@@ -134,7 +135,7 @@ def view_results(
     frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
     # the folder of an interface has fields alone
-    has_summary = (folder / store.SUMMARY).is_file()
+    has_summary = (folder / store.SUMMARY_FILE).is_file()
     title = store.read_summary(folder).title if has_summary else ""
     title = title or folder.resolve().name
     if out is None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ..campaigns.cost import (
-    TOLERANCE,
+    TOLERANCE_SETTING,
     Accuracy,
     Cost,
     Judgement,
@@ -23,21 +23,21 @@ from .answer import (
     Quantity,
     Remarks,
     Variables,
-    encode,
+    encode_texts,
     make_columns,
     to_plain,
 )
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
-RUN_COLUMNS = {
+COST_FILE_COLUMNS = {
     "label": ("setting", ""),
     "seconds": ("seconds", "s"),
     "wall_seconds": ("wall_seconds", "s"),
     "timings": ("timings", ""),
 }
 # Words for the judgement of the scene as it is.
-SCENE_JUDGEMENTS = {
+SCENE_JUDGEMENT_WORDS = {
     Judgement.MEETS: "meets the tolerance",
     Judgement.MISSES: "misses the tolerance",
     Judgement.UNKNOWN: "does not have an error estimate of every measure",
@@ -47,7 +47,7 @@ SCENE_JUDGEMENTS = {
 class Row(NamedTuple):
     """A run of a curve of cost, and its least accurate measure.
 
-    - knob: what varies along the curve: TOLERANCE, or the name of a numerical setting.
+    - knob: what varies along the curve: TOLERANCE_SETTING, or the name of a numerical setting.
     - run: the run.
     - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
       curve do not count.
@@ -69,7 +69,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     Parameters
     ----------
     curves : dict of str to list of Cost
-        The runs, from coarse to fine, by what varies: TOLERANCE, or the name of a numerical setting.
+        The runs, from coarse to fine, by what varies: TOLERANCE_SETTING, or the name of a numerical setting.
     model : Model
         Model of the scene as it is, which no run changes.
 
@@ -87,19 +87,19 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         knob_rows = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
         rows += knob_rows
         # the runs of a curve of tolerances have no tolerance in common
-        sentence = None if one == TOLERANCE else describe_best_setting(curve, tolerance)
+        sentence = None if one == TOLERANCE_SETTING else describe_best_setting(curve, tolerance)
         details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
-    if knob == TOLERANCE:
+    if knob == TOLERANCE_SETTING:
         chosen = next((run for run in runs if run.tolerance == tolerance), runs[-1])
     else:
         chosen = find_best_run(runs, tolerance)
     row = next(row for row in rows if row.run is chosen)
-    sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE else []
+    sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
-    advised = rows[: len(runs)] if knob == TOLERANCE else [row]
+    advised = rows[: len(runs)] if knob == TOLERANCE_SETTING else [row]
     notes = [f"{_describe_miss(one)}: {text}." for one in advised for text in one.run.remedies]
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
@@ -143,7 +143,7 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
         )
     sentences = [
         f"At its tolerance {run.tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and "
-        f"{SCENE_JUDGEMENTS[row.judgement]}{error}."
+        f"{SCENE_JUDGEMENT_WORDS[row.judgement]}{error}."
     ]
 
     met = [one.run for one in rows if one.judgement is Judgement.MEETS]
@@ -171,7 +171,7 @@ def _describe_miss(row: Row) -> str:
 def _find_main_measure(runs: list[Cost]) -> str:
     """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
     names = find_measures_with_error(runs)
-    names = [name for name in quantities.KEY if name in names] or names
+    names = [name for name in quantities.KEY_QUANTITY_NAMES if name in names] or names
     return rate_run(runs[0], names, runs[0].tolerance).name or names[0]
 
 
@@ -195,13 +195,13 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
 
 
 def _make_data(rows: list[Row], main: str) -> Variables:
-    """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too.
+    """Return the columns of cost.csv, one element for each run; the charts and the table of the page show them too.
 
     `rows` are runs with their judgements, and `main` is the name of the main measure.
     """
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}
-    for attribute, (name, unit) in RUN_COLUMNS.items():
+    for attribute, (name, unit) in COST_FILE_COLUMNS.items():
         columns[name] = ([getattr(run, attribute) for run in runs], unit)
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
@@ -223,5 +223,5 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     # a colour for each varied setting and for runs that miss the tolerance
     has_several = rows[0].knob != rows[-1].knob
     texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
-    data["result"] = encode("run", texts)
+    data["result"] = encode_texts("run", texts)
     return data

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import __version__
-from ..campaigns.fits.curve import EXTENT, FittedCurve
+from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
 from ..campaigns.fits.options import FitOptions
 from ..campaigns.fits.problem import FittedKeys, Listener
@@ -29,25 +29,25 @@ from .answer import (
     Quantity,
     Remarks,
     Variables,
-    encode,
+    encode_texts,
     make_columns,
 )
 from .quantities import format_quantity
+from .run_data import SENSOR_UNITS
 from .runs import make_origin
 
-FITTED_SCENE = "scene.fitted.toml"
-MAX_NAMED_VALUES = 2  # largest number of fitted values in the headline
-MIN_NAMED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
-LOOP_UNITS = {"force": "N", "friction_ratio": "1"}
-KINDS = {"acceleration": "m s-2", "displacement": "m"}  # readings of a row, and their units
+FITTED_SCENE_FILE = "scene.fitted.toml"
+MAX_HEADLINE_VALUES = 2  # further fitted values are in the table only
+MIN_REPORTED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
+LOOP_FORCE_UNITS = {"force": "N", "friction_ratio": "1"}
 # settings and gains of the sensors of a rig that a scene may leave out
-INSTRUMENT = {
+DEFAULT_SENSOR_SETTINGS = {
     "reading": "peak",
     "reading_cutoff": None,
     "acceleration_gain": 1.0,
     "displacement_gain": 1.0,
 }
-WEAR_UNIT = "m2 N-1"
+WEAR_COEFFICIENT_UNIT = "m2 N-1"
 AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
 
 
@@ -88,7 +88,7 @@ def compute_answer(
     """
     fit = fit_measurement(scene, to, free, options, listener)
     answer = make_answer(fit, scene)
-    write_text(folder / FITTED_SCENE, format_fitted_scene(fit, scene, answer.verdict, folder))
+    write_text(folder / FITTED_SCENE_FILE, format_fitted_scene(fit, scene, answer.verdict, folder))
     return answer
 
 
@@ -117,7 +117,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     scene : Scene
         Scene before the fit.
     """
-    parts = _DESCRIBE[type(fit)](fit)
+    parts = _DESCRIBE_FUNCTIONS[type(fit)](fit)
     details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
     if isinstance(fit, FittedCoefficient):
         details["values"] = _describe_coefficient(fit)
@@ -136,7 +136,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
     pairs = _collect_pairs(details.get("correlation", ()), list(measures))
-    if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
+    if pairs and abs(pairs["correlation"].values[0]) >= MIN_REPORTED_CORRELATION:
         names = pairs["pair"].values[0].replace(", ", " and ")
         verdict.append(
             f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination "
@@ -156,7 +156,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
 
 def _make_headline(details: JsonObject, measures: Quantities) -> str:
     """Return a sentence with the first fitted values and their intervals."""
-    named = list(measures.items())[:MAX_NAMED_VALUES]
+    named = list(measures.items())[:MAX_HEADLINE_VALUES]
     text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
     if len(measures) > len(named):
         text += f" and {len(measures) - len(named)} more"
@@ -181,7 +181,7 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
 
 def _describe_coefficient(fit: FittedCoefficient) -> dict[str, JsonObject]:
     """Return the wear coefficient as the only fitted value of fit.json."""
-    value = {"value": fit.value, "unit": WEAR_UNIT, "interval": [fit.low, fit.high]}
+    value = {"value": fit.value, "unit": WEAR_COEFFICIENT_UNIT, "interval": [fit.low, fit.high]}
     return {COEFFICIENT_KEY: value | {"bounds": [fit.bounds.low, fit.bounds.high]}}
 
 
@@ -220,7 +220,7 @@ def _describe_search(keys: FittedKeys) -> JsonObject:
 def describe_loop_fit(fit: FittedLoop) -> Parts:
     """Return the parts of a fit to a friction loop."""
     loop = fit.loop
-    unit = LOOP_UNITS[loop.quantity]
+    unit = LOOP_FORCE_UNITS[loop.quantity]
     peak = np.abs(loop.reading).max()
     n_rows = int((~fit.held_out).sum())
     scores = {
@@ -350,7 +350,8 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
 def _describe_instrument(fit: FittedRows) -> JsonObject:
     """Return settings and gains of the sensors: those of the scene, fitted values, or defaults."""
     instrument = {
-        name: getattr(fit.instrument, name, default) for name, default in INSTRUMENT.items()
+        name: getattr(fit.instrument, name, default)
+        for name, default in DEFAULT_SENSOR_SETTINGS.items()
     }
     for bound, value in zip(fit.keys.ranges, fit.keys.fit.values, strict=True):
         table, _, key = bound.key.partition(".")
@@ -372,7 +373,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
     columns["held"] = (is_held.astype(np.int8), "")
 
     data = {}
-    for part, (name, unit) in enumerate(KINDS.items()):
+    for part, (name, unit) in enumerate(SENSOR_UNITS.items()):
         # a row without a reading has no computed one
         is_kind = cells.is_acceleration == (name == "acceleration")
         places = cells.row[is_kind]
@@ -398,7 +399,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
         unstable = ", unstable in the test" * ("U" in row["flag"])
         uses.append(f"{'held out' if is_held_out else 'fitted'}{unstable}")
     drives = [f"{row['frequency']:.6g} Hz" for row in entries]
-    codes = {"use": encode("row", uses), "drive": encode("row", drives)}
+    codes = {"use": encode_texts("row", uses), "drive": encode_texts("row", drives)}
     return entries, codes | data | make_columns("row", columns)
 
 
@@ -409,12 +410,15 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     name = measured.name.replace("_", " ")
     text = format_quantity(measured.name, Quantity(unit="m", **ends))
 
-    points = {"coefficient": ([fit.value], WEAR_UNIT)}
+    points = {"coefficient": ([fit.value], WEAR_COEFFICIENT_UNIT)}
     for end, value in ends.items():
         points[f"depth_{end}".removesuffix("_value")] = ([value], "m")
     # the computed curve is drawn a little beyond the interval of the coefficient
-    coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
-    curve = {"curve_coefficient": (coefficients, WEAR_UNIT), "curve_depth": (depths, "m")}
+    coefficients, depths = fit.curve[:, fit.curve[0] <= CURVE_EXTENSION_RATIO * fit.high]
+    curve = {
+        "curve_coefficient": (coefficients, WEAR_COEFFICIENT_UNIT),
+        "curve_depth": (depths, "m"),
+    }
 
     # what the interval of the coefficient contains
     warnings = []
@@ -459,7 +463,7 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     )
 
 
-_DESCRIBE = {
+_DESCRIBE_FUNCTIONS = {
     FittedLoop: describe_loop_fit,
     FittedCurve: describe_curve_fit,
     FittedRows: describe_rows_fit,
@@ -487,5 +491,5 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folde
         fitted = fit.keys.fitted_scene()
     # the model is built before the scene moves, because its file names are relative to its folder
     model = build(fitted)
-    text = write_resolved(move_scene(fitted, folder / FITTED_SCENE), model)
+    text = write_resolved(move_scene(fitted, folder / FITTED_SCENE_FILE), model)
     return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

@@ -18,26 +18,26 @@ from . import store
 from .charts.table import CSV_FILES
 
 # files of all verbs; a folder that contains any other file is never replaced
-FILES = frozenset(
+FILES_OF_ALL_VERBS = frozenset(
     {
-        *(store.SUMMARY, store.SCENE, store.PAGE, store.FIELDS, "result.nc"),
+        *(store.SUMMARY_FILE, store.SCENE_FILE, store.PAGE_FILE, store.FIELDS_FILE, "result.nc"),
         *store.DATA_FILES.values(),
         *store.DETAIL_FILES.values(),
         *(name for files in CSV_FILES.values() for name in files),
         *("interfaces", "fields.pvd", "fields_frames", "scene.fitted.toml"),
     }
 )
-LOCK = ".writer"
+WRITER_LOCK_FILE = ".writer"
 # files with the state from which an interrupted run continues
-STATE = "wear.npz"
-STATES = re.compile(r"wear\.npz|march(_\d+)+\.npz")
+WEAR_STATE_FILE = "wear.npz"
+STATE_FILE_PATTERN = re.compile(r"wear\.npz|march(_\d+)+\.npz")
 
 
 class Folder:
     """Results folder as a context manager, which is locked while files are written.
 
     `path` is the partial folder into which files are written. At exit without an error it replaces
-    an older folder; at exit with an error it is removed except for saved STATES. The next entry
+    an older folder; at exit with an error it is removed except for saved states (`is_state_file`). The next entry
     keeps these states if `resume` is set; otherwise it deletes them and says so in the sentence
     `dropped`.
 
@@ -63,7 +63,9 @@ class Folder:
         self.resume = resume
         self.dropped = ""
         self.new_parents = [path for path in self.target.parents if not path.exists()]
-        self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
+        self.claim = FolderLock(
+            self.target.parent / f".{self.target.name}{WRITER_LOCK_FILE}", target, "run"
+        )
 
     def __enter__(self) -> "Folder":
         if not self.target.name:
@@ -134,7 +136,9 @@ class Folder:
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""
         for place in (self.target, self.path, make_old_folder_path(self.target)):
-            refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
+            refuse_others(
+                place, self.shown, (*FILES_OF_ALL_VERBS, WRITER_LOCK_FILE), "patchfem results"
+            )
 
     def _abandon(self) -> None:
         """Remove an incomplete results folder, but keep a saved state."""
@@ -143,12 +147,12 @@ class Folder:
             RESUMABLE_FOLDERS.append(self.path)
         for part in self.path.iterdir():
             if part not in states:
-                remove(part)
+                remove_path(part)
         with suppress(OSError):  # it contains a state
             self.path.rmdir()
 
 
-def remove(path: Path) -> None:
+def remove_path(path: Path) -> None:
     """Remove a file or a folder with its content, as far as this is possible."""
     shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
@@ -157,20 +161,22 @@ def remove_partial_files(folder: Path) -> None:
     """Remove the partial files in a folder and its subfolders, which only a killed writer leaves."""
     for path in folder.rglob(".*"):
         if is_partial_name(path.name):
-            remove(path)
+            remove_path(path)
 
 
-def is_state(name: str) -> bool:
+def is_state_file(name: str) -> bool:
     """Return whether a file with this name contains the saved state of an interrupted run."""
-    return STATES.fullmatch(name) is not None
+    return STATE_FILE_PATTERN.fullmatch(name) is not None
 
 
 def list_states(folder: Path) -> list[Path]:
     """Return the files with the saved state of an interrupted run in a folder, which may not exist."""
-    return [path for path in folder.glob("*.npz") if is_state(path.name)]
+    return [path for path in folder.glob("*.npz") if is_state_file(path.name)]
 
 
-def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
+def refuse_others(
+    folder: Path, user_path, allowed_names, description: str, allows_dot_names: bool = False
+) -> None:
     """Raise PatchfemError if a path is not a folder, or if the folder contains files of another kind.
 
     Parameters
@@ -179,11 +185,11 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
         The path, which may not exist.
     user_path : Path
         The path as the user named it.
-    allowed : container of str
+    allowed_names : container of str
         Names of files that are allowed.
-    kind : str
+    description : str
         What these files are, in words.
-    dots : bool
+    allows_dot_names : bool
         Whether names that start with a dot are allowed.
     """
     if not folder.exists():
@@ -195,12 +201,12 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
     other_files = sorted(
         path.name
         for path in folder.iterdir()
-        if path.name not in allowed
-        and not (is_partial_name(path.name) or is_state(path.name))
-        and not (dots and path.name.startswith("."))
+        if path.name not in allowed_names
+        and not (is_partial_name(path.name) or is_state_file(path.name))
+        and not (allows_dot_names and path.name.startswith("."))
     )
     if other_files:
         raise PatchfemError(
-            f"{user_path}: {folder.name} contains files that are not {kind} "
+            f"{user_path}: {folder.name} contains files that are not {description} "
             f"({', '.join(other_files[:3])}{', ...' if len(other_files) > 3 else ''}); choose another -o"
         )

@@ -25,7 +25,7 @@ from .columns import Table, make_tables
 from .quantities import format_quantity
 
 # what a file beside a page is, by its name or its ending
-FILE_TEXTS = {
+FILE_DESCRIPTIONS = {
     "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
     "interfaces": "fields of every interface that has a patch of its own, in the same format",
     "summary.json": "verdict, quantities with their errors, warnings and notes, in SI units",
@@ -38,29 +38,16 @@ FILE_TEXTS = {
 MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
-MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
-COMPRESSION = 6  # level of the compression of the figures in a page
+MAX_SCENE_VALUE_CHARACTERS = 80  # largest number of characters of a value of a scene
+FIGURE_COMPRESSION_LEVEL = 6  # of zlib, from 1 (fast) to 9 (small)
 
 
-def write_page(folder: Path) -> Path:
-    """Write report.html into a folder from the other files of the folder, and return its path.
-
-    Raises
-    ------
-    PatchfemError
-        If the folder has no complete result.
-    Missing
-        If the page cannot be written.
-    """
-    return write_report([folder])
-
-
-def write_report(folders: list[Path], out: Path | None = None) -> Path:
+def write_report(*folders: Path, out: Path | None = None) -> Path:
     """Write the page of one folder, or of several folders side by side, and return its path.
 
     Parameters
     ----------
-    folders : list of Path
+    *folders : Path
         Results folders, of answers of the same kind.
     out : Path, optional
         The page; by default report.html in a single folder, else in the current folder.
@@ -73,7 +60,9 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
         If the page cannot be written.
     """
     text = make_page([Path(folder) for folder in folders])
-    path = Path(out or (Path(folders[0]) / store.PAGE if len(folders) == 1 else store.PAGE))
+    path = Path(
+        out or (Path(folders[0]) / store.PAGE_FILE if len(folders) == 1 else store.PAGE_FILE)
+    )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -95,21 +84,22 @@ def make_page(folders: list[Path]) -> str:
         tables = make_tables(first)
         paths = sorted(folders[0].glob("[!.]*"))
         texts = {
-            path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths
+            path.name: FILE_DESCRIPTIONS.get(path.name) or FILE_DESCRIPTIONS.get(path.suffix)
+            for path in paths
         }
-        if (folders[0] / store.FIELDS).is_file():
+        if (folders[0] / store.FIELDS_FILE).is_file():
             # only a run with fields has the modules that read them
             from .fields.film import make_stress_panels
 
-            drawn += make_stress_panels(folders[0] / store.FIELDS)
+            drawn += make_stress_panels(folders[0] / store.FIELDS_FILE)
     else:
         tables = list_scene_differences(answers)
         texts = {}
 
-    figures = [plotly.draw(panel) for panel in drawn]
-    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack)
+    figures = [plotly.make_plotly_figure(panel) for panel in drawn]
+    packed = json.dumps(figures, separators=(",", ":"), allow_nan=False, default=plotly.pack_array)
     measures, zeros = _list_measures(answers)
-    return _template().render(
+    return _read_template().render(
         answers=answers,
         first=first,
         panels=drawn,
@@ -117,7 +107,7 @@ def make_page(folders: list[Path]) -> str:
         measures=measures,
         zeros=zeros,
         files=[(name, text) for name, text in texts.items() if text],
-        data=_encode(gzip.compress(packed.encode(), COMPRESSION, mtime=0)),
+        data=_encode_base64(gzip.compress(packed.encode(), FIGURE_COMPRESSION_LEVEL, mtime=0)),
         library=read_library() if drawn else "",
     )
 
@@ -127,10 +117,10 @@ def _read_all(folders: list[Path]) -> Answers:
     if not folders:
         raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
-        return {"": store.read(folders[0])}
+        return {"": store.read_answer(folders[0])}
     answers = {}
     for folder in folders:
-        answer = store.read(folder)
+        answer = store.read_answer(folder)
         # a case of a sweep is named by its keys, any other answer by its folder
         case = answer.details.get("case") if answer.is_run else None
         name = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in (case or {}).items())
@@ -157,7 +147,7 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
         reasons = dict.fromkeys(entry.reason for entry in entries if entry and entry.value is None)
         kind = next(iter(answers.values())).kind
         missing = [f"No value: {reason}." for reason in reasons if reason]
-        rows.append((name, texts, " ".join([quantities.describe(name, kind), *missing])))
+        rows.append((name, texts, " ".join([quantities.describe_quantity(name, kind), *missing])))
     return rows, zeros
 
 
@@ -199,19 +189,19 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
 def list_scene_differences(answers: Answers) -> list[Table]:
     """Return a table of the keys in which the resolved scenes differ, as `columns.make_tables` does, or [] without any."""
     scenes = {
-        name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
+        name: _flatten_tables(tomllib.loads(answer.origin.get("resolved", "")))
         for name, answer in answers.items()
     }
     rows = []
     for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
         texts = [str(scene.get(key, "-")) for scene in scenes.values()]
         if len(set(texts)) > 1:
-            rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
+            rows.append([key, *(shorten(text, MAX_SCENE_VALUE_CHARACTERS) for text in texts)])
     table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
     return [table] if rows else []
 
 
-def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
+def _flatten_tables(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
     """Return nested tables of a scene as dotted keys.
 
     Tables of a list are named by their name or number.
@@ -224,11 +214,11 @@ def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
         return {prefix: table}
     flat = {}
     for name, entry in pairs:
-        flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
+        flat |= _flatten_tables(entry, f"{prefix}.{name}" if prefix else str(name))
     return flat
 
 
-def _encode(content: bytes) -> str:
+def _encode_base64(content: bytes) -> str:
     """Return bytes in base64."""
     return base64.b64encode(content).decode()
 
@@ -236,11 +226,13 @@ def _encode(content: bytes) -> str:
 @cache
 def read_library() -> str:
     """Return the compressed bundle of plotly.js in base64."""
-    return _encode((files(__package__) / "plotly" / "plotly-cartesian.min.js.gz").read_bytes())
+    return _encode_base64(
+        (files(__package__) / "plotly" / "plotly-cartesian.min.js.gz").read_bytes()
+    )
 
 
 @cache
-def _template():
+def _read_template():
     """Return the template of all pages."""
     from jinja2 import Environment
 

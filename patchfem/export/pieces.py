@@ -14,22 +14,22 @@ from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
 from ..runs.pieces import compute_pieces
-from .charts.axes import save
+from .charts.axes import save_figure
 from .fields.blocks import make_blocks
 from .fields.film import contact_window, last_frames
 from .fields.vtkhdf import Frames
 
-PICTURES = (".png", ".svg", ".pdf")
-FILMS = (".gif", ".mp4", ".html")
-FIGURE_SIZE = (12.0, 5.2)  # [inch]; with DPI an even number of pixels, which video formats need
-DPI = 100  # pixels per inch
+FILM_ENDINGS = (".gif", ".mp4", ".html")
+# Width and height; with PIXELS_PER_INCH they give even numbers of pixels, which video formats need
+FIGURE_SIZE_INCHES = (12.0, 5.2)
+PIXELS_PER_INCH = 100
 FILM_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
-FRAME_RATE_LIMITS = (3.0, 25.0)  # [1/s]
+FRAME_RATE_LIMITS_HZ = (3.0, 25.0)
 DRAWN_MOTION_FRACTION = 0.05  # largest motion as drawn, over the height of the contact window
 DRAWN_SLIDE_FRACTION = 0.03  # largest slide of the upper piece as drawn, over its length
 # Fraction of the stresses that the colours cover; larger ones are peaks in corners.
-COLOURED_FRACTION = 0.998
-MM = 1e3  # mm per m
+COLOURED_STRESS_FRACTION = 0.998
+MM_PER_M = 1e3
 
 
 # left, right, bottom and top of a picture [m]
@@ -108,7 +108,7 @@ def magnify_pieces(
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
     slid = ", slide of {:.3g} um × {:g}" if slide.any() else ""
     captions = [f"motion × {magnify:g}" + slid.format(1e6 * one, slide_factor) for one in slide]
-    return DrawnPieces(window, MM * places, cells, is_inside, captions)
+    return DrawnPieces(window, MM_PER_M * places, cells, is_inside, captions)
 
 
 def _visible_factor(length: float, motion: np.ndarray) -> float:
@@ -151,7 +151,7 @@ def draw_cells(axes, drawn: DrawnPieces, stress: np.ndarray, **style):
         axes.set_title(drawn.captions[index])
 
     axes.add_collection(cells)
-    left, right, bottom, top = MM * np.array(drawn.window)
+    left, right, bottom, top = MM_PER_M * np.array(drawn.window)
     margin = 0.08 * (top - bottom)  # for the motion that leaves the window
     axes.set(xlim=(left - margin, right + margin), ylim=(bottom - margin, top + margin))
     axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
@@ -187,13 +187,13 @@ def draw_pieces(
 
     low, high = frames.blocks["lower"].points.min(axis=0), frames.blocks["upper"].points.max(axis=0)
     windows = ((low[0], high[0], low[1], high[1]), contact_window(frames))
-    figure = Figure(figsize=FIGURE_SIZE, dpi=DPI, layout="constrained")
+    figure = Figure(figsize=FIGURE_SIZE_INCHES, dpi=PIXELS_PER_INCH, layout="constrained")
     panels = figure.subplots(1, 2) if onto is None else [onto]
 
     # All frames and panels have the same colours.
     parts = [frames.blocks[side].cell_data["von_mises"] for side in ("lower", "upper")]
     stress = np.concatenate([values[numbers] for values in parts], axis=1)
-    limit = np.quantile(stress, COLOURED_FRACTION)
+    limit = np.quantile(stress, COLOURED_STRESS_FRACTION)
     unit, scale = choose_axis_unit([limit], "Pa")
     changes = []
     for axes, window in zip(panels, windows):
@@ -241,7 +241,7 @@ def write_picture(frames: Frames, number: int, title: str, magnify: float | None
     """
     with write_atomically(out) as partial:
         figure, _ = draw_pieces(frames, np.array([number]), title, magnify)
-        save(figure, partial, out.suffix[1:].lower(), 1.5 * DPI)
+        save_figure(figure, partial, out.suffix[1:].lower(), 1.5 * PIXELS_PER_INCH)
     last = len(frames.times) - 1
     return f"{out}: {title}, frame {number} of 0 to {last}, {frames.times[number]:.6g} s"
 
@@ -289,7 +289,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # so that the panels stay at their places
     film = animation.FuncAnimation(figure, show, len(numbers))
-    rate = float(np.clip(len(numbers) / FILM_SECONDS, *FRAME_RATE_LIMITS))
+    rate = float(np.clip(len(numbers) / FILM_SECONDS, *FRAME_RATE_LIMITS_HZ))
     with write_atomically(out) as partial:
         if out.suffix == ".html":
             partial.write_text(_make_page(film.to_jshtml(rate), title), "utf-8")

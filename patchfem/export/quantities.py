@@ -1,7 +1,8 @@
 """Definitions of all quantities, and how their numbers are displayed.
 
 The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; QUANTITIES defines those of the other
-verbs. KEY lists the quantities that come first: in the tiles of a page, on the screen and in the first columns of a table.
+verbs. KEY_QUANTITY_NAMES lists the quantities that come first: in the tiles of a page, on the screen and in the first
+columns of a table.
 """
 
 from collections import ChainMap
@@ -19,22 +20,24 @@ from ..runs.results import patch_rows
 from . import surface_definitions
 from .answer import Definition, Quantities, Quantity
 
-MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+MAX_KEY_QUANTITIES = 10  # largest number of key quantities on a page and on the screen
 # Smallest half-width of an interval relative to its ends that the digits show
-MIN_SHOWN_WIDTH = 1e-9
-INTERVAL_DIGITS = 11  # largest number of digits of an end, which has two digits of the half-width
-MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
+MIN_RELATIVE_HALF_WIDTH = 1e-9
+# Largest number of digits of the end of an interval, which has two digits of the half-width
+MAX_INTERVAL_END_DIGITS = 11
+# Significant digits of quantities of measured surfaces without an error; traces have no more
+SURFACE_QUANTITY_DIGITS = 4
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
-PERCENT_WORDS = ("fraction", "share")
+PERCENT_NAME_ENDINGS = ("fraction", "share")
 # display units of areas of sections and of wear coefficients
-LADDERS = UNIT_LADDERS | {
+DISPLAY_UNIT_LADDERS = UNIT_LADDERS | {
     "m2": (("um^2", 1e12),),
     "m2 N-1": (("m^2/N", 1.0),),
     "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
 }
-DEGREES = ("deg", 57.29577951308232)  # display unit of angles, and degrees in a radian
+ANGLE_DISPLAY_UNIT = ("deg", 57.29577951308232)  # display unit of angles, and degrees in a radian
 
-KEY = tuple(
+KEY_QUANTITY_NAMES = tuple(
     """
     frequency_at_smallest_amplitude frequency_at_largest_amplitude damping_at_smallest_amplitude
     damping_at_largest_amplitude force_at_smallest_amplitude force_at_largest_amplitude largest_damping
@@ -50,7 +53,7 @@ KEY = tuple(
 
 
 # kinds of answers whose quantities are defined in `surfaces.definitions`
-SURFACE_KINDS = ("compare", "pairs", "profile")
+SURFACE_ANSWER_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
     # sweep
     "peak_height": Definition("1", "largest response over the swept frequency"),
@@ -114,7 +117,7 @@ QUANTITIES: dict[str, Definition] = {
         "1",
         "exponent of the energy loss per cycle over the amplitude, between the two largest ones in gross slip; 1 in theory",
     ),
-    # fit; of keys of a scene, see FITTED_KEY
+    # fit; of keys of a scene, see FIT_KEY_TEXT
     "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
     "residual_fraction": Definition(
         "1", "root mean square of fitted minus measured values, over the largest measured value"
@@ -148,7 +151,9 @@ QUANTITIES: dict[str, Definition] = {
     ),
     "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
 }
-FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
+FIT_KEY_TEXT = (
+    "value of this key of the scene that fits the measurement best, with its 95 % interval"
+)
 
 
 def find_definition(name: str, kind: str = "") -> Definition | None:
@@ -158,27 +163,27 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     is None for an unknown name.
     """
     if "." in name:
-        return Definition("1", FITTED_KEY)
-    if kind in SURFACE_KINDS:
-        return surface_definitions.find(name) or surface_definitions.find(
-            rows.remove_interface_number(name)
-        )
+        return Definition("1", FIT_KEY_TEXT)
+    if kind in SURFACE_ANSWER_KINDS:
+        return surface_definitions.find_surface_definition(
+            name
+        ) or surface_definitions.find_surface_definition(rows.remove_interface_number(name))
     # quantities of a sweep: limits of its key, and extremes of measures
     measure = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(measure)
-    definitions = ChainMap(QUANTITIES, patch_rows.TABLE, rows.TABLE)
+    definitions = ChainMap(QUANTITIES, patch_rows.PATCH_TABLE, rows.MOTION_TABLE)
     found = definitions.get(name) or definitions.get(measure) or definitions.get(base_name)
     return found and Definition(found.unit, found.text)
 
 
-def describe(name: str, kind: str = "") -> str:
+def describe_quantity(name: str, kind: str = "") -> str:
     """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
     definition = find_definition(name, kind)
     if definition is None:
         return ""
     base_name = rows.remove_interface_number(name)
     number = name.removeprefix(base_name).removeprefix("_")
-    part = "group" if kind in SURFACE_KINDS else "interface"
+    part = "group" if kind in SURFACE_ANSWER_KINDS else "interface"
     text = f"{definition.text}; of {part} {number}" if number else definition.text
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
@@ -196,13 +201,13 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
         Magnitude of the number [SI].
     """
     last_word = rows.remove_interface_number(name).rpartition("_")[2]
-    if unit == "1" and last_word in PERCENT_WORDS:
+    if unit == "1" and last_word in PERCENT_NAME_ENDINGS:
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
-        return DEGREES
-    if unit not in LADDERS:
+        return ANGLE_DISPLAY_UNIT
+    if unit not in DISPLAY_UNIT_LADDERS:
         return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
-    return choose_unit(LADDERS[unit], size)
+    return choose_unit(DISPLAY_UNIT_LADDERS[unit], size)
 
 
 def format_quantity(name: str, quantity: Quantity) -> str:
@@ -230,13 +235,13 @@ def format_quantity(name: str, quantity: Quantity) -> str:
 
 
 def _find_digits(name: str) -> int | None:
-    """Return the number of digits of a quantity without an error; None for a measure of a run, which has all digits."""
+    """Return the number of digits to show of a quantity without an error; None for a measure of a run: all digits."""
     if name in QUANTITIES:
         return QUANTITIES[name].digits
     base_name = rows.remove_interface_number(name)
-    if base_name in rows.TABLE or base_name in patch_rows.TABLE:
+    if base_name in rows.MOTION_TABLE or base_name in patch_rows.PATCH_TABLE:
         return None
-    return MEASURED_DIGITS if surface_definitions.find(name) else None
+    return SURFACE_QUANTITY_DIGITS if surface_definitions.find_surface_definition(name) else None
 
 
 def format_value(value: float | str, unit: str, digits: int = 4, name: str = "") -> str:
@@ -272,8 +277,8 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
 
     # both ends and the value have two digits of the width of the interval, and thus the same last digit
     half_width = (ends[1] - ends[0]) / 2
-    is_shown = half_width > MIN_SHOWN_WIDTH * max(map(abs, ends))
-    digits = INTERVAL_DIGITS if is_shown else MAX_SIGNIFICANT_DIGITS
+    is_shown = half_width > MIN_RELATIVE_HALF_WIDTH * max(map(abs, ends))
+    digits = MAX_INTERVAL_END_DIGITS if is_shown else MAX_SIGNIFICANT_DIGITS
     numbers = (value, *ends)
     text, low, high = (round_to_error(n, half_width, max_digits=digits)[0] for n in numbers)
     return f"{text} {unit} ({low} to {high})".replace("  ", " ")
@@ -284,7 +289,7 @@ def _zero_limit(name: str, quantity: Quantity) -> float:
 
     It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
     """
-    table = patch_rows.TABLE if name in patch_rows.TABLE else rows.TABLE
+    table = patch_rows.PATCH_TABLE if name in patch_rows.PATCH_TABLE else rows.MOTION_TABLE
     row = table.get(rows.remove_interface_number(name))
     return quantity.floor if row is None else min(row.floor, quantity.floor)
 
@@ -294,9 +299,9 @@ def is_zero(name: str, quantity: Quantity) -> bool:
     return format_quantity(name, quantity).partition(" ")[0] == "0"
 
 
-def choose_key(quantities: Quantities) -> Quantities:
-    """Return the quantities for the tiles: those of KEY that are present, at most MAX_TILES; none that is missing or 0."""
-    names = [name for name in KEY if name in quantities]
+def choose_key_quantities(quantities: Quantities) -> Quantities:
+    """Return the quantities that a page shows in tiles, at most MAX_KEY_QUANTITIES; none that is missing or 0."""
+    names = [name for name in KEY_QUANTITY_NAMES if name in quantities]
     # the quantities of a verb without key names are shown in their own order
     names = names or list(quantities)
     shown = {
@@ -304,4 +309,4 @@ def choose_key(quantities: Quantities) -> Quantities:
         for name in names
         if quantities[name].value is not None and not is_zero(name, quantities[name])
     }
-    return dict(list(shown.items())[:MAX_TILES])
+    return dict(list(shown.items())[:MAX_KEY_QUANTITIES])

@@ -1,6 +1,6 @@
 """Arrays of a run as variables with dimensions, units and descriptions: the content of result.nc.
 
-In: a `Result` of `runs`. Out: {name: Variable}. A row of VARIABLES says where a Result has an array; a new variable is a
+In: a `Result` of `runs`. Out: {name: Variable}. A row of RUN_VARIABLES says where a Result has an array; a new variable is a
 new row. What has to be computed or selected first has a function of its own.
 """
 
@@ -18,18 +18,20 @@ from ..model import structure
 from ..response import spectrum
 from ..response.events import EVENT_KIND_NAMES
 from ..response.levels import LEVEL_MEASURES
-from ..response.rows import TABLE
+from ..response.rows import MOTION_TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Quantities, Quantity, Variable, Variables, encode, make_columns
+from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
 
-# a measured row belongs to a run if its frequency differs by no more than this [Hz]
-SAME_FREQUENCY = 0.5
-MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
-STUCK_TEXT = "state of the interface"
-READINGS = {"acceleration": "m s-2", "displacement": "m"}  # quantities of the sensors, and units
-FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a linear run has not
+# Largest difference of the drive frequencies of a run and of a measured row that belongs to it
+MAX_FREQUENCY_DIFFERENCE_HZ = 0.5
+CODE_MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
+STICK_STATE_TEXT = "state of the interface"
+# Quantities that the sensors of a rig measure, and their SI units
+SENSOR_UNITS = {"acceleration": "m s-2", "displacement": "m"}
+# Histories of the friction interface, which a linear run has not
+FRICTION_HISTORIES = ("slide", "slide_velocity", "friction_force")
 
 
 class Row(NamedTuple):
@@ -48,7 +50,7 @@ class Row(NamedTuple):
     places: str
 
 
-VARIABLES = {
+RUN_VARIABLES = {
     "time": Row("time", "s", "time", "response.time"),
     "relative_displacement": Row(
         "time",
@@ -207,7 +209,7 @@ VARIABLES = {
     "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "wear.columns.cycle"),
 }
 # fields along the interface, by their names in `Result.fields`
-FIELDS = {
+INTERFACE_FIELDS = {
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
     "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
     "gap": ("m", "gap that remains between the loaded surfaces"),
@@ -220,12 +222,12 @@ FIELDS = {
 def collect_data(result: Result) -> Variables:
     """Return all arrays of a run, in SI units."""
     data = {}
-    for name, row in VARIABLES.items():
+    for name, row in RUN_VARIABLES.items():
         places = " ".join(f"{place}_error" for place in row.places.split())
         error = Row(row.dims, row.unit, f"error of {name}", places)
         data |= _read_row(result, name, row) | _read_row(result, f"{name}_error", error)
     if result.plan.kind == "linear":
-        data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
+        data = {name: one for name, one in data.items() if name not in FRICTION_HISTORIES}
     data |= _collect_motion(result) | _collect_loop(result) | _collect_patch(result)
     for face in result.faces:
         data |= _collect_face(face)
@@ -244,12 +246,12 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
     values = next((one for one in found if one is not None), None)
     if values is None or not np.size(values):
         return {}
-    if name in MEANINGS:
+    if name in CODE_MEANINGS:
         values = np.asarray(values, np.int8)
     elif row.unit == "":
         values = np.array([str(value) for value in values])
     variables = make_columns(row.dims, {name: (values, row.unit, row.text)})
-    return {name: replace(variables[name], meanings=MEANINGS.get(name, ()))}
+    return {name: replace(variables[name], meanings=CODE_MEANINGS.get(name, ()))}
 
 
 def _look_up(value, place: str):
@@ -377,7 +379,7 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
     }
     data = make_columns("x", nodes)
     data |= make_columns(frame, {f"{frame}_time": (fields["time"], "s", "time of the frame")})
-    for name in FIELDS:
+    for name in INTERFACE_FIELDS:
         if name in fields:
             data[name] = _make_field(name, fields[name], frame)
     return data
@@ -386,11 +388,12 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
 def _make_field(name: str, values, frame: str) -> Variable:
     """Return a field along x over frames, and over strips if it has three dimensions.
 
-    The values are in SI units. `name` is that of the field in `FIELDS`, and `frame` that of the dimension of the frames.
+    The `values` are in SI units. `name` is a key of `INTERFACE_FIELDS`, and `frame` the name of the dimension of the
+    frames.
     """
-    unit, text = FIELDS[name]
+    unit, text = INTERFACE_FIELDS[name]
     dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
-    return Variable(dims, np.asarray(values), unit, text, MEANINGS.get(name, ()))
+    return Variable(dims, np.asarray(values), unit, text, CODE_MEANINGS.get(name, ()))
 
 
 def _collect_face(face) -> Variables:
@@ -414,14 +417,14 @@ def _collect_levels(result: Result) -> Variables:
     drive_text = "force" if unit == "N" else "acceleration of the base"
     columns = {
         "level_drive": ([level.drive for level in levels], unit, drive_text),
-        "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STUCK_TEXT),
+        "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STICK_STATE_TEXT),
     }
     for name in LEVEL_MEASURES:
         if any(name in level.values for level in levels):
-            unit = TABLE[name].unit
+            unit = MOTION_TABLE[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, TABLE[name].text)
+            columns[f"level_{name}"] = (values, unit, MOTION_TABLE[name].text)
             columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
     data = make_columns("level", columns)
     data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))
@@ -433,7 +436,7 @@ def _collect_regimes(result: Result) -> Variables:
     curve = None if result.motion.steady is None else result.motion.steady.curve
     if curve is None:
         return {}
-    regimes = encode("curve_point", curve["regime"], "regime of the steady motion")
+    regimes = encode_texts("curve_point", curve["regime"], "regime of the steady motion")
     folds = np.asarray(curve.get("folds", ()), float)
     unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
     columns = {"curve_fold": (folds, unit, "where the curve turns back")} if folds.size else {}
@@ -475,7 +478,7 @@ def _collect_readings(result: Result) -> Variables:
     level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
     text = "largest acceleration of the drive"
     columns = {"computed_input": ([float(level)], "m s-2", text)}
-    for name, unit in READINGS.items():
+    for name, unit in SENSOR_UNITS.items():
         values = [getattr(row, name) for row in rows]
         measured_columns[f"measured_{name}"] = (np.array(values, float), unit, f"measured {name}")
         if name in computed:
@@ -502,14 +505,14 @@ def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantitie
     path, gains, kind, cutoff = model.measured
     frequency = model.rig.drive.frequency
     table = measured.read_table(path)
-    rows = [row for row in table if abs(row.frequency - frequency) <= SAME_FREQUENCY]
+    rows = [row for row in table if abs(row.frequency - frequency) <= MAX_FREQUENCY_DIFFERENCE_HZ]
     if not rows:
         return None
 
     # computed readings are the measures times the gains of the sensors; an instrument that filters or averages reads less
     names = ("absolute_acceleration_peak", "relative_displacement_amplitude")
-    measures = dict(zip(READINGS, map(result.measures.get, names), strict=True))
-    factors = dict(zip(READINGS, gains))
+    measures = dict(zip(SENSOR_UNITS, map(result.measures.get, names), strict=True))
+    factors = dict(zip(SENSOR_UNITS, gains))
     peak = measures["acceleration"]
     signal = model.rig.drive.signal
     if kind != "peak" and isinstance(signal, SineDrive) and peak is not None and peak.value:
@@ -520,7 +523,7 @@ def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantitie
     for name, measure in measures.items():
         if measure is not None and measure.value is not None:
             error = None if measure.error is None else measure.error * factors[name]
-            computed[name] = Quantity(measure.value * factors[name], READINGS[name], error)
+            computed[name] = Quantity(measure.value * factors[name], SENSOR_UNITS[name], error)
     return rows, computed
 
 

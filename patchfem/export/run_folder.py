@@ -15,10 +15,10 @@ from ..runs.run import StateFile, is_march, run
 from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
-from .folder import STATE, Folder, list_states
+from .folder import WEAR_STATE_FILE, Folder, list_states
 from .runs import make_answer
 
-MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
+MAX_WRITTEN_INTERFACES = 6  # fields of further interfaces are not written
 INTERFACES_FOLDER = "interfaces"
 
 
@@ -78,7 +78,7 @@ def run_into(
             report(folder.dropped)
         state_file = None
         if saves_state(run_plan):
-            state_file = StateFile(folder.path / STATE, __version__, resume)
+            state_file = StateFile(folder.path / WEAR_STATE_FILE, __version__, resume)
         try:
             result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
         except NotConverged as error:
@@ -91,7 +91,7 @@ def run_into(
 def draw_page(folder: Path) -> BaseException | None:
     """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
     try:
-        page.write_page(folder)
+        page.write_report(folder)
     except BaseException as fault:
         return fault
     return None
@@ -124,7 +124,7 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
         return False
     try:
         version = store.read_summary(target).patchfem
-        text = (target / store.SCENE).read_text("utf-8")
+        text = (target / store.SCENE_FILE).read_text("utf-8")
     except (OSError, PatchfemError):
         return False
     if (version, text) == (__version__, run_plan.model.source.resolved):
@@ -150,15 +150,15 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     start_time = perf_counter()
     notes = result.notes
     if result.patch is not None:
-        vtkhdf.write_fields(result, folder / store.FIELDS)
-    for face in result.faces[:MAX_INTERFACES]:
+        vtkhdf.write_fields(result, folder / store.FIELDS_FILE)
+    for face in result.faces[:MAX_WRITTEN_INTERFACES]:
         face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
         notes += [f"interface {face.name}: {note}" for note in face_notes]
     result.seconds["files"] = perf_counter() - start_time
     answer = make_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})
-    store.write(answer, folder)
+    store.write_answer(answer, folder)
     return answer
 
 
@@ -175,7 +175,7 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
         fields=face.fields,
         notes=[],
     )
-    vtkhdf.write_fields(face_result, folder / store.FIELDS)
+    vtkhdf.write_fields(face_result, folder / store.FIELDS_FILE)
     return face_result.notes
 
 

@@ -17,32 +17,34 @@ from ..formatting import (
     format_quantity,
     format_value,
 )
-from ..response.outcome import OPEN_LOOP
+from ..response.outcome import OPEN_LOOP_MESSAGE
 from ..response.rows import remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
 from ..structure import drive_sizes
 from . import quantities
 from .answer import JsonObject, Quantities, Quantity
-from .run_data import READINGS, find_readings
+from .run_data import SENSOR_UNITS, find_readings
 
-CHECKS = ("energy_balance", "work_check")  # measures that only check a run
-MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
+RUN_CHECK_MEASURES = ("energy_balance", "work_check")  # measures that only check a run
+# Largest number of interfaces or contact regions whose values a sentence lists
+MAX_LISTED_CONTACTS = 3
 # largest slip [m] and largest work relative to force times motion that are attributed to round-off
 SLIP_ROUND_OFF = 1e-15
 AREA_ROUND_OFF = 1e-12
 # deviation from the final position, relative to this position, at which a released output is at rest
-REST_FRACTION = 5e-3
-ZERO_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
+MAX_REST_DEVIATION = 5e-3
+ZERO_POSITION_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
 # Smallest number of amplitudes of a decay for which its damping is printed.
 MIN_DECAY_AMPLITUDES = 5
-SCATTER = "_scatter"  # end of the name of a measure that states the scatter between random records
+# End of the name of a measure that states the scatter between random records
+SCATTER_NAME_ENDING = "_scatter"
 # Largest relative difference of the measured input from the drive of the run.
-SAME_INPUT_FRACTION = 0.01
+MAX_INPUT_DIFFERENCE = 0.01
 CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
 
-# parts of a headline: (measure, text); a run shows the first MAX_PARTS that it has
-HEADLINES = {
+# parts of a headline: (measure, text); a run shows the first MAX_HEADLINE_PARTS that it has
+HEADLINE_PARTS = {
     "wear": (
         ("worn_depth_max", "{} worn off at the deepest place"),
         ("worn_volume", "{} worn off"),
@@ -71,7 +73,7 @@ HEADLINES = {
         ("approach", "approach {}"),
     ),
 }
-MAX_PARTS = 3  # largest number of measures in a headline
+MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
@@ -105,17 +107,17 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
     """
     kind = _choose_headline(result, measures)
     parts = []
-    for name, text in HEADLINES[kind]:
+    for name, text in HEADLINE_PARTS[kind]:
         if name == "loop_area":
             parts += _describe_interfaces(result, measures, text)
-        elif _is_shown(measures, name):
-            part = text.format(_format(name, measures))
+        elif _is_nonzero(measures, name):
+            part = text.format(_format_measure(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
             parts.append(part)
     if not parts:
         return ""
-    text = ", ".join(parts[:MAX_PARTS])
+    text = ", ".join(parts[:MAX_HEADLINE_PARTS])
     cycles = details.get("cycles")
     if cycles is not None and cycles < 1 - CYCLE_ROUND_OFF:
         text = f"in {cycles:.2g} of a cycle: {text}"
@@ -123,7 +125,7 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:
-    """Return the key of HEADLINES for a run."""
+    """Return the key of HEADLINE_PARTS for a run."""
     if "worn_volume" in measures or "worn_depth_max" in measures:
         return "wear"
     if "relative_displacement_rms" in measures:
@@ -131,7 +133,7 @@ def _choose_headline(result: Result, measures: Quantities) -> str:
     return result.plan.kind if result.plan.kind in ("patch", "bench") else "rig"
 
 
-def _is_shown(measures: Quantities, name: str) -> bool:
+def _is_nonzero(measures: Quantities, name: str) -> bool:
     """Return whether a measure has a value that is not displayed as 0."""
     measure = measures.get(name)
     return (
@@ -147,17 +149,17 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     names = [
         name
         for name in measures
-        if remove_interface_number(name) == "loop_area" and _is_shown(measures, name)
+        if remove_interface_number(name) == "loop_area" and _is_nonzero(measures, name)
     ]
     if not names:
         return []
     if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
         text += " (mean of the last cycles)"
-    if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
+    if any(warning.startswith(OPEN_LOOP_MESSAGE) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-    return [text.format(_format(names[0], measures)) + where]
+    return [text.format(_format_measure(names[0], measures)) + where]
 
 
 def describe_outcome(result: Result, measures: Quantities, details: JsonObject) -> str:
@@ -273,7 +275,7 @@ def _describe_stuck_outcome(measures: Quantities) -> str:
     return _describe_no_slip(has_patch, "cycles")
 
 
-def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -> str:
+def _describe_place(contact: JsonObject | None, sentence_form: str = "In contact: {}.") -> str:
     """Return where the contact is along x, such as "x = -6.35 to -3.56 mm"; "" if all of the length is in contact."""
     if not contact or not contact["stretches"]:
         return ""
@@ -282,14 +284,14 @@ def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -
         return ""
     unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
     count = ""
-    if len(stretches) > MAX_LISTED:
+    if len(stretches) > MAX_LISTED_CONTACTS:
         count = f"{len(stretches)} regions from "
         stretches = [(stretches[0][0], stretches[-1][1])]
     texts = [
         f"{format_number(start * scale, 4)} to {format_number(end * scale, 4)}"
         for start, end in stretches
     ]
-    return form.format(f"{count}x = {' and '.join(texts)} {unit}")
+    return sentence_form.format(f"{count}x = {' and '.join(texts)} {unit}")
 
 
 def _describe_readings(readings: Iterable[JsonObject]) -> str:
@@ -320,9 +322,9 @@ def list_readings(result: Result) -> list[JsonObject]:
     level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
 
     # a row of another input belongs to another run
-    rows = [row for row in rows if abs(row.input - level) <= SAME_INPUT_FRACTION * row.input]
+    rows = [row for row in rows if abs(row.input - level) <= MAX_INPUT_DIFFERENCE * row.input]
     listed = []
-    for row, (name, unit) in product(rows, READINGS.items()):
+    for row, (name, unit) in product(rows, SENSOR_UNITS.items()):
         value = getattr(row, name)
         if not value or name not in computed:
             continue
@@ -347,7 +349,9 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     ratios = {
         name: measure.error_ratio(tolerance)
         for name, measure in result.measures.items()
-        if measure.value is not None and measure.error is not None and not name.endswith(SCATTER)
+        if measure.value is not None
+        and measure.error is not None
+        and not name.endswith(SCATTER_NAME_ENDING)
     }
     if not ratios or max(ratios.values()) > 1:
         return ""
@@ -356,7 +360,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     visible = {
         name: ratio
         for name, ratio in ratios.items()
-        if name not in CHECKS and "±" in _format(name, measures)
+        if name not in RUN_CHECK_MEASURES and "±" in _format_measure(name, measures)
     }
     if not visible:
         return f"All errors are within the tolerance {tolerance:g}."
@@ -364,12 +368,12 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     largest = format_number(100 * visible[name], 2)
     return (
         f"All errors are within the tolerance {tolerance:g}; the largest is {largest} % of what it allows "
-        f"({name}: {_format(name, measures)})."
+        f"({name}: {_format_measure(name, measures)})."
     )
 
 
-def _format(name: str, measures: Quantities) -> str:
-    """Return a measure as text with its error."""
+def _format_measure(name: str, measures: Quantities) -> str:
+    """Return a measure as text with its error, such as "14.808 ± 0.041 um"."""
     return quantities.format_quantity(name, measures[name])
 
 
@@ -408,7 +412,7 @@ def _describe_decay(decay) -> str:
     return f"It decays with {', with '.join(parts)}."
 
 
-def describe_rest(time, output, error: float = 0.0, last: float | None = None) -> str:
+def describe_rest(time, output, error: float = 0.0, last_amplitude: float | None = None) -> str:
     """Describe where and when a released motion comes to rest, or how it moves at the end.
 
     Parameters
@@ -417,15 +421,15 @@ def describe_rest(time, output, error: float = 0.0, last: float | None = None) -
         Stored samples with all reversals [s], [m].
     error : float
         Error of the amplitude [m]; an output that moves by no more is at rest.
-    last : float, optional
+    last_amplitude : float, optional
         Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
-    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else output[-1]
-    rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
+    end = 0.0 if abs(output[-1]) < ZERO_POSITION_FRACTION * largest else output[-1]
+    rest_limit = max(error, MAX_REST_DEVIATION * abs(end), ZERO_POSITION_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
-    amplitude = amplitude if last is None else min(last, amplitude)
+    amplitude = amplitude if last_amplitude is None else min(last_amplitude, amplitude)
     if amplitude > rest_limit:
         end_time = format_quantity(time[-1], "s", 3)
         return f"still moves with an amplitude of {format_length(amplitude, 3)} after {end_time}"

@@ -20,8 +20,8 @@ from .run_data import collect_data
 from .run_words import list_readings, make_verdict
 
 # ratio of a stiffness to its error above which the loss factor is computed
-MIN_STIFFNESS_ERRORS = 10.0
-PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
+MIN_STIFFNESS_TO_ERROR = 10.0
+RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
 def make_answer(result: Result) -> Answer:
@@ -114,7 +114,9 @@ def list_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that compute."""
     installed = list_installed_versions()
     python = ".".join(map(str, sys.version_info[:3]))
-    return {"python": python} | {name: installed[name] for name in PACKAGES if name in installed}
+    return {"python": python} | {
+        name: installed[name] for name in RECORDED_PACKAGES if name in installed
+    }
 
 
 def make_details(result: Result) -> JsonObject:
@@ -201,7 +203,7 @@ def _find_loss_factor(result: Result) -> JsonObject:
     if None in (stiffness.value, work.value) or work.value < 0:
         return {}
     stiffness_error = stiffness.error or stiffness.floor
-    if stiffness.value <= MIN_STIFFNESS_ERRORS * stiffness_error:
+    if stiffness.value <= MIN_STIFFNESS_TO_ERROR * stiffness_error:
         return {}
 
     amplitude = result.plan.model.slide.amplitude

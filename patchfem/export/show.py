@@ -22,17 +22,17 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     # The runs of `cost` are its answer, and so are the cases of a backbone over a few values of a key.
     for table in make_tables(answer) if answer.kind in MAX_TABLE_ROWS else ():
         if len(table["rows"]) <= MAX_TABLE_ROWS[answer.kind]:
-            lines += _align([table["headings"], *table["rows"]])
-    shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
+            lines += _align_columns([table["headings"], *table["rows"]])
+    shown = answer.quantities if is_verbose else quantities.choose_key_quantities(answer.quantities)
     return lines + format_quantities(shown)
 
 
 def format_quantities(shown: Quantities) -> list[str]:
     """Return an aligned line for each quantity."""
-    return _align(list_quantities(shown))
+    return _align_columns(list_quantities(shown))
 
 
-def _align(rows: Sequence[Sequence[str]]) -> list[str]:
+def _align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return an indented line for each row of texts, in aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows)]
     return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
@@ -50,7 +50,11 @@ def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
 def list_files(folder: Path, has_page: bool = True) -> list[str]:
     """Return a line for the results folder, and for its page, its fields and its main table if it has them."""
     lines = [f"results: {folder}{'' if has_page else ' (without report.html: --no-page)'}"]
-    for label, name in (("page", store.PAGE), ("fields", store.FIELDS), ("table", "sweep.csv")):
+    for label, name in (
+        ("page", store.PAGE_FILE),
+        ("fields", store.FIELDS_FILE),
+        ("table", "sweep.csv"),
+    ):
         if (folder / name).is_file():
             lines.append(f"{label}: {folder / name}")
     inside = sorted(folder.glob("interfaces/*"))

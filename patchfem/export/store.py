@@ -1,4 +1,4 @@
-"""Files of an answer: `write` puts them into a folder, `read` returns the answer from them.
+"""Files of an answer: `write_answer` puts them into a folder, `read_answer` returns the answer from them.
 
 A folder contains summary.json (verdict, quantities, remarks, origin), the JSON file of the verb with the keys that scripts
 read, the arrays as netCDF, a CSV file for each curve, and report.html, which is made from the other files.
@@ -19,12 +19,12 @@ from .answer import RUN_KINDS, Answer, JsonObject, Quantity, Remarks, Variable
 from .columns import format_curves
 from .netcdf import read_netcdf, write_netcdf
 
-SUMMARY = "summary.json"
-SCENE = "scene.resolved.toml"
-PAGE = "report.html"
-FIELDS = "fields.vtkhdf"
+SUMMARY_FILE = "summary.json"
+SCENE_FILE = "scene.resolved.toml"
+PAGE_FILE = "report.html"
+FIELDS_FILE = "fields.vtkhdf"
 # variable of CPU times; it is in summary.json, so that equal runs write equal netCDF files
-CPU_TIMES = "accuracy_seconds"
+CPU_TIMES_VARIABLE = "accuracy_seconds"
 # netCDF file of each kind of answer; result.nc for all others
 DATA_FILES = {"sweep": "sweep.nc", "backbone": "backbone.nc"}
 # JSON file with the `details` of each kind of answer; those of a run are in summary.json
@@ -49,26 +49,28 @@ class Summary(BaseModel):
     origin: dict[str, Any]
 
 
-def data_file(kind: str) -> str:
+def name_data_file(kind: str) -> str:
     """Return the name of the netCDF file of a kind of answer."""
     return DATA_FILES.get(kind, "result.nc")
 
 
-def write(answer: Answer, folder: Path) -> None:
+def write_answer(answer: Answer, folder: Path) -> None:
     """Write all files of an answer except its page into an existing folder.
 
     OSError or WriteError is raised if this fails.
     """
     if answer.origin.get("resolved"):
-        write_text(folder / SCENE, answer.origin["resolved"])
+        write_text(folder / SCENE_FILE, answer.origin["resolved"])
     if answer.data:
-        data = {name: variable for name, variable in answer.data.items() if name != CPU_TIMES}
-        write_netcdf(replace(answer, data=data), folder / data_file(answer.kind))
+        data = {
+            name: variable for name, variable in answer.data.items() if name != CPU_TIMES_VARIABLE
+        }
+        write_netcdf(replace(answer, data=data), folder / name_data_file(answer.kind))
     for name, text in format_curves(answer).items():
         write_text(folder / name, text)
     if not answer.is_run:
         write_json(answer.details, folder / DETAIL_FILES[answer.kind])
-    write_json(make_summary(answer), folder / SUMMARY)
+    write_json(make_summary(answer), folder / SUMMARY_FILE)
 
 
 def write_json(content: JsonObject, path: Path) -> None:
@@ -88,8 +90,8 @@ def make_summary(answer: Answer) -> JsonObject:
         "title": answer.title,
         "kind": answer.kind,
     }
-    if CPU_TIMES in answer.data:
-        details[CPU_TIMES] = answer.data[CPU_TIMES].values.tolist()
+    if CPU_TIMES_VARIABLE in answer.data:
+        details[CPU_TIMES_VARIABLE] = answer.data[CPU_TIMES_VARIABLE].values.tolist()
     if "outcome" in details:
         summary["outcome"] = details.pop("outcome")
     summary |= {
@@ -103,7 +105,7 @@ def make_summary(answer: Answer) -> JsonObject:
     return summary | details | {"origin": origin}
 
 
-def read(folder: Path) -> Answer:
+def read_answer(folder: Path) -> Answer:
     """Read an answer from the files in a folder.
 
     PatchfemError is raised if it has no complete result or a damaged file.
@@ -116,13 +118,15 @@ def read(folder: Path) -> Answer:
     try:
         if summary.kind in DETAIL_FILES:
             details = json.loads((folder / DETAIL_FILES[summary.kind]).read_text("utf-8"))
-        if (folder / SCENE).is_file():
-            origin = origin | {"resolved": (folder / SCENE).read_text("utf-8")}
-        path = folder / data_file(summary.kind)
+        if (folder / SCENE_FILE).is_file():
+            origin = origin | {"resolved": (folder / SCENE_FILE).read_text("utf-8")}
+        path = folder / name_data_file(summary.kind)
         data = read_netcdf(path)[0] if path.is_file() else {}
-        if CPU_TIMES in details:
-            times = np.array(details[CPU_TIMES], float)
-            data[CPU_TIMES] = Variable(("accuracy_run",), times, "s", "CPU time of the motion")
+        if CPU_TIMES_VARIABLE in details:
+            times = np.array(details[CPU_TIMES_VARIABLE], float)
+            data[CPU_TIMES_VARIABLE] = Variable(
+                ("accuracy_run",), times, "s", "CPU time of the motion"
+            )
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
 
@@ -148,11 +152,11 @@ def read_summary(folder: Path) -> Summary:
     Missing
         If there is no such folder.
     """
-    path = Path(folder) / SUMMARY
+    path = Path(folder) / SUMMARY_FILE
     if not path.parent.is_dir():
         raise Missing(f"{folder}: no such results folder")
     if not path.is_file():
-        raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY}")
+        raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY_FILE}")
 
     content = b""
     try:

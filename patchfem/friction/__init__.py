@@ -56,13 +56,11 @@ PUBLIC = {
         "masing_loop",
         "parallel_element",
     ),
-    "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
     "laws.lugre_kernels": (
         "rate_equation",
         "relaxation_length",
     ),
-    "laws.stretch": ("points_element",),
     "path_work": (
         "mean_slip_phase",
         "sampled_work",

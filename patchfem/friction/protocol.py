@@ -27,7 +27,6 @@ class Element(NamedTuple):
     - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
     - form: "rigid" for a law that sticks rigidly, "parallel" for parallel elastic-plastic elements, "points" for points
       with bonds, "speed" for a function of the velocity, "flow" for a law with one state variable
-    - density: numbers of a continuous density that parallel elements represent (`laws.iwan`), or ()
     """
 
     kernels: str
@@ -36,4 +35,3 @@ class Element(NamedTuple):
     limit: float
     length: float = 0.0
     form: str = ""
-    density: tuple[float, ...] = ()

@@ -3,18 +3,24 @@
 from importlib import import_module
 from math import inf
 
+import numpy as np
+
+from ..core import MIN_LOAD
 from ..effects import LAWS, law_has_trait
 from .protocol import SteadyLoop
 
 
 def make_law(friction, load: float = 1.0):
-    """Return the friction law defined by the keys of a [friction] table, all of which must be given.
+    """Return the friction law defined by the keys of a [friction] table, per newton of load.
+
+    All engines take their numbers from the attributes of this law. Laws with bonds have no such function, because their
+    rest speed follows from the motion (`model.law.make_bond_parameters`).
 
     Parameters
     ----------
     friction : table
-        Keys in SI units.
-    load : float
+        Keys in SI units; floats, or arrays (c,) of the values of c contacts.
+    load : float or (c,) array
         Load [N] on the whole contact, to which a stiffness in the table refers.
 
     Returns
@@ -22,6 +28,7 @@ def make_law(friction, load: float = 1.0):
     object
         A law as in `protocol`.
     """
+    load = np.maximum(load, MIN_LOAD)
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
 
 
@@ -54,5 +61,7 @@ def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:
     -------
     SteadyLoop or None
     """
-    loop_from_keys = getattr(import_module(LAWS[friction.law].module), "loop_from_keys", None)
-    return None if loop_from_keys is None else loop_from_keys(friction, load, amplitude)
+    if law_has_trait(friction.law, "bonds") or law_has_trait(friction.law, "averaged"):
+        return None
+    find_loop = getattr(make_law(friction, load), "steady_loop", None)
+    return None if find_loop is None else find_loop(load, amplitude)

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import ModalBasis
+from ..core import MIN_LOAD, ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
 from .drives import Signal, make_signal
-from .laws import LAWS, MIN_LOAD, is_rigid, masing
+from .laws import LAWS, is_rigid, masing
 from .laws.springs import make_cubic, make_interlocking
 from .records import (
     N_INTEGRALS,

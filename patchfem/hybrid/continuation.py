@@ -49,12 +49,14 @@ class PathEquations(NamedTuple):
     - by_parameter: (N,) derivatives of r by the parameter p
     - details: further results at this point
     - residual: largest part of the residual there, relative to the unknowns, and of that of unknowns that were eliminated
+    - memory: what the equations remember there, for `Curve.restart`
     """
 
     jacobian: np.ndarray
     by_parameter: np.ndarray
     details: Any = None
     residual: float = 0.0
+    memory: Any = None
 
 
 class Curve(NamedTuple):
@@ -62,10 +64,12 @@ class Curve(NamedTuple):
 
     - find_residual: function of x (N,) and p that returns r (N,)
     - differentiate: function of x (N,) and p that returns `PathEquations`
+    - restart: function of a `PathPoint` after a failed step, for equations that remember where they were evaluated
     """
 
     find_residual: Callable[[np.ndarray, float], np.ndarray]
     differentiate: Callable[[np.ndarray, float], PathEquations]
+    restart: Callable[["PathPoint"], None] | None = None
 
 
 class PathPoint(NamedTuple):
@@ -175,6 +179,8 @@ def follow_curve(
         tangent = point.find_tangent(tangent, unit)
         try:
             taken = _take_step(curve, point, step * tangent, unit, settings.tolerance)
+            if taken is None and curve.restart is not None:
+                curve.restart(point)
         except NotConverged:
             ended = "cost"
             break

@@ -2,6 +2,10 @@
 
 In every regime the equations are smooth. A step that leaves the regime is cut at the first zero of a margin on its dense
 output, and the regime is switched there.
+
+`rig` is a `records.Rig` and `state` a `records.State`, whose rows are named by enumerations of `records`: `Clock` for values
+of the run such as LENGTH, the duration of the present step [s], `Memory` for each interface, `Probe` for what is observed. A
+place in a step is its fraction from 0 to 1.
 """
 
 import numpy as np
@@ -186,6 +190,8 @@ def advance(rig, state, record, t_end, cycle):
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]
     n_empty = 0
+
+    # A pass is a step of length h, or its part up to the first event.
     while clock[Clock.TIME] < t_end:
         if n_empty > MAX_EMPTY_STEPS:
             return Status.NO_PROGRESS
@@ -194,6 +200,8 @@ def advance(rig, state, record, t_end, cycle):
         h = min(clock[Clock.STEP], longest, t_end - clock[Clock.TIME])
         norm = take_step(rig, state, h, rtol, n_checked)
         clock[Clock.N_STEPS] += 1
+
+        # `norm` is the error of the step relative to its tolerance. A step beyond it is repeated with a shorter length.
         if not norm <= 1:
             clock[Clock.STEP] = h * (step_factor(norm) if norm > 1 else REJECTED_FACTOR)
             if clock[Clock.STEP] < MIN_STEP * t_end:
@@ -209,16 +217,22 @@ def advance(rig, state, record, t_end, cycle):
             # does not say how exact its dense output is up to the event.
             clock[Clock.STEP] = SPEED_STEP_RATIO * fraction * h
             continue
+
+        # The run ends where the output reaches the stop of the flexure before the event.
         travel_end = find_travel_end(rig, state, fraction)
         if travel_end < fraction:
             fraction = travel_end
             face = -1
+
+        # Measures and samples of the part of the step that is motion
         if fraction > 0:
             observe_cycle(rig, state, fraction, record.cycles[cycle])
             if in_window and clock[Clock.TIME] + fraction * h > first_seen:
                 observe_window(rig, state, record, cycle, fraction)
         write_samples(rig, state, record, fraction)
         work_before = state.y[Tail.WORK]
+
+        # The state moves to the end of this part.
         if fraction == 1:
             # The last stage and the last margins are those of the start of the next step.
             copy_values(state.rows[N_STAGES], state.rows[0])
@@ -233,6 +247,7 @@ def advance(rig, state, record, t_end, cycle):
         if travel_end <= 1 and face < 0:
             return Status.EXCEEDS_TRAVEL
 
+        # The interface of the event changes its regime.
         n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
         if event.which == Margin.SPEED:
             # The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
@@ -314,7 +329,7 @@ def repeat_row(rig, state, row, source, count):
     state : State
         Motion at the end of the cycle that is repeated.
     row : (m,) array
-        Row that is written.
+        Row of `records.Record.samples` or `events` that is written.
     source : (m,) array
         Row of the earlier sample or event.
     count : int

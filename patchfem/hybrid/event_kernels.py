@@ -71,9 +71,9 @@ def write_margins(rig, state, t, y, margins):
     t : float
         Time [s].
     y : (n,) array
-        State.
-    margins : array
-        Margins, which are written.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
+    margins : (M, 5) array
+        Margins of the M interfaces, in the order of `records.Margin`, which are written.
     """
     n = rig.modes.shape[1]
     if rig.settings[Setting.HAS_RIGID] > 0:
@@ -95,7 +95,7 @@ def write_margins(rig, state, t, y, margins):
 
 @njit(**NJIT_KERNEL)
 def copy_margins(state, row):
-    """Copy a row of the margins to row 0, that of the start of the next step."""
+    """Copy a row of `State.margins` (rows, M, 5), the margins of M interfaces, to row 0, the start of the next step."""
     for i in range(state.margins.shape[1]):
         copy_values(state.margins[row, i], state.margins[0, i])
 
@@ -123,7 +123,7 @@ def write_margins_inside(rig, state, x, row):
 
 @njit(**NJIT_KERNEL)
 def write_probes(rig, state, t, y, probes):
-    """Write the scalars of a state that cycles and windows observe.
+    """Write the scalars of a state that cycles and windows observe, such as slides and forces.
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def write_probes(rig, state, t, y, probes):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     probes : (p,) array
-        Scalars, which are written.
+        Scalars in the order of `records.Probe`, which are written.
     """
     n = rig.modes.shape[1]
     find_rates(rig, state, t, y, state.rows[RATES])
@@ -151,6 +151,12 @@ def write_probes(rig, state, t, y, probes):
     if rig.settings[Setting.BASE_MOVES] > 0:
         probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
 
+    # A sliding interface that others hold has a velocity of round-off.
+    slowest = 0.0
+    for i in range(rig.faces.shape[0]):
+        if rests(state.memory[i]):
+            slowest = SAME_SPEED_TOL
+
     # Every interface; a law slips where the irreversible part of its velocity exceeds the elastic one.
     integrals = find_integrals(rig, y)
     for i in range(rig.faces.shape[0]):
@@ -164,7 +170,7 @@ def write_probes(rig, state, t, y, probes):
         if i == 0:
             probes[Probe.VELOCITY] = point.velocity
         slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
-        is_still = rests(memory) or point.velocity == 0
+        is_still = rests(memory) or abs(point.velocity) <= slowest * point.speed_scale
         probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
 
 
@@ -391,6 +397,8 @@ def hold_or_release(rig, state):
     n_faces = rig.faces.shape[0]
     for i in range(n_faces):
         state.memory[i, Memory.BEFORE] = state.memory[i, Memory.FORCE]
+
+    # Each pass moves one interface from rest to slip or back.
     n_released = 0
     for pivot in range(MAX_PIVOTS):
         update_grip(rig, state)

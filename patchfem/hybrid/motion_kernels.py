@@ -1,4 +1,8 @@
-"""Rates of the state of a motion: modes, drive, friction, work and slip (compiled)."""
+"""Rates of the state of a motion: modes, drive, friction, work and slip (compiled).
+
+`rig` is a `records.Rig` and `state` a `records.State`, whose rows are named by enumerations of `records`: `Clock` for values
+of the run, `Memory` and `Face` for each interface, `Mode` and `Piece` for modes and pieces of the drive.
+"""
 
 import numpy as np
 
@@ -19,6 +23,7 @@ from .records import (
 from .table_kernels import force_and_rates
 
 SHARED_GRIP = 1e-7  # relative compliance by which more interfaces than modes share their forces
+MIN_STRENGTH = 0.01  # smallest strength by which they do so, relative to that of the strongest
 N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance leaves
 
 
@@ -116,7 +121,7 @@ def look(rig, state, i, t, y):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     """
     n = rig.modes.shape[1]
     face = rig.faces[i]
@@ -152,7 +157,7 @@ def look(rig, state, i, t, y):
 
 @njit(**NJIT_KERNEL)
 def find_rates(rig, state, t, y, rates):
-    """Write the rates of the state y at a time t, and forces and slip rates into the memory.
+    """Write the rates of the state y at a time t; FORCE [N] and SLIP_RATE [m/s] of each interface go to `state.memory`.
 
     Parameters
     ----------
@@ -163,9 +168,9 @@ def find_rates(rig, state, t, y, rates):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     rates : (n,) array
-        Rates, which are written.
+        Rates of the entries of `records.State.y` per second, which are written.
     """
     n = rig.modes.shape[1]
     n_faces = rig.faces.shape[0]
@@ -230,9 +235,9 @@ def add_friction(rig, state, i, t, y, rates):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     rates : (n,) array
-        Rates, which are written.
+        Rates of the entries of `records.State.y` per second, which are written.
     """
     n = rig.modes.shape[1]
     memory = state.memory[i]
@@ -306,10 +311,31 @@ def hold(rig, state, acceleration):
 
 
 @njit(**NJIT_KERNEL)
+def find_strength(rig, i):
+    """Return the largest modal force [N] of a rigid interface at rest under its mean load.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    i : int
+        Number of the interface.
+    """
+    row = rig.rows[0, i]
+    return rig.faces[i, Face.NUMBERS] * rig.faces[i, Face.MEAN] * np.sqrt(project(row, row))
+
+
+@njit(**NJIT_KERNEL)
 def update_grip(rig, state):
     """Invert the compliance of the resting interfaces by the Gauss-Jordan method."""
     n = rig.faces.shape[0]
     grip = state.grip
+    # More interfaces than modes share their forces by their strengths, so that they reach their limits at once.
+    strongest = 1e-300
+    for i in range(n):
+        if rests(state.memory[i]):
+            strongest = max(strongest, find_strength(rig, i))
+
     # Compliance [1/kg] between resting interfaces. The others have a unit row. More interfaces than modes would make it
     # singular, so that the diagonal is a little larger.
     for i in range(n):
@@ -318,7 +344,8 @@ def update_grip(rig, state):
             if rests(state.memory[i]) and rests(state.memory[k]):
                 grip[i, k] = project(rig.rows[0, i], rig.rows[0, k]) / rig.settings[Setting.MASS]
         if rests(state.memory[i]):
-            grip[i, i] *= 1 + SHARED_GRIP
+            share = max(find_strength(rig, i) / strongest, MIN_STRENGTH)
+            grip[i, i] *= 1 + SHARED_GRIP / share
 
     for i in range(n):
         # Row i is divided by its pivot, and subtracted from the other rows. The inverse takes the place of the matrix.

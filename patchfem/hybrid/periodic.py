@@ -247,7 +247,9 @@ class Shooting:
         state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
         state.clock[Clock.N_STEPS] = self.n_steps
         self.record = make_arrays(self.case)[1]
-        compiled.load("hybrid.engine_kernels").run_case(self.case.rig, state, self.record)
+        compiled.load_compiled_module("hybrid.engine_kernels").run_case(
+            self.case.rig, state, self.record
+        )
         self.n_periods += 1
         self.n_steps = state.clock[Clock.N_STEPS]
         if self.n_steps > settings[Setting.MAX_STEPS]:

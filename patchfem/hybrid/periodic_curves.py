@@ -183,7 +183,7 @@ class PeriodEquations:
     @property
     def curve(self) -> Curve:
         """Equations for the continuation."""
-        return Curve(self.find_residual, self.differentiate)
+        return Curve(self.find_residual, self.differentiate, self.restart)
 
     def _make_shooting(self, parameter: float) -> LoopShooting:
         """Return the map of a period at a value of the parameter."""
@@ -270,7 +270,8 @@ class PeriodEquations:
         )
         motion = self._describe(shooting, before, change)
         self.n_steps = shooting.n_steps
-        return PathEquations(jacobian, slope, motion, motion.change)
+        memory = (self.before, self.reversals)
+        return PathEquations(jacobian, slope, motion, motion.change, memory)
 
     def _describe(self, shooting: LoopShooting, before: State, change) -> PeriodicMotion:
         """Return the motion of a point, with its multipliers.
@@ -339,16 +340,15 @@ class PeriodEquations:
         step = (second.w - first.w) / unit
         tangent = step / np.linalg.norm(step)
         guess = Guess(first.w + fraction * (second.w - first.w), tangent, unit)
+        self.n_steps = 0.0
         self.restart(first)
         found = correct_point(self.curve, first, guess, self.tolerance)
         return None if found is None else found[0]
 
     def restart(self, point: PathPoint) -> None:
-        """Begin the next correction at a point of the curve, with a new count of steps."""
-        self.n_steps = 0.0
-        self.before = copy_state(point.equations.details.run.final)
-        self.reversals = None
-        self.differentiate(point.w[:-1], point.w[-1])
+        """Begin the next correction at a point of the curve."""
+        self.before = point.equations.memory[0]
+        self.reversals = point.equations.memory[1]
 
     def list_crossings(self, path: CurvePath, parameter: float) -> list[PathPoint]:
         """Return the points at which a path passes a value of the parameter, in their order."""
@@ -360,6 +360,7 @@ class PeriodEquations:
                 continue
             guess = first.w + (parameter - before) / (after - before) * (second.w - first.w)
             guess[-1] = parameter
+            self.n_steps = 0.0
             self.restart(first)
             point = find_point(self.curve, first, guess, self.tolerance)
             found += [point] * (point is not None)

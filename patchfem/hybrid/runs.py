@@ -180,7 +180,7 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
         if start is not None:
             state = _restart(case, start)
             case = replace(case, y=state.y.copy())
-        compiled.load("hybrid.engine_kernels").run_case(case.rig, state, record)
+        compiled.load_compiled_module("hybrid.engine_kernels").run_case(case.rig, state, record)
         clock = state.clock
         n_needed = min(N_EVENTS, int(clock[Clock.N_EVENTS]))
     status = Status(int(clock[Clock.STATUS]))

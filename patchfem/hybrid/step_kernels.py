@@ -108,7 +108,7 @@ def step_factor(norm):
 
 @njit(**NJIT_KERNEL)
 def find_curve(state, h):
-    """Write the coefficients of the dense output of a step whose state at the end is known."""
+    """Write the coefficients of the dense output of a step of `h` [s] with a known end to the rows from CURVE on."""
     rows = state.rows
     for k in range(state.y.size):
         change = rows[END, k] - state.y[k]
@@ -126,7 +126,7 @@ def find_curve(state, h):
 
 @njit(**NJIT_KERNEL)
 def read_curve(state, x, y):
-    """Write the state at the fraction x of a step.
+    """Write the state at the fraction x of a step to `y`, by the polynomial of the dense output (degree 7).
 
     Parameters
     ----------

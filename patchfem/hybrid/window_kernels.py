@@ -2,6 +2,10 @@
 
 A step, or its part up to an event, is evaluated at the five points of the Gauss-Lobatto rule of order 8. Integrals are
 the sums of this rule; extremes inside are located by parabolas.
+
+`rig` is a `records.Rig` and `state` a `records.State`, whose rows are named by enumerations of `records`: `Clock` for values
+of the run such as LENGTH, the duration of the present step [s], `Memory` for each interface, `Probe` for what is observed. A
+place in a step is its fraction from 0 to 1.
 """
 
 import numpy as np
@@ -139,7 +143,7 @@ def add_output(rig, y, cycle):
     rig : Rig
         Arrays of the rig.
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     cycle : (12,) array
         Row of `records.Record.cycles`.
     """
@@ -223,7 +227,7 @@ def observe_reversal(rig, state, fraction, cycle, sign, column):
     sign : float
         1 for the largest value, -1 for the smallest.
     column : int
-        Column of `State.probes`.
+        Column of the extreme slide in `records.Record.cycles`; its force is in the next column.
     """
     slide = Probe.FACES + Probe.SLIDE
     force = Probe.FACES + Probe.FORCE
@@ -316,7 +320,7 @@ def add_start(rig, clock, t, row):
 
 @njit(**NJIT_KERNEL)
 def write_row(rig, state, t, y, row):
-    """Write a sample: time, state, forces, loads and directions.
+    """Write time, state y, forces [N], loads [N] and directions of the interfaces to a row of the samples or events.
 
     Parameters
     ----------
@@ -327,9 +331,9 @@ def write_row(rig, state, t, y, row):
     t : float
         Time [s].
     y : (n,) array
-        State.
+        Coordinates, velocities, states of the laws and integrals, in the order of `records.State.y`.
     row : array
-        Row that is written.
+        Row of `records.Record.samples` or `events` that is written.
     """
     n_faces = rig.faces.shape[0]
     find_rates(rig, state, t, y, state.rows[RATES])

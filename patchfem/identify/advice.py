@@ -6,7 +6,8 @@ import numpy as np
 
 from .least_squares import Fit
 
-MIN_INTERVAL_GAIN = 0.1  # smallest decrease of an interval for which a further test is advised
+# Smallest decrease of an interval for which a further test is advised
+MIN_INTERVAL_DECREASE_FRACTION = 0.1
 
 
 def advise_test(
@@ -40,7 +41,7 @@ def advise_test(
     widest = int(np.argmax(sizes[determined]))
     ratio = np.sqrt(after[:, widest, widest])
     best = int(np.argmin(ratio))
-    if ratio[best] > 1 - MIN_INTERVAL_GAIN:
+    if ratio[best] > 1 - MIN_INTERVAL_DECREASE_FRACTION:
         return ""
     return (
         f"a further measurement {places[best]} would narrow the interval of {names[determined[widest]]} most, by about "

@@ -7,9 +7,8 @@ from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 MIN_DECAY_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
-MIN_DECREASE = (
-    0.36  # smallest reduction of the sum of squares by a further sinusoid that does not fit noise
-)
+# Smallest reduction of the sum of squares by a further sinusoid that does not fit noise
+MIN_RELATIVE_SQUARES_DECREASE = 0.36
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
 MIN_SINUSOID_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
@@ -40,7 +39,7 @@ def fit_decay(time, value) -> FittedModes:
     time = time - time[0]
     problem = SinusoidProblem(time, value, [np.ones(time.size)])
     spacing = 2 * np.pi * MIN_SPECTRAL_LINE_SPACING / time[-1]
-    limits = Limits(MAX_SINUSOIDS, MIN_DECREASE, spacing=spacing)
+    limits = Limits(MAX_SINUSOIDS, MIN_RELATIVE_SQUARES_DECREASE, spacing=spacing)
     fit = problem.fit(lambda fit: _find_starts(time, fit), limits)
     if not fit.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")

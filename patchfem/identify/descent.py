@@ -69,7 +69,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     # the residual is scaled because the method stops at an absolute gradient
     ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
-        lambda part: model.with_penalty(fixed + select @ part) / scale,
+        lambda part: model.evaluate_or_penalize(fixed + select @ part) / scale,
         inner,
         jac=lambda part: model.jacobian(fixed + select @ part, free) / scale,
         bounds=(0, 1),

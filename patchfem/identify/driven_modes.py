@@ -17,7 +17,7 @@ from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 # Smallest relative reduction of the sum of squares by a further mode, and smallest rms of the mode relative to that
 # of the response.
-LIMITS = Limits(count=12, decrease=0.02, rms=3e-3)
+DRIVEN_MODE_LIMITS = Limits(count=12, decrease=0.02, rms=3e-3)
 # Number of samples at each end that are not fitted, because of the jump of the periodic continuation.
 N_EDGE_SAMPLES = 32
 # Largest number of fitted samples, from the beginning of the record.
@@ -25,8 +25,8 @@ MAX_FITTED_SAMPLES = 2**16
 MIN_ZETA = 1e-6  # lower bound of the damping ratios in the search
 MAX_ZETA = 0.5  # upper bound of the damping ratios in the search
 # Ratio of the length of the record to that of the windowed segments in which a further mode is sought.
-N_SEGMENTS = 8
-MIN_RECORD_SAMPLES = 64 * N_SEGMENTS  # smallest number of samples of a record
+N_RECORD_SEGMENTS = 8
+MIN_RECORD_SAMPLES = 64 * N_RECORD_SEGMENTS  # smallest number of samples of a record
 # Half-width of the main lobe of a Hann window, which hides the lines near 0, in spectral lines.
 WINDOW_WIDTH_LINES = 1.5
 # Smallest input power of an excited spectral line, relative to the largest one.
@@ -78,7 +78,7 @@ class _DrivenRecord:
         This part of the power of a line is |G_xf|^2 / G_ff times the coherence, averaged over windowed segments. It is
         the H1 estimator of Bendat and Piersol, Random Data, ch. 6.
         """
-        size = 2 * (self.force.size // (2 * N_SEGMENTS))
+        size = 2 * (self.force.size // (2 * N_RECORD_SEGMENTS))
         records = (self.force[self.inner], fit.residual)
         frequency, transforms = transform_segments(self.step, records, size)
         densities = average_segments(*transforms)
@@ -134,7 +134,7 @@ def fit_driven_modes(
     record = _DrivenRecord(step, force[fitted], response[fitted], DERIVATIVE_ORDERS[quantity])
     problem = record.problem
 
-    fit = problem.fit(record.find_starts, LIMITS)
+    fit = problem.fit(record.find_starts, DRIVEN_MODE_LIMITS)
     if not fit.poles.size:
         raise PatchfemError(
             "no mode is visible in the response; a record over a resonance is needed"
@@ -144,7 +144,7 @@ def fit_driven_modes(
 
     # The spectrum that shows the modes resolves no lower frequency; filters and aliasing distort the highest ones.
     min_frequency, max_frequency = band
-    lowest = WINDOW_WIDTH_LINES * N_SEGMENTS / (force.size * step)
+    lowest = WINDOW_WIDTH_LINES * N_RECORD_SEGMENTS / (force.size * step)
     min_w = 2 * np.pi * max(min_frequency, lowest)
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
 

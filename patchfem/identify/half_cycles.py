@@ -21,13 +21,15 @@ SINE_FIT_ERROR = 3e-5
 # Largest relative standard deviation of the size of a half cycle due to noise; the decay ends where it is larger.
 MAX_HALF_CYCLE_NOISE = 0.25
 # Number of fits of all half cycles, each with half periods and decay rates from the previous fit.
-N_PASSES = 3
+N_HALF_CYCLE_FITS = 3
 MAX_MIDPOINT_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
-MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
-N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
-N_FIRST_CYCLES = 1.2  # cycles at the beginning of a decay to which the first sinusoid is fitted
+MAX_MIDPOINT_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
+# Half cycles on each side from which the noise of a half cycle is estimated
+N_NEIGHBOUR_HALF_CYCLES = 8
+# Cycles at the beginning of a decay to which the first sinusoid is fitted
+N_CYCLES_OF_FIRST_SINE = 1.2
 # Smallest place of the middle of the first half cycle, in half periods, one half less the error of the fit
-MIN_FIRST_MIDDLE = 0.48
+MIN_FIRST_MIDPOINT = 0.48
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].
 FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
@@ -52,8 +54,8 @@ class _FittedSines(NamedTuple):
 
     def compute_noise(self) -> np.ndarray:
         """Return the standard deviation (n,) of the noise in the neighbourhood of each half cycle."""
-        window = np.ones(2 * N_NEIGHBOURS + 1)
-        inner = slice(N_NEIGHBOURS, -N_NEIGHBOURS)
+        window = np.ones(2 * N_NEIGHBOUR_HALF_CYCLES + 1)
+        inner = slice(N_NEIGHBOUR_HALF_CYCLES, -N_NEIGHBOUR_HALF_CYCLES)
         square = np.convolve(self.square, window)[inner]
         n_free = np.convolve(self.n_free, window)[inner]
         return np.sqrt(np.maximum(square, 0.0) / n_free)
@@ -90,7 +92,7 @@ def find_half_cycles(time, value) -> HalfCycles:
     candidates = []
     for is_viscous in (False, True):
         sines = followed
-        for _ in range(N_PASSES):
+        for _ in range(N_HALF_CYCLE_FITS):
             sines = _refine_half_cycles(time, value, sines, is_viscous=is_viscous)
         if len(sines) > 2:
             candidates.append(_FittedSines(*np.array(sines).T))
@@ -152,8 +154,8 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
         raise PatchfemError("the record contains no oscillation")
 
     # a sinusoid that is fitted to the first cycle, and a little more for an inexact frequency
-    is_first = time - time[0] <= N_FIRST_CYCLES / frequency
-    n_samples = round(np.count_nonzero(is_first) / N_FIRST_CYCLES)
+    is_first = time - time[0] <= N_CYCLES_OF_FIRST_SINE / frequency
+    n_samples = round(np.count_nonzero(is_first) / N_CYCLES_OF_FIRST_SINE)
     if n_samples < 2 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
             f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
@@ -169,7 +171,7 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     # A half cycle goes from peak to peak around a zero of the sinusoid, and must lie completely in the record.
     half_period = np.pi / cycle.poles[0, 0]
     middle = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
-    if middle < MIN_FIRST_MIDDLE * half_period:
+    if middle < MIN_FIRST_MIDPOINT * half_period:
         middle += half_period
     return time[0] + middle, half_period
 
@@ -263,7 +265,7 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
         coefficients = np.linalg.lstsq(columns, value[low:high], rcond=None)[0]
         _, sine, cosine = coefficients
         correction = -np.arctan2(cosine * np.sign(sine), abs(sine)) * length / np.pi
-        if not abs(middle + correction - predicted) <= MAX_MIDDLE_SHIFT * length:
+        if not abs(middle + correction - predicted) <= MAX_MIDPOINT_SHIFT * length:
             return None
         if abs(correction) < 1e-9 * length:
             break

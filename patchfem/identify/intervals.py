@@ -27,13 +27,12 @@ MIN_DIRECTION_COMPONENT = 1e-3
 # profile is used.
 MAX_NONLINEARITY = 0.2
 # Smallest half-width of an interval above round-off, relative to the range of the parameter.
-MIN_INTERVAL = 1e-9
+MIN_INTERVAL_HALF_WIDTH = 1e-9
 # Ratio of the distance to the bound to the first step of a profile, for a parameter without a linear interval.
-N_FIRST_STEPS = 64
-PROFILE_TOL = 1e-3  # tolerance of the end of a profile interval, relative to its half-width
-MAX_GROWTH_RATIO = (
-    1e6  # growth at a point without a residual, relative to that at the end of the interval
-)
+N_FIRST_STEPS_TO_BOUND = 64
+PROFILE_END_TOL = 1e-3  # tolerance of the end of a profile interval, relative to its half-width
+# Growth at a point without a residual, relative to that at the end of the interval
+MAX_SQUARES_GROWTH_RATIO = 1e6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -118,7 +117,7 @@ class _Minimum(NamedTuple):
             if descent.cost < np.inf:
                 nearby = descent.u
             growth = max(descent.cost / self.cost - 1, 0.0) / self.growth
-            return np.sqrt(min(growth, MAX_GROWTH_RATIO)) - 1
+            return np.sqrt(min(growth, MAX_SQUARES_GROWTH_RATIO)) - 1
 
         # the step is doubled until the end is bracketed
         low = 0.0
@@ -130,7 +129,7 @@ class _Minimum(NamedTuple):
             high = min(2 * high, max_step)
         if not low:
             nearby = self.u
-        return brentq(compute_excess, low, high, xtol=PROFILE_TOL * (low or high / 4))
+        return brentq(compute_excess, low, high, xtol=PROFILE_END_TOL * (low or high / 4))
 
 
 def compute_intervals(
@@ -158,11 +157,13 @@ def compute_intervals(
     n = u.size
     rows = estimate_effective_rows(model(u)) if is_series else model.rows
     dof = max(rows - n, 1)
+    # An exact fit has the cost of its round-off, so that variances are not zero.
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     quantile = stdtrit(dof, 0.975)
     minimum = _Minimum(model, u, cost, quantile**2 / dof)
 
-    # covariance of the free parameters, and the directions without effect
+    # Covariance (J^T J)^-1 cost/dof of the parameters that have an effect and lie on no bound. A parameter is unknown
+    # if a direction without effect on the residual contains it.
     jacobian = model.jacobian(u, range(n))
     norms = np.linalg.norm(jacobian, axis=0)
     has_effect = norms > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
@@ -173,6 +174,8 @@ def compute_intervals(
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
+    # Linear interval u_k +- t sqrt(cov_kk). To its end the other free parameters change by the multiple cov_ik/cov_kk of
+    # u_k; if the sum of squares does not grow as expected on this line, or if u_k is on a bound, its profile is followed.
     half_width = quantile * np.sqrt(np.diag(covariance))
     offsets = np.full((2, n), np.nan)
     open_ends = np.zeros((n, 2), bool)
@@ -183,13 +186,15 @@ def compute_intervals(
         direction = np.zeros(n)
         if k in free:
             direction[free] = half_width[k] * covariance[k, free] / covariance[k, k]
-        if k not in free or (half_width[k] >= MIN_INTERVAL and not minimum.is_linear(direction)):
+        if k not in free or (
+            half_width[k] >= MIN_INTERVAL_HALF_WIDTH and not minimum.is_linear(direction)
+        ):
             methods[k] = "profile"
             others = [other for other in np.flatnonzero(has_effect) if other != k]
             bounds = np.array([u[k], 1 - u[k]])
-            first = half_width[k] if half_width[k] > MIN_INTERVAL else 0.0
+            first = half_width[k] if half_width[k] > MIN_INTERVAL_HALF_WIDTH else 0.0
             for side, sign in enumerate((-1.0, 1.0)):
-                step = first or bounds[side] / N_FIRST_STEPS
+                step = first or bounds[side] / N_FIRST_STEPS_TO_BOUND
                 steps[side] = minimum.find_profile_end(k, sign, step, others)
             open_ends[k] = ~np.isfinite(steps)
             steps = np.minimum(steps, bounds)
@@ -201,6 +206,7 @@ def compute_intervals(
         offsets[:, k] = steps
     ends = [model.space.to_values(u - offsets[0]), model.space.to_values(u + offsets[1])]
 
+    # Correlations cov_ij/sqrt(cov_ii cov_jj), without the parameters that the data do not determine
     covariance[is_unknown] = np.nan
     covariance[:, is_unknown] = np.nan
     scale = np.sqrt(np.diag(covariance))

@@ -14,11 +14,11 @@ from .sinusoids import FittedModes
 
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
 # Largest error of a sample time in time steps; times in text files may have only six digits.
-MAX_TIME_ERROR = 1e-3
+MAX_SAMPLE_TIME_ERROR = 1e-3
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
-MAX_ERROR_RATIO = 2.0
+MAX_ZETA_ERROR_RATIO = 2.0
 # Largest misfit of a driven response for which no note is issued.
-MAX_MISFIT = 0.1
+MAX_DRIVEN_MISFIT = 0.1
 # Largest misfit of a free decay for which no note is issued.
 MAX_DECAY_MISFIT = 0.05
 
@@ -77,7 +77,7 @@ def find_time_step(time: np.ndarray) -> float:
     """
     step = (time[-1] - time[0]) / (time.size - 1)
     deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
-    if deviation > max(MAX_TIME_ERROR, 1e-5 * time.size):
+    if deviation > max(MAX_SAMPLE_TIME_ERROR, 1e-5 * time.size):
         raise PatchfemError(
             f"the times deviate from an even step of {step:.6g} s by up to {deviation:.2g} of this step; an "
             "evenly sampled record is needed"
@@ -128,7 +128,7 @@ def identify_driven_modes(
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
 
-    if modes.misfit > MAX_MISFIT:
+    if modes.misfit > MAX_DRIVEN_MISFIT:
         notes.append(
             f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
             "record is noisy, or the rig is not linear"
@@ -244,16 +244,16 @@ def compute_decay_curve(
     curve = fit_decay_curve(_convert_to_displacement(half_cycles, order))
 
     notes = []
-    is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
+    is_certain = curve.damping_error <= MAX_ZETA_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():
         if not is_certain.any():
             raise PatchfemError(
-                f"the damping ratio has an interval wider than {MAX_ERROR_RATIO:g} times its value at all "
+                f"the damping ratio has an interval wider than {MAX_ZETA_ERROR_RATIO:g} times its value at all "
                 f"{is_certain.size} amplitudes: the record has too few half cycles or too much noise"
             )
         notes.append(
             f"{np.count_nonzero(~is_certain)} of {is_certain.size} amplitudes are left out: the interval "
-            f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
+            f"of the damping ratio is wider than {MAX_ZETA_ERROR_RATIO:g} times its value there"
         )
         curve = curve.select(is_certain)
 

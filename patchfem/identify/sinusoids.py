@@ -194,14 +194,15 @@ class SinusoidProblem:
         Parameters
         ----------
         find_starts : callable
-            Function of a SinusoidFit that returns initial poles (2,) of a further sinusoid.
+            Function of a SinusoidFit that returns initial guesses (2,) for a further sinusoid: its damped frequency
+            [rad/s] and decay rate [1/s].
         limits : Limits
-            When no further sinusoid is added.
+            Largest number of sinusoids, their smallest spacing [rad/s], and the smallest gain by a further one.
 
         Returns
         -------
         SinusoidFit
-            Without sinusoids if none is better than the fixed columns.
+            Without sinusoids if none is better than the columns `fixed` alone, such as a constant.
         """
         best, _ = self.solve(np.empty((0, 2)))
         while len(best.poles) < limits.count and best.mean_square > (MIN_MISFIT * self.scale) ** 2:

@@ -8,12 +8,11 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 
-DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
+FINITE_DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
 MIN_BOUND_RATIO_FOR_LOG = 10  # largest ratio of upper to lower bound of a linear scale
-PENALTY_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
-N_KNOWN_RESIDUALS = (
-    32  # number of the last residuals that are kept: a search returns to its neighbours
-)
+FAILED_RESIDUAL_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
+# Number of the last residuals that are kept: a search returns to its neighbours
+N_CACHED_RESIDUALS = 32
 
 
 class SearchSpace(NamedTuple):
@@ -130,7 +129,7 @@ class UnitCubeResidual:
         self.counts = SearchCounts(0, 0, "")
         self.largest = 0.0
         self.rows = 0
-        self._evaluate_once = lru_cache(N_KNOWN_RESIDUALS)(self._evaluate)
+        self._evaluate_once = lru_cache(N_CACHED_RESIDUALS)(self._evaluate)
 
     def __call__(self, u) -> np.ndarray | None:
         """Return the residual (r,) at u (n,), or None if the evaluation fails."""
@@ -141,11 +140,11 @@ class UnitCubeResidual:
         residual = self(u)
         return np.inf if residual is None else residual @ residual
 
-    def with_penalty(self, u) -> np.ndarray:
+    def evaluate_or_penalize(self, u) -> np.ndarray:
         """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
         residual = self(u)
         if residual is None:
-            return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
+            return np.full(self.rows, FAILED_RESIDUAL_FACTOR * max(self.largest, 1e-300))
         return residual
 
     def _evaluate(self, u: tuple[float, ...]) -> np.ndarray | None:
@@ -180,7 +179,7 @@ class UnitCubeResidual:
         columns = np.zeros((len(free), self.rows))
         for column, coordinate in zip(columns, free):
             evaluated = []
-            for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP, 0.0):
+            for step in (FINITE_DIFFERENCE_STEP, -FINITE_DIFFERENCE_STEP, 0.0):
                 point = np.array(u, float)
                 point[coordinate] += step
                 is_wanted = len(evaluated) < 2 and not (self.is_expensive and evaluated and step)

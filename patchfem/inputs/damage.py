@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from ..exceptions import PatchfemError
 
 MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason
-MAX_LISTED = 12  # largest number of names that a message lists
+MAX_LISTED_NAMES = 12  # largest number of names that a message lists
 
 # Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
-MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
+PROGRAM_MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
 
 
 def shorten(text, length: int = 40) -> str:
@@ -21,20 +21,20 @@ def shorten(text, length: int = 40) -> str:
 
 
 def list_some(texts: Sequence[str]) -> str:
-    """Join texts with commas; those beyond `MAX_LISTED` are only counted."""
-    n_more = len(texts) - MAX_LISTED
-    return ", ".join(texts[:MAX_LISTED]) + (f" and {n_more} more" if n_more > 0 else "")
+    """Join texts with commas; those beyond `MAX_LISTED_NAMES` are only counted."""
+    n_more = len(texts) - MAX_LISTED_NAMES
+    return ", ".join(texts[:MAX_LISTED_NAMES]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     """Convert exceptions that are raised while a damaged file is read into a PatchfemError.
 
-    Its message is `message`, the reason in brackets and `remedy`. `MISTAKES` of the program pass.
+    Its message is `message`, the reason in brackets and `remedy`. `PROGRAM_MISTAKES` of the program pass.
     """
     try:
         yield
-    except (PatchfemError, *MISTAKES):
+    except (PatchfemError, *PROGRAM_MISTAKES):
         raise
     except Exception as error:
         reason = shorten(error, MAX_REASON_LENGTH)

@@ -21,10 +21,10 @@ from .records import (
     RequestedChannel,
     select_channels,
 )
-from .tables import MAX_LINE_LENGTH, NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
+from .tables import MAX_LINE_CHARACTERS, NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
 from .units import CHANNEL_UNITS
 
-EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
+RECORD_EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
 MAX_TABLE_COLUMNS = 1000  # largest number of columns in a table or an array
@@ -61,9 +61,11 @@ def read_records(
         return _read_matlab(path, requests)
     if ending in UNIVERSAL_EXTENSIONS:
         return _read_universal(path, requests, exported_names)
-    if ending in EXTENSIONS:
+    if ending in RECORD_EXTENSIONS:
         return select_channels(path, _read_table(path, exported_names), requests, [])
-    raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(EXTENSIONS)}")
+    raise PatchfemError(
+        f"{path}: the name of an imported file must end in {', '.join(RECORD_EXTENSIONS)}"
+    )
 
 
 def _read_universal(
@@ -111,7 +113,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     if len(names) > MAX_TABLE_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-            f"needed, not '{shorten(table.header, MAX_LINE_LENGTH)}'"
+            f"needed, not '{shorten(table.header, MAX_LINE_CHARACTERS)}'"
         )
     columns = [name.lower().replace(" ", "_") for name in names]
     channels = []

@@ -15,14 +15,14 @@ from .damage import refuse_damage
 from .packed import refuse_large_content
 from .records import check_file
 
-REMEDY = "save only the variables that are needed"  # for a file that is too large
-MAX_NESTING = 8  # largest depth of nested structures
+TOO_LARGE_MATLAB_REMEDY = "save only the variables that are needed"  # for a file that is too large
+MAX_STRUCTURE_NESTING = 8  # largest depth of nested structures
 # Signature at the beginning of an HDF5 file, or after the user block that MATLAB puts there.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-NUMBER_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
+NUMBER_DTYPE_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
 Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
 # MATLAB classes with numbers, besides integers. "" stands for data of other programs.
-NUMBER_CLASSES = ("", "double", "single", "logical")
+MATLAB_NUMBER_CLASSES = ("", "double", "single", "logical")
 
 
 def read_variables(path, data: bytes | None = None) -> Arrays:
@@ -49,7 +49,7 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
         If there is no file, or if it is damaged, too large or no MATLAB file.
     """
     if data is None:
-        check_file(Path(path), REMEDY)
+        check_file(Path(path), TOO_LARGE_MATLAB_REMEDY)
         data = Path(path).read_bytes()
     is_hdf5 = data.startswith((HDF5_SIGNATURE, b"MATLAB 7.3")) or data[512:520] == HDF5_SIGNATURE
 
@@ -63,10 +63,12 @@ def read_variables(path, data: bytes | None = None) -> Arrays:
             with h5py.File(io.BytesIO(data), "r") as file:
                 sizes = []
                 file.visititems(lambda _, item: sizes.append(getattr(item, "nbytes", 0)))
-                refuse_large_content(path, sum(sizes), REMEDY)
+                refuse_large_content(path, sum(sizes), TOO_LARGE_MATLAB_REMEDY)
                 _add_group(arrays, file, "", 0)
         else:
-            refuse_large_content(path, matlab_elements.count_unpacked_bytes(data), REMEDY)
+            refuse_large_content(
+                path, matlab_elements.count_unpacked_bytes(data), TOO_LARGE_MATLAB_REMEDY
+            )
             matlab_elements.check_elements(data)
             _read_version_5(data, arrays)
     return arrays
@@ -113,15 +115,15 @@ def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
     value
         What SciPy has read.
     depth : int
-        Number of structures that contain the value. Below MAX_NESTING, structures are opened.
+        Number of structures that contain the value. Below MAX_STRUCTURE_NESTING, structures are opened.
     """
     if sparse.issparse(value):
         arrays[name] = _check_sparse(sparse.csc_array(value))
-    elif value.dtype.kind in NUMBER_KINDS:
+    elif value.dtype.kind in NUMBER_DTYPE_KINDS:
         arrays[name] = _to_numbers(value)
     elif value.size == 1 and hasattr(value.flat[0], "_fieldnames"):
         structure = value.flat[0]
-        for field in structure._fieldnames if depth < MAX_NESTING else ():
+        for field in structure._fieldnames if depth < MAX_STRUCTURE_NESTING else ():
             _add_value(arrays, f"{name}.{field}", getattr(structure, field), depth + 1)
 
 
@@ -147,9 +149,9 @@ def _add_group(arrays: Arrays, group, prefix: str, depth: int) -> None:
         if "MATLAB_sparse" in item.attrs:
             arrays[prefix + name] = _read_sparse(item)
         elif isinstance(item, h5py.Dataset):
-            if item.shape is not None and (kind in NUMBER_CLASSES or "int" in kind):
+            if item.shape is not None and (kind in MATLAB_NUMBER_CLASSES or "int" in kind):
                 _add_dataset(arrays, prefix + name, item)
-        elif kind == "struct" and depth < MAX_NESTING:
+        elif kind == "struct" and depth < MAX_STRUCTURE_NESTING:
             _add_group(arrays, item, f"{prefix}{name}.", depth + 1)
 
 
@@ -167,7 +169,7 @@ def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
     values = np.asarray(dataset[()])
     if "MATLAB_empty" in dataset.attrs:  # such a dataset contains the shape
         values = np.zeros(values.astype(int).ravel()).T
-    if values.dtype.kind in NUMBER_KINDS:
+    if values.dtype.kind in NUMBER_DTYPE_KINDS:
         arrays[name] = _to_numbers(values.T if values.ndim > 1 else values.reshape(-1, 1))
 
 

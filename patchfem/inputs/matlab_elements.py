@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from .packed import MAX_UNPACKED_BYTES
 
-PIECE_BYTES = 2**12  # bytes that are unpacked at once, to at most 1000 times as many
+UNPACKED_PIECE_BYTES = 2**12  # bytes that are unpacked at once, to at most 1000 times as many
 # Version and order of the bytes in the header of a file.
 VERSION_5_MARKS = {b"\x00\x01IM": "little", b"\x01\x00MI": "big"}
 HEADER_BYTES = 128  # length [bytes] of the header of a file
@@ -41,9 +41,11 @@ def count_unpacked_bytes(data: bytes) -> int:
     for variable in _list_variables(data):
         unpacker = zlib.decompressobj()
         stop = min(variable.stop, len(data))
-        for start in range(variable.start, stop, PIECE_BYTES):
+        for start in range(variable.start, stop, UNPACKED_PIECE_BYTES):
             if variable.kind == COMPRESSED_TYPE and total <= MAX_UNPACKED_BYTES:
-                total += len(unpacker.decompress(data[start : min(start + PIECE_BYTES, stop)]))
+                total += len(
+                    unpacker.decompress(data[start : min(start + UNPACKED_PIECE_BYTES, stop)])
+                )
     return total
 
 

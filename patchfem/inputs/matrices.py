@@ -24,8 +24,8 @@ MATRIX_NAMES = {
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
-MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
-MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
+MAX_MATRIX_VALUES = 5 * 10**7  # largest number of values in a matrix
+MAX_MATRIX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 
 
 class Matrix(NamedTuple):
@@ -158,8 +158,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
-        max_numbers = min(MAX_NUMBERS, path.stat().st_size)
-        if max(n_rows, n_columns) > MAX_ROWS or n_numbers > max_numbers:
+        max_numbers = min(MAX_MATRIX_VALUES, path.stat().st_size)
+        if max(n_rows, n_columns) > MAX_MATRIX_ROWS or n_numbers > max_numbers:
             raise PatchfemError(
                 f"{path}: the header announces {n_numbers} numbers in {n_rows} x {n_columns}, more than "
                 "the file can hold"
@@ -213,8 +213,8 @@ def _read_abaqus(path: Path) -> Matrix:
         places, index = _rank_dofs(labels.reshape(-1, 2))
         rows, columns = index.reshape(-1, 2).T
         n = len(places)
-    elif labels.min() < 1 or labels.max() > MAX_ROWS:
-        raise PatchfemError(f"{path}: rows and columns count from 1 to {MAX_ROWS} at most")
+    elif labels.min() < 1 or labels.max() > MAX_MATRIX_ROWS:
+        raise PatchfemError(f"{path}: rows and columns count from 1 to {MAX_MATRIX_ROWS} at most")
     else:
         rows, columns = labels.T - 1
         n = labels.max()
@@ -273,8 +273,10 @@ def _make_matrix(path: Path, values) -> Matrix:
     Raises PatchfemError if it has too many rows.
     """
     # A small file may state any number of rows, for each of which a sparse matrix needs memory.
-    if max(values.shape, default=0) > MAX_ROWS:
-        raise PatchfemError(f"{path}: a matrix of {MAX_ROWS} rows and columns at most can be read")
+    if max(values.shape, default=0) > MAX_MATRIX_ROWS:
+        raise PatchfemError(
+            f"{path}: a matrix of {MAX_MATRIX_ROWS} rows and columns at most can be read"
+        )
     # SciPy checks the indices of these formats only on demand. Wrong ones end the process.
     if sparse.issparse(values) and values.format in ("csr", "csc", "bsr"):
         values.check_format(full_check=True)

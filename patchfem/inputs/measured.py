@@ -10,15 +10,15 @@ from .damage import shorten
 from .tables import TableFormat, find_factors, parse_number, read_text
 
 # Factors to SI by unit, for each column of numbers in a table of measured responses
-COLUMN_UNITS = {
+RESPONSE_COLUMN_UNITS = {
     "frequency": UNIT_FACTORS["frequency"],
     "input": UNIT_FACTORS["acceleration"],
     "acceleration": UNIT_FACTORS["acceleration"],
     "displacement": UNIT_FACTORS["length"],
 }
 # Columns that a table of measured responses may have
-TABLE_FORMAT = TableFormat(
-    COLUMN_UNITS,
+RESPONSE_TABLE_FORMAT = TableFormat(
+    RESPONSE_COLUMN_UNITS,
     ("frequency", "input"),
     "frequency [Hz],input [g],acceleration [g],displacement [um],flag",
     "a measured table",
@@ -67,13 +67,13 @@ def read_table(path: Path) -> list[MeasuredRow]:
     PatchfemError
         If the file is not such a table; the message names the line.
     """
-    table = read_text(path, TABLE_FORMAT.contents)
-    factors = find_factors(table, TABLE_FORMAT)
-    unknown = [name for name in table.names if name not in (*COLUMN_UNITS, "flag")]
+    table = read_text(path, RESPONSE_TABLE_FORMAT.contents)
+    factors = find_factors(table, RESPONSE_TABLE_FORMAT)
+    unknown = [name for name in table.names if name not in (*RESPONSE_COLUMN_UNITS, "flag")]
     if unknown:
         raise PatchfemError(
             f"{path}:1: column '{shorten(unknown[0])}' is unknown; possible columns are flag and "
-            f"{', '.join(COLUMN_UNITS)}"
+            f"{', '.join(RESPONSE_COLUMN_UNITS)}"
         )
     rows = []
     for number, cells in table.iterate_rows(skips_blank=True):
@@ -92,7 +92,7 @@ def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) 
         raise PatchfemError(
             f"{location}flag '{shorten(flag)}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
         )
-    values = dict.fromkeys(COLUMN_UNITS)
+    values = dict.fromkeys(RESPONSE_COLUMN_UNITS)
     for name, factor in factors.items():
         if cells[name]:
             values[name] = parse_number(location + name, cells[name], factor)

@@ -12,7 +12,8 @@ from .damage import list_some, shorten
 from .tables import require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
-MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
+# Largest size of a file of records or of a MATLAB file in bytes
+MAX_RECORD_FILE_BYTES = 512 * 2**20
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 
@@ -75,8 +76,8 @@ def check_file(path: Path, remedy: str) -> None:
     """
     if not path.is_file():
         raise Missing(f"{path}: there is no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise PatchfemError(f"{path}: more than {MAX_BYTES >> 20} MiB; {remedy}")
+    if path.stat().st_size > MAX_RECORD_FILE_BYTES:
+        raise PatchfemError(f"{path}: more than {MAX_RECORD_FILE_BYTES >> 20} MiB; {remedy}")
 
 
 def parse_requests(texts: Iterable) -> list[RequestedChannel]:

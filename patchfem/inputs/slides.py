@@ -12,7 +12,7 @@ from .tables import TableFormat, read_columns
 from .units import CHANNEL_UNITS
 
 # Columns of the file of a prescribed slide
-COLUMN_NAMES = ("time", "displacement")
+SLIDE_COLUMN_NAMES = ("time", "displacement")
 
 
 def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
@@ -39,7 +39,7 @@ def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
     path = Path(path)
     table = TableFormat(
         {**CHANNEL_UNITS, "lateral": CHANNEL_UNITS["displacement"]},
-        COLUMN_NAMES,
+        SLIDE_COLUMN_NAMES,
         "time [s],displacement [um]",
         "a path",
     )
@@ -51,7 +51,7 @@ def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
         )
 
     # The pieces were pressed together where the slide starts.
-    columns = {name: columns.values[name] for name in COLUMN_NAMES}
+    columns = {name: columns.values[name] for name in SLIDE_COLUMN_NAMES}
     for name, column in columns.items():
         if column[0] != 0:
             raise PatchfemError(

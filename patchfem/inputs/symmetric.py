@@ -4,9 +4,9 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
-from .tables import MAX_VALUE
+from .tables import MAX_SI_VALUE
 
-MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
+MAX_SKEW_FRACTION = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 # End of the message about a skew-symmetric matrix
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 
@@ -85,9 +85,9 @@ def read_row(values, subject: str, n: int, *, allows_rows: bool = False) -> np.n
         raise PatchfemError(
             f"{subject} contains values that are not finite; finite ones are needed"
         )
-    if np.abs(values).max(initial=0.0) > MAX_VALUE:
+    if np.abs(values).max(initial=0.0) > MAX_SI_VALUE:
         raise PatchfemError(
-            f"{subject} contains values outside the computable range; magnitudes of at most {MAX_VALUE:g} are needed"
+            f"{subject} contains values outside the computable range; magnitudes of at most {MAX_SI_VALUE:g} are needed"
         )
     if not values.size:
         raise PatchfemError(f"{subject} is empty; at least one number is needed")
@@ -137,7 +137,7 @@ def symmetrize(values, subject: str):
     # A small skew part is round-off of the program that wrote the matrix
     skew = abs(values - values.T).max()
     largest = abs(values).max()
-    if skew > MAX_SKEW * largest:
+    if skew > MAX_SKEW_FRACTION * largest:
         raise PatchfemError(
             f"{subject} is not symmetric: entries differ from the transpose by {skew:.3g}, "
             f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"

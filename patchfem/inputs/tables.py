@@ -21,9 +21,9 @@ from .units import find_unit_factor
 if TYPE_CHECKING:
     import numpy as np
 
-MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
-MAX_LINE_LENGTH = 80  # largest number of characters of a quoted line
-MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
+MAX_TABLE_BYTES = 64 * 2**20  # largest size of a text file in bytes
+MAX_LINE_CHARACTERS = 80  # largest number of characters of a quoted line
+MAX_SI_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 # Pattern of a number in a table
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
@@ -83,10 +83,10 @@ class TextTable(NamedTuple):
                 continue
             cells = split_cells(f"{self.path}:{number}", line, self.separator)
             if len(cells) != len(self.names):
-                columns = shorten(", ".join(self.names), 3 * MAX_LINE_LENGTH)
+                columns = shorten(", ".join(self.names), 3 * MAX_LINE_CHARACTERS)
                 raise PatchfemError(
                     f"{self.path}:{number}: the number of cells must be {len(self.names)} ({columns}), not "
-                    f"{len(cells)} as in '{shorten(line, MAX_LINE_LENGTH)}'"
+                    f"{len(cells)} as in '{shorten(line, MAX_LINE_CHARACTERS)}'"
                 )
             yield number, cells
 
@@ -138,10 +138,10 @@ def read_text(path: Path, contents: str) -> TextTable:
     """
     try:
         with open_for_reading(path) as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
+            data = file.read(MAX_TABLE_BYTES + 1)
+        if len(data) > MAX_TABLE_BYTES:
             raise PatchfemError(
-                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
+                f"{path}: more than {MAX_TABLE_BYTES >> 20} MiB of text; leave out some rows of {contents}"
             )
         text = data.decode("utf-8-sig")
     except FileNotFoundError:
@@ -169,7 +169,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     names = table.names
     expected = (
         f"{table.path}:1: a header like `{form.example}` is needed, not "
-        f"'{shorten(table.header, MAX_LINE_LENGTH)}'"
+        f"'{shorten(table.header, MAX_LINE_CHARACTERS)}'"
     )
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")
@@ -211,7 +211,7 @@ def parse_number(location: str, cell: str, factor: float) -> float:
     Raises
     ------
     PatchfemError
-        If the cell is not a finite number, or larger than `MAX_VALUE`.
+        If the cell is not a finite number, or larger than `MAX_SI_VALUE`.
     """
     if not NUMBER_PATTERN.fullmatch(cell):
         reason = "is not a finite number"
@@ -219,9 +219,9 @@ def parse_number(location: str, cell: str, factor: float) -> float:
             reason = "has a decimal comma; export the file with decimal points"
         raise PatchfemError(f"{location}: '{shorten(cell)}' {reason}")
     value = float(cell) * factor
-    if abs(value) > MAX_VALUE:
+    if abs(value) > MAX_SI_VALUE:
         raise PatchfemError(
-            f"{location}: {value:g} in SI is outside the computable range; at most {MAX_VALUE:g} is possible"
+            f"{location}: {value:g} in SI is outside the computable range; at most {MAX_SI_VALUE:g} is possible"
         )
     return value
 

@@ -18,7 +18,7 @@ from .units import CHANNEL_UNITS, normalize_unit
 Dataset = dict[str, Any]  # dataset of a universal file as pyuff returns it
 DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
 TIME_ABSCISSA_TYPE = 17  # type code of the abscissa "time"
-GENERAL_TYPE = 0  # function type of a dataset 58 that may be anything
+GENERAL_FUNCTION_TYPE = 0  # function type of a dataset 58 that may be anything
 TIME_RESPONSE_TYPE = 1  # function type of a time response in dataset 58
 # Quantity of each data type of dataset 58 that is read; 9 is the force of an excitation.
 ORDINATE_QUANTITIES = {
@@ -28,7 +28,7 @@ ORDINATE_QUANTITIES = {
     12: "acceleration",
     13: "force",
 }
-UNKNOWN_ORDINATE = 0  # data type of values that may be any quantity
+UNKNOWN_ORDINATE_TYPE = 0  # data type of values that may be any quantity
 
 
 def read_datasets(path) -> list[Dataset]:
@@ -102,12 +102,12 @@ def make_channels(
     """
     factors = find_unit_factors(path, datasets)
     functions = [dataset for dataset in datasets if dataset["type"] == 58]
-    quantities = {UNKNOWN_ORDINATE: default_quantity, **ORDINATE_QUANTITIES}
+    quantities = {UNKNOWN_ORDINATE_TYPE: default_quantity, **ORDINATE_QUANTITIES}
     channels = []
     for number, dataset in enumerate(functions, 1):
         kind = int(dataset["func_type"])
         is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA_TYPE
-        if kind == TIME_RESPONSE_TYPE or (kind == GENERAL_TYPE and is_over_time):
+        if kind == TIME_RESPONSE_TYPE or (kind == GENERAL_FUNCTION_TYPE and is_over_time):
             quantity = quantities.get(int(dataset["ordinate_spec_data_type"]), "")
             channels.append(_make_channel(path, number, dataset, quantity, factors, notes))
     return channels

@@ -22,17 +22,17 @@ PUBLIC = {
         "write_mesh",
     ),
     "grading": (
-        "LENGTH_TOL",
+        "EQUAL_LENGTH_TOL",
         "Layout",
         "divide_into_columns",
         "divide_into_rows",
         "tributary_lengths",
     ),
     "grid": (
-        "ROW_SLOPE",
+        "ROW_HEIGHT_GROWTH",
         "TensorGrid",
-        "graded_grid",
-        "row_scale",
+        "make_graded_grid",
+        "compute_row_scale",
     ),
     "pieces": ("PieceMesh",),
 }

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from ..core import PatchfemError
 from .elements import ELEMENTS
-from .grading import LENGTH_TOL
-from .pieces import CellEdges, PieceMesh, find_edges, freeze_piece, signed_areas
+from .grading import EQUAL_LENGTH_TOL
+from .pieces import CellEdges, PieceMesh, compute_signed_areas, find_edges, freeze_piece
 
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
@@ -20,8 +20,8 @@ MAX_ROUNDED_SLOPE = 0.1
 MAX_LISTED_TAGS = 12
 # Largest distances of the node of an edge of second order from the middle of the edge, as fractions of its length: along
 # the edge, where it moves the stresses, and across, where the edge may be an arc of a rounded end of up to 45 degrees
-MAX_MIDDLE_SHIFT = 0.01
-MAX_MIDDLE_BULGE = 0.1
+MAX_MIDDLE_NODE_SHIFT = 0.01
+MAX_MIDDLE_NODE_BULGE = 0.1
 # Names of the tags of the cells of both pieces, with their numbers in mesh files
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 # Names of the tags of the edges on the interfaces and the far faces of both pieces, with these numbers
@@ -112,7 +112,7 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
             )
 
         distance = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
-        if distance > LENGTH_TOL * lower.length:
+        if distance > EQUAL_LENGTH_TOL * lower.length:
             raise PatchfemError(
                 f"lower_interface and upper_interface do not match (lengths {lower.length:.9g} and {upper.length:.9g} m, "
                 f"with ends up to {distance:.6g} m apart); let both interfaces begin and end at the same x (the nodes "
@@ -170,7 +170,7 @@ def _check_numbers(mesh: TaggedMesh) -> None:
         raise PatchfemError("a node has a coordinate that is not finite")
     span = np.ptp(used_points, axis=0)
     z_span = span[-1]
-    if span.size > 2 and z_span > LENGTH_TOL * span[:2].max():
+    if span.size > 2 and z_span > EQUAL_LENGTH_TOL * span[:2].max():
         raise PatchfemError(
             f"the mesh is not plane: its z values span {z_span:.6g} m; draw the mesh in x and y"
         )
@@ -219,7 +219,7 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
     interface, far = ends
     interface = interface[np.argsort(points[interface, 0], kind="stable")]
     _check_interface(points, interface, side)
-    if np.abs(points[interface, 1]).max() <= LENGTH_TOL * np.ptp(points[interface, 0]):
+    if np.abs(points[interface, 1]).max() <= EQUAL_LENGTH_TOL * np.ptp(points[interface, 0]):
         points[interface, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])
 
@@ -240,7 +240,7 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
     turned clockwise.
     """
     n = ELEMENTS[kind].n_corners
-    is_clockwise = signed_areas(points[cells[:, :n]]) < 0
+    is_clockwise = compute_signed_areas(points[cells[:, :n]]) < 0
     # In the reversed order the middle of the edge from one corner to the next changes its place, too.
     order = np.arange(cells.shape[1])
     order[:n] = order[:n][::-1]
@@ -280,7 +280,7 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
     length_squared = (along**2).sum(axis=1)
     shift = np.abs((along * offset).sum(axis=1)) / length_squared
     bulge = np.abs(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]) / length_squared
-    is_wrong = (shift > MAX_MIDDLE_SHIFT) | (bulge > MAX_MIDDLE_BULGE)
+    is_wrong = (shift > MAX_MIDDLE_NODE_SHIFT) | (bulge > MAX_MIDDLE_NODE_BULGE)
     if is_wrong.any():
         distance = np.hypot(shift, bulge)
         worst = int(np.argmax(np.where(is_wrong, distance, 0.0)))
@@ -289,7 +289,7 @@ def _check_middles(points, edges: CellEdges, side: str) -> None:
             f"{count} nodes of the {side} piece are not in the middle of their edge: the node at "
             f"{_format_place(middle[worst])} is {distance[worst]:.2g} of the length of its edge (from "
             f"{_format_place(start[worst])}, to {_format_place(end[worst])}) away from the middle; "
-            f"{MAX_MIDDLE_SHIFT:.0%} along the edge and {MAX_MIDDLE_BULGE:.0%} across are permitted"
+            f"{MAX_MIDDLE_NODE_SHIFT:.0%} along the edge and {MAX_MIDDLE_NODE_BULGE:.0%} across are permitted"
         )
 
 
@@ -316,7 +316,7 @@ def _check_interface(points, nodes, side: str) -> None:
 
     x, y = points[nodes].T
     cells = np.diff(x)
-    tolerance = LENGTH_TOL * np.ptp(x)
+    tolerance = EQUAL_LENGTH_TOL * np.ptp(x)
     shortest = int(np.argmin(cells))
     if cells[shortest] <= tolerance and np.ptp(x) > 0:
         raise PatchfemError(f"{name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes")
@@ -381,26 +381,26 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
         )
 
 
-def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
+def _check_touching_nodes(mesh: PieceMesh, border_edges, side: str) -> None:
     """Raise PatchfemError if a boundary node of a mesh lies on a boundary edge of which it is no end.
 
-    The rows of `border` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
+    The rows of `border_edges` (e, 2) are the nodes of the boundary edges. `side` names the piece in the message.
     """
     # Only nodes within half the length of an edge from its middle can lie on it
-    nodes = np.unique(border)
-    start = mesh.points[border[:, 0]]
-    along = mesh.points[border[:, 1]] - start
+    nodes = np.unique(border_edges)
+    start = mesh.points[border_edges[:, 0]]
+    along = mesh.points[border_edges[:, 1]] - start
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
     nearby_nodes = tree.query_ball_point(start + along / 2, length / 2 * (1 + 1e-9))
-    edge = np.repeat(np.arange(len(border)), [len(neighbours) for neighbours in nearby_nodes])
+    edge = np.repeat(np.arange(len(border_edges)), [len(neighbours) for neighbours in nearby_nodes])
     node = nodes[np.concatenate(nearby_nodes).astype(int)]
 
     # The area that edge and node span is 0 where the node lies on the edge
     offset = mesh.points[node] - start[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
-    is_touching = np.abs(area) <= LENGTH_TOL * mesh.length * length[edge]
-    is_touching &= (border[edge] != node[:, None]).all(axis=1)
+    is_touching = np.abs(area) <= EQUAL_LENGTH_TOL * mesh.length * length[edge]
+    is_touching &= (border_edges[edge] != node[:, None]).all(axis=1)
 
     if is_touching.any():
         x, y = mesh.points[node[np.argmax(is_touching)]]

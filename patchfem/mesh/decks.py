@@ -13,22 +13,22 @@ from .checks import CELL_TAGS, EDGE_TAGS, TaggedBlock, TaggedMesh
 from .elements import ELEMENTS
 
 # How a deck contains tags, for messages
-TAG_HELP = (
+DECK_TAG_HELP = (
     "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET, of *SURFACE of type ELEMENT or of "
     "*ELSET made of line elements"
 )
-PLANE_ELEMENT = re.compile(r"CP(?:E|S|EG)([3468])(?:M|R|H|I|RH|IH|MH)?$")
+PLANE_ELEMENT_PATTERN = re.compile(r"CP(?:E|S|EG)([3468])(?:M|R|H|I|RH|IH|MH)?$")
 # Numbers of nodes of line elements, which only name edges
-LINE_ELEMENTS = {"T2D2": 2, "T3D2": 2, "B21": 2, "B31": 2, "R2D2": 2}
-LINE_ELEMENTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3}
+LINE_ELEMENT_NODE_COUNTS = {"T2D2": 2, "T3D2": 2, "B21": 2, "B31": 2, "R2D2": 2}
+LINE_ELEMENT_NODE_COUNTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3}
 # Elements in meshio by number of nodes; a surface names the sides of plane elements
-PLANE_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
-LINE_KINDS = {2: "line", 3: "line3"}
+MESHIO_PLANE_NAMES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
+MESHIO_LINE_NAMES = {2: "line", 3: "line3"}
 PART_KEYWORDS = ("PART", "ASSEMBLY", "INSTANCE")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
 # Largest ratio of the members of a set to the lines of the deck; since a set may repeat members of
 # other sets, a short deck could otherwise name any number of members
-MAX_SET_SIZE_RATIO = 64
+MAX_SET_MEMBERS_PER_LINE = 64
 
 
 class Deck:
@@ -47,7 +47,7 @@ class Deck:
         self.elements: dict[int, tuple[str, list[int]]] = {}
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[list[str]]] = {}
-        self.max_members = MAX_SET_SIZE_RATIO * (text.count("\n") + 1)
+        self.max_members = MAX_SET_MEMBERS_PER_LINE * (text.count("\n") + 1)
         for keyword, parameters, lines in _split_blocks(text):
             self._add(keyword, parameters, lines)
 
@@ -81,24 +81,24 @@ class Deck:
 
     def _add_numbered(
         self,
-        known: dict[int, object],
-        new: list[tuple[int, object]],
+        contents: dict[int, object],
+        numbered_entries: list[tuple[int, object]],
         kind: str,
         parameters: dict[str, str],
     ) -> None:
-        """Add numbered nodes or elements to the known ones.
+        """Add nodes or elements, a list of number and content, to the `contents` by number.
 
-        PatchfemError is raised for a number given twice. `new` lists number and content. If the `parameters` of the
-        block name a set of this `kind` ("NSET" or "ELSET"), the numbers become members of it.
+        PatchfemError is raised for a number given twice. If the `parameters` of the block name a set of this `kind`
+        ("NSET" or "ELSET"), the numbers of the `numbered_entries` become members of it.
         """
-        for number, content in new:
-            if number in known:
+        for number, content in numbered_entries:
+            if number in contents:
                 name = "node" if kind == "NSET" else "element"
                 raise PatchfemError(f"{name} {number} is given twice")
-            known[number] = content
+            contents[number] = content
         if kind in parameters:
             members = self.sets[kind].setdefault(parameters[kind].lower(), [])
-            members += [number for number, _ in new]
+            members += [number for number, _ in numbered_entries]
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
         """Return the numbers of the nodes or elements in a set, which may contain other sets.
@@ -166,7 +166,7 @@ class Deck:
         if len({len(coordinates) for coordinates in self.nodes.values()}) > 1:
             raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
         points = np.array(list(self.nodes.values()), float).reshape(len(self.nodes), -1)
-        return TaggedMesh(points, blocks, TAG_HELP)
+        return TaggedMesh(points, blocks, DECK_TAG_HELP)
 
     def _list_sides(self, tag: str) -> list[list[int]]:
         """Return both corner nodes of each element side in the surface with the name `tag`."""
@@ -224,8 +224,8 @@ def _read_elements(kind: str, lines) -> list[tuple[int, tuple[str, list[int]]]]:
     `kind` is the type in the deck, such as "CPE4", and `lines` are the words of the data lines. An element may
     continue over several lines.
     """
-    plane = PLANE_ELEMENT.match(kind)
-    n_nodes = int(plane[1]) if plane else LINE_ELEMENTS.get(kind.removesuffix("H"))
+    plane = PLANE_ELEMENT_PATTERN.match(kind)
+    n_nodes = int(plane[1]) if plane else LINE_ELEMENT_NODE_COUNTS.get(kind.removesuffix("H"))
     if n_nodes is None:
         raise PatchfemError(
             f"{kind or 'untyped'} elements cannot be used; the cells must be plane triangles or quadrilaterals of plane "
@@ -234,5 +234,5 @@ def _read_elements(kind: str, lines) -> list[tuple[int, tuple[str, list[int]]]]:
     numbers = np.array([int(word) for line in lines for word in line], np.int64)
     if numbers.size % (n_nodes + 1):
         raise PatchfemError(f"{kind} elements do not all have {n_nodes} nodes")
-    name = PLANE_KINDS[n_nodes] if plane else LINE_KINDS[n_nodes]
+    name = MESHIO_PLANE_NAMES[n_nodes] if plane else MESHIO_LINE_NAMES[n_nodes]
     return [(row[0], (name, row[1:])) for row in numbers.reshape(-1, n_nodes + 1).tolist()]

@@ -54,33 +54,34 @@ class Element(NamedTuple):
         ]
         return ShapeFunctions(self._monomials(points, 0, 0) @ to_nodes, np.stack(slopes, axis=1))
 
-    def _monomials(self, points, order_x: int, order_y: int) -> np.ndarray:
+    def _monomials(self, points, x_derivative: int, y_derivative: int) -> np.ndarray:
         """Return the monomials (g, k) at points (g, 2), or their derivatives.
 
-        They are differentiated once along x or y if `order_x` or `order_y` is 1, and not if it is 0.
+        They are differentiated once along x or y if `x_derivative` or `y_derivative` is 1, and not if it is 0.
         """
         out = np.ones((len(points), len(self.powers)))
-        for axis, order in enumerate((order_x, order_y)):
+        for axis, order in enumerate((x_derivative, y_derivative)):
             power = self.powers[:, axis]
             factor = power if order else 1
             out *= factor * points[:, [axis]] ** np.maximum(power - order, 0)
         return out
 
 
-def _make_element(corners, powers, rule, has_centre: bool = False) -> Element:
+def _make_element(corners, exponents, quadrature, has_centre: bool = False) -> Element:
     """Return an element from its corners.
 
-    With more monomials than corners it has mid-edge nodes. `powers` (k, 2) are the exponents of the monomials, `rule`
-    the points and weights of the integration, and an element with `has_centre` has one more node at the origin.
+    With more monomials than corners it has mid-edge nodes. `exponents` (k, 2) are those of the monomials along both
+    coordinates, `quadrature` the points and weights of the integration, and an element with `has_centre` has one more
+    node at the origin.
     """
     nodes = np.array(corners, float)
-    if len(powers) > len(corners):
+    if len(exponents) > len(corners):
         middles = (nodes + np.roll(nodes, -1, axis=0)) / 2
         nodes = np.concatenate([nodes, middles])
     if has_centre:
         nodes = np.concatenate([nodes, np.zeros((1, 2))])
-    points, weights = rule
-    return Element(len(corners), nodes, np.array(powers), np.array(points), np.array(weights))
+    points, weights = quadrature
+    return Element(len(corners), nodes, np.array(exponents), np.array(points), np.array(weights))
 
 
 def _square_rule(count: int) -> tuple[list, list]:
@@ -90,19 +91,21 @@ def _square_rule(count: int) -> tuple[list, list]:
     return [(points[a], points[b]) for a, b in pairs], [weights[a] * weights[b] for a, b in pairs]
 
 
-_TRIANGLE = [(0, 0), (1, 0), (0, 1)]
-_SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+_TRIANGLE_CORNERS = [(0, 0), (1, 0), (0, 1)]
+_SQUARE_CORNERS = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 # Exact for polynomials of degree two
-_TRIANGLE_RULE = ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6, 1 / 6, 1 / 6])
-_LINEAR = [(0, 0), (1, 0), (0, 1)]
-_QUADRATIC = [*_LINEAR, (2, 0), (1, 1), (0, 2)]
-_SERENDIPITY = [*_QUADRATIC, (2, 1), (1, 2)]
+_TRIANGLE_QUADRATURE = ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6, 1 / 6, 1 / 6])
+_LINEAR_EXPONENTS = [(0, 0), (1, 0), (0, 1)]
+_QUADRATIC_EXPONENTS = [*_LINEAR_EXPONENTS, (2, 0), (1, 1), (0, 2)]
+_SERENDIPITY_EXPONENTS = [*_QUADRATIC_EXPONENTS, (2, 1), (1, 2)]
 
 # Elements by their names in meshio
 ELEMENTS = {
-    "triangle": _make_element(_TRIANGLE, _LINEAR, _TRIANGLE_RULE),
-    "quad": _make_element(_SQUARE, [*_LINEAR, (1, 1)], _square_rule(2)),
-    "triangle6": _make_element(_TRIANGLE, _QUADRATIC, _TRIANGLE_RULE),
-    "quad8": _make_element(_SQUARE, _SERENDIPITY, _square_rule(3)),
-    "quad9": _make_element(_SQUARE, [*_SERENDIPITY, (2, 2)], _square_rule(3), has_centre=True),
+    "triangle": _make_element(_TRIANGLE_CORNERS, _LINEAR_EXPONENTS, _TRIANGLE_QUADRATURE),
+    "quad": _make_element(_SQUARE_CORNERS, [*_LINEAR_EXPONENTS, (1, 1)], _square_rule(2)),
+    "triangle6": _make_element(_TRIANGLE_CORNERS, _QUADRATIC_EXPONENTS, _TRIANGLE_QUADRATURE),
+    "quad8": _make_element(_SQUARE_CORNERS, _SERENDIPITY_EXPONENTS, _square_rule(3)),
+    "quad9": _make_element(
+        _SQUARE_CORNERS, [*_SERENDIPITY_EXPONENTS, (2, 2)], _square_rule(3), has_centre=True
+    ),
 }

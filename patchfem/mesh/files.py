@@ -23,7 +23,7 @@ from .pieces import find_edges
 MAX_FILE_BYTES = 256 * 2**20
 # Smallest size [bytes] of an entry in these sections of a .msh file
 MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
-LINES = ("line", "line3")  # names of lines in meshio
+LINE_NAMES = ("line", "line3")  # names of lines in meshio
 
 
 def write_mesh(lower, path: Path, upper=None) -> None:
@@ -71,8 +71,8 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         meshio.write(partial, mesh, **options)
 
 
-def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
-    """Join the meshes `lower` and `upper` of a pair, the lower piece at y <= 0 and first.
+def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]]:
+    """Join the meshes `lower_piece` and `upper_piece` of a pair, the lower piece at y <= 0 and first.
 
     Both are `PieceMesh`, whose second coordinate is the depth below the interface.
 
@@ -86,7 +86,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
     cells = {}
     lines = []
     n_points = 0
-    for side, sign, body in (("lower", -1.0, lower), ("upper", 1.0, upper)):
+    for side, sign, body in (("lower", -1.0, lower_piece), ("upper", 1.0, upper_piece)):
         # Cells of a kind, with the numbers of their nodes among those of both pieces
         n_cells = 0
         for kind, nodes in body.blocks.items():
@@ -108,7 +108,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
         n_points += len(body.points)
 
     n_line_nodes = lines[0][0].shape[1]
-    cells[LINES[n_line_nodes - 2]] = lines
+    cells[LINE_NAMES[n_line_nodes - 2]] = lines
     blocks = [TaggedBlock(kind, *map(np.concatenate, zip(*parts))) for kind, parts in cells.items()]
     return np.concatenate(points), blocks
 
@@ -213,11 +213,11 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
     for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
-        if block.type not in LINES and block.type not in ELEMENTS:
+        if block.type not in LINE_NAMES and block.type not in ELEMENTS:
             raise PatchfemError(
                 f"{path}: {block.type} cells; only plane triangles, quadrilaterals and lines can be used"
             )
-        dimension = 1 if block.type in LINES else 2
+        dimension = 1 if block.type in LINE_NAMES else 2
         codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
         names = [
             tags.names.get((dimension, code), f"tag {code}" if code else "")

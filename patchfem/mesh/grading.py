@@ -8,7 +8,7 @@ import numpy as np
 from ..core import frozen_array
 
 # Largest difference of lengths that count as equal, as a fraction of the interface length
-LENGTH_TOL = 1e-9
+EQUAL_LENGTH_TOL = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +65,10 @@ def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
     return np.maximum(0.0, np.maximum(low - x, x - high))
 
 
-def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
+def divide_interval(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
     """Divide an interval into cells whose lengths approximate given target lengths.
 
-    The levels lie at equal steps of the integral of 1/length, so the lengths of neighbouring cells
+    The grid lines lie at equal steps of the integral of 1/length, so the lengths of neighbouring cells
     differ by a factor of about 1 + slope at most.
 
     Parameters
@@ -119,14 +119,14 @@ def tributary_lengths(x) -> np.ndarray:
     return np.append(half_cells, 0.0) + np.insert(half_cells, 0, 0.0)
 
 
-def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
+def divide_into_columns(layout: Layout, required_positions=()) -> np.ndarray:
     """Divide a layout into an even number of at least four columns.
 
     Parameters
     ----------
     layout : Layout
         Interval along the interface and target lengths.
-    required_levels : sequence of float
+    required_positions : sequence of float
         Positions [m] at each of which a column ends.
 
     Returns
@@ -134,12 +134,12 @@ def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
     (k,) ndarray [m]
         Both ends included.
     """
-    inner = sorted(level for level in required_levels if layout.start < level < layout.stop)
+    inner = sorted(place for place in required_positions if layout.start < place < layout.stop)
     parts = []
     for low, high in pairwise([layout.start, *inner, layout.stop]):
         part = replace(layout, start=low, stop=high)
-        levels = graded_levels(part, is_even=True, min_cells=2 if inner else 4)
-        parts.append(levels[1:] if parts else levels)
+        grid_lines = divide_interval(part, is_even=True, min_cells=2 if inner else 4)
+        parts.append(grid_lines[1:] if parts else grid_lines)
     return frozen_array(np.concatenate(parts))
 
 
@@ -160,12 +160,12 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
     coating_rows : int
         Number of rows in the coating.
     """
-    substrate_levels = graded_levels(
+    substrate_lines = divide_interval(
         replace(layout, start=layout.start + coating_thickness), min_cells=3
     )
     if coating_thickness <= 0:
-        return frozen_array(substrate_levels), 0
-    coating_levels = graded_levels(
+        return frozen_array(substrate_lines), 0
+    coating_lines = divide_interval(
         replace(layout, stop=layout.start + coating_thickness), min_cells=2
     )[:-1]
-    return frozen_array(np.concatenate([coating_levels, substrate_levels])), coating_levels.size
+    return frozen_array(np.concatenate([coating_lines, substrate_lines])), coating_lines.size

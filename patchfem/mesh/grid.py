@@ -17,14 +17,14 @@ from ..core import frozen_array
 from .ends import SHARP_END, End
 from .grading import Layout, divide_into_rows, tributary_lengths
 
-COLUMN_GROWTH = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
+COLUMN_LENGTH_RATIO = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
 # Number of equal columns beyond which the rows become shorter with the columns; with fewer columns
 # the rows stay as short, which costs little
 N_REFERENCE_COLUMNS = 32
 # Growth of the rows with the distance from a face, for N_REFERENCE_COLUMNS columns; with 0.2 there
 # are a fifth more rows for the same error of the compliance
-ROW_SLOPE = 0.3
-COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
+ROW_HEIGHT_GROWTH = 0.3
+N_COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
 MIN_PIECE_ROWS = 6  # smallest number of rows of a piece
 
 
@@ -156,16 +156,16 @@ class TensorGrid:
         x = self.x[::2]
         if self.x.size % 2 == 0:
             x = np.linspace(self.x[0], self.x[-1], self.x.size // 2 + 1)
-        return self._change_levels(x, merge_levels)
+        return self._change_grid_lines(x, merge_grid_lines)
 
     def refine(self) -> "TensorGrid":
         """Return the grid after every cell is split in two in both directions with smooth grading.
 
         The rows of the coating stay in the coating, and the nodes of the face follow its shape.
         """
-        return self._change_levels(split_levels(self.x), split_levels)
+        return self._change_grid_lines(split_grid_lines(self.x), split_grid_lines)
 
-    def _change_levels(self, x, change) -> "TensorGrid":
+    def _change_grid_lines(self, x, change) -> "TensorGrid":
         """Return the grid with the columns x [m], after `change` is applied to its rows and outer columns.
 
         `change` takes and returns ascending grid lines (k,) [m]. It is applied to coating and substrate separately, so
@@ -182,7 +182,7 @@ class TensorGrid:
             outer=frozen_array(change(self.outer)),
         )
 
-    def extend(self, length: float, end: End, growth: float = COLUMN_GROWTH) -> "TensorGrid":
+    def extend(self, length: float, end: End, growth: float = COLUMN_LENGTH_RATIO) -> "TensorGrid":
         """Return the grid of a piece of which this one is the part over the interface.
 
         The interface lies in the middle of the piece. The first column beyond the interface is as long
@@ -206,22 +206,22 @@ class TensorGrid:
         outer = [np.zeros(1)]
         for stop in sorted({length / 2 - end.size, length / 2}):
             if stop > half_interface * (1 + 1e-12):
-                columns = graded_rows(cell, stop - half_interface - outer[-1][-1], growth)
+                columns = compute_row_heights(cell, stop - half_interface - outer[-1][-1], growth)
                 outer.append(outer[-1][-1] + np.cumsum(columns))
                 cell = columns[-1] * growth
         return replace(self, outer=frozen_array(np.concatenate(outer)), end=end)
 
 
-def graded_rows(
-    start: float, total: float, growth: float = COLUMN_GROWTH, min_rows: int = 1
+def compute_row_heights(
+    first_height: float, total_height: float, growth: float = COLUMN_LENGTH_RATIO, min_rows: int = 1
 ) -> np.ndarray:
     """Compute heights of rows that grow with a constant ratio and add up to a total.
 
     Parameters
     ----------
-    start : float
+    first_height : float
         Height of the first row [m], or a little less.
-    total : float
+    total_height : float
         Sum of the heights [m].
     growth : float
         Largest ratio of successive heights, above 1.
@@ -233,10 +233,12 @@ def graded_rows(
     (ny,) ndarray
         Heights [m], the smallest first.
     """
-    start = min(start, total / min_rows)
-    n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
-    if n_rows * start >= total * (1 - 1e-12):
-        return np.full(n_rows, total / n_rows)
+    first_height = min(first_height, total_height / min_rows)
+    n_rows = max(
+        min_rows, ceil(log(1 + total_height * (growth - 1) / first_height) / log(growth) - 1e-9)
+    )
+    if n_rows * first_height >= total_height * (1 - 1e-12):
+        return np.full(n_rows, total_height / n_rows)
     # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
     powers = np.arange(n_rows)
     next_ratio = growth * (1 + 1e-6) + 1e-6
@@ -244,14 +246,14 @@ def graded_rows(
     while next_ratio < ratio:
         ratio = next_ratio
         rows = ratio**powers
-        derivative = start * (powers[1:] @ rows[:-1])
-        next_ratio = ratio - (start * rows.sum() - total) / derivative
-    rows = start * ratio**powers
-    return rows * (total / rows.sum())
+        derivative = first_height * (powers[1:] @ rows[:-1])
+        next_ratio = ratio - (first_height * rows.sum() - total_height) / derivative
+    rows = first_height * ratio**powers
+    return rows * (total_height / rows.sum())
 
 
-def graded_grid(
-    length: float, height: float, element_size: float, coating: float = 0.0
+def make_graded_grid(
+    length: float, height: float, element_size: float, coating_thickness: float = 0.0
 ) -> TensorGrid:
     """Make the grid of a piece with equal columns, whose rows grow with the distance from both faces.
 
@@ -264,7 +266,7 @@ def graded_grid(
         Size of the piece [m].
     element_size : float
         Width of the columns [m], or a little more.
-    coating : float
+    coating_thickness : float
         Thickness of the coating [m].
 
     Returns
@@ -273,23 +275,24 @@ def graded_grid(
     """
     # Rows for N_REFERENCE_COLUMNS columns, which are then scaled with the columns.
     n_columns = max(2, ceil(length / element_size - 1e-9))
-    scale = row_scale(n_columns)
+    scale = compute_row_scale(n_columns)
     reference_cell = length / n_columns / scale
 
     # The stress is singular at the ends of the far face, so that the rows are short there as well.
     bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
-    if coating > 0:
-        bands.append((coating, coating, min(reference_cell, coating / COATING_ROWS)))
+    if coating_thickness:
+        coating_row = min(reference_cell, coating_thickness / N_COATING_ROWS)
+        bands += [(coating_thickness, coating_thickness, coating_row)]
     max_row = height / MIN_PIECE_ROWS
     rows = Layout(
-        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_SLOPE
+        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_HEIGHT_GROWTH
     ).scale_cells(scale)
 
     x = np.linspace(-length / 2, length / 2, n_columns + 1)
-    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating))
+    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating_thickness))
 
 
-def row_scale(n_columns: int) -> float:
+def compute_row_scale(n_columns: int) -> float:
     """Return the factor by which the rows of a grid with equal columns are shorter than with N_REFERENCE_COLUMNS columns.
 
     It is at most 1: with fewer columns the rows stay as short.
@@ -297,33 +300,33 @@ def row_scale(n_columns: int) -> float:
     return min(1.0, N_REFERENCE_COLUMNS / n_columns)
 
 
-def merge_levels(levels) -> np.ndarray:
-    """Return every second of the grid lines `levels` (k,) [m], including the first and the last.
+def merge_grid_lines(grid_lines) -> np.ndarray:
+    """Return every second of the grid lines `grid_lines` (k,) [m], including the first and the last.
 
     With an odd number of cells the lines are interpolated in their number instead.
     """
-    if levels.size % 2:
-        return levels[::2]
-    position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
-    return np.interp(position, np.arange(levels.size), levels)
+    if grid_lines.size % 2:
+        return grid_lines[::2]
+    position = np.linspace(0, grid_lines.size - 1, grid_lines.size // 2 + 1)
+    return np.interp(position, np.arange(grid_lines.size), grid_lines)
 
 
-def split_levels(levels) -> np.ndarray:
+def split_grid_lines(grid_lines) -> np.ndarray:
     """Insert a grid line into each cell so that geometric growth of the cells is preserved.
 
-    `levels` (k,) [m] are ascending grid lines. The result has 2 k - 1 of them.
+    `grid_lines` (k,) [m] are ascending grid lines. The result has 2 k - 1 of them.
     """
-    if levels.size < 2:
-        return levels
-    cells = np.diff(levels)
+    if grid_lines.size < 2:
+        return grid_lines
+    cells = np.diff(grid_lines)
     ratio = np.ones(cells.size)
     if cells.size > 1:
         ratio[1:-1] = np.sqrt(cells[2:] / cells[:-2])
         ratio[0] = cells[1] / cells[0]
         ratio[-1] = cells[-1] / cells[-2]
-    out = np.empty(2 * levels.size - 1)
-    out[::2] = levels
+    out = np.empty(2 * grid_lines.size - 1)
+    out[::2] = grid_lines
     # A ratio above four is a jump of the cell size where two gradings meet; the limit keeps the
     # halves of a cell beside the jump within a factor of two of each other.
-    out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
+    out[1::2] = grid_lines[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

@@ -17,13 +17,13 @@ from .grid import TensorGrid
 
 # Corner nodes of the children of a cell: numbers below n are its corners, the next n the middles of its edges, then its
 # centre
-CHILDREN = {
+CHILD_CELL_NODES = {
     3: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
     4: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
-LINEAR_KINDS = {3: "triangle", 4: "quad"}
+LINEAR_ELEMENT_NAMES = {3: "triangle", 4: "quad"}
 # Elements into whose nodes the cells of first order are divided
-SECOND_ORDER = {"triangle": "triangle6", "quad": "quad9"}
+SECOND_ORDER_NAMES = {"triangle": "triangle6", "quad": "quad9"}
 
 
 class CellEdges(NamedTuple):
@@ -131,7 +131,7 @@ class PieceMesh:
         """Return the areas of the cells (t,) [m2] between straight edges."""
         parts = []
         for kind, cells in self.blocks.items():
-            parts.append(signed_areas(self.points[cells[:, : ELEMENTS[kind].n_corners]]))
+            parts.append(compute_signed_areas(self.points[cells[:, : ELEMENTS[kind].n_corners]]))
         return np.concatenate(parts)
 
     def tributary_lengths(self) -> np.ndarray:
@@ -159,12 +159,12 @@ class PieceMesh:
                 shape = ELEMENTS[kind].evaluate(ELEMENTS[kind].centre).values[0]
                 nodes = np.column_stack([cells, len(points) + np.arange(len(cells))])
                 points = np.concatenate([points, np.tensordot(points[cells], shape, ([1], [0]))])
-            children[LINEAR_KINDS[n]] = nodes[:, CHILDREN[n]].reshape(-1, n)
+            children[LINEAR_ELEMENT_NAMES[n]] = nodes[:, CHILD_CELL_NODES[n]].reshape(-1, n)
 
         # A piece of second order gets its middle nodes again
         tagged = _tag_inner_points(tagged, len(points))
         if self.is_quadratic:
-            kinds = {LINEAR_KINDS[ELEMENTS[kind].n_corners]: kind for kind in self.blocks}
+            kinds = {LINEAR_ELEMENT_NAMES[ELEMENTS[kind].n_corners]: kind for kind in self.blocks}
             points, children, tagged = raise_order(points, children, tagged, kinds)
 
         interface, far = map(np.flatnonzero, tagged)
@@ -215,7 +215,7 @@ def raise_order(
     points,
     blocks: dict[str, np.ndarray],
     tagged: list[np.ndarray],
-    kinds: dict[str, str] = SECOND_ORDER,
+    second_order_names: dict[str, str] = SECOND_ORDER_NAMES,
 ) -> tuple[np.ndarray, dict[str, np.ndarray], list[np.ndarray]]:
     """Add the nodes of elements of second order to cells of first order.
 
@@ -229,7 +229,7 @@ def raise_order(
         Cells (t, n) by the name of their element.
     tagged : list of (N,) bool ndarray
         Whether each point has each tag.
-    kinds : dict
+    second_order_names : dict
         Elements of second order by those of first order.
 
     Returns
@@ -252,14 +252,14 @@ def raise_order(
     for kind, corners in blocks.items():
         nodes = [corners, middles[n_edges : n_edges + corners.size].reshape(corners.shape)]
         n_edges += corners.size
-        if kinds[kind] == "quad9":
+        if second_order_names[kind] == "quad9":
             nodes.append(len(points) + np.arange(len(corners))[:, None])
             points = np.concatenate([points, corner_points[corners].mean(axis=1)])
-        out[kinds[kind]] = np.concatenate(nodes, axis=1)
+        out[second_order_names[kind]] = np.concatenate(nodes, axis=1)
     return points, out, _tag_inner_points(tagged, len(points))
 
 
-def signed_areas(corners) -> np.ndarray:
+def compute_signed_areas(corners) -> np.ndarray:
     """Return the areas (t,) of cells with corners (t, n, 2), positive if these are counterclockwise."""
     # Coordinates relative to a corner of the cell lose no digits if the origin is far away.
     a = corners - corners[:, :1]

@@ -32,7 +32,7 @@ PUBLIC = {
         "make_piece_meshes",
     ),
     "profile": ("find_sample_spacing",),
-    "rig": ("MAX_TRAVEL",),
+    "rig": ("MAX_COMPUTED_DISPLACEMENT",),
     "similar_models": (
         "SimilarModels",
         "collect_columns",

@@ -13,7 +13,7 @@ from ..formatting import format_length
 from ..scene.keys.tables import Tables
 from ..scene.text import format_toml
 
-START_KEY = "wear.start"
+WEAR_START_KEY = "wear.start"
 # Keys of [contact] that may differ between two runs because they do not describe the surfaces.
 LOADING_KEYS = (
     "load",
@@ -38,7 +38,7 @@ MIN_GAP_DIFFERENCE = 1e-12  # difference between gaps [m] below which it is roun
 # Largest relative difference between the lengths of one interface on two meshes.
 MAX_LENGTH_DIFFERENCE = 1e-6
 # Exceptions of h5py, json and tomllib for a file of another kind.
-FILE_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
+FOREIGN_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,7 +89,7 @@ class EarlierWear:
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
                 f"{format_length(change, 3)}; choose a run of the same pieces, and elements of the same length if "
                 "the surfaces are rough",
-                START_KEY,
+                WEAR_START_KEY,
             )
 
     def measure_error(self, name: str, value: float) -> float | None:
@@ -110,7 +110,7 @@ class EarlierWear:
             raise PatchfemError(
                 f"{self.path}: the interface of that run is {format_length(float(np.ptp(self.x)))} long, but "
                 f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
-                START_KEY,
+                WEAR_START_KEY,
             )
 
 
@@ -148,10 +148,10 @@ def read_end_state(path: Path) -> EarlierWear:
             )
         has_strips = "strips" in earlier.scene["contact"]
         is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
-    except FILE_ERRORS:
+    except FOREIGN_ERRORS:
         raise PatchfemError(
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
-            START_KEY,
+            WEAR_START_KEY,
         ) from None
 
     # What the file has but this run cannot use.
@@ -159,13 +159,13 @@ def read_end_state(path: Path) -> EarlierWear:
         raise PatchfemError(
             f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "
             "without [contact.strips]",
-            START_KEY,
+            WEAR_START_KEY,
         )
     if not is_usable:
         raise PatchfemError(
             f"{path}: the worn depth in this file is not a list of depths along a patch; run that "
             "scene again",
-            START_KEY,
+            WEAR_START_KEY,
         )
     return earlier
 
@@ -199,7 +199,7 @@ def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
         raise PatchfemError(
             f"{path}: the pieces of that run are not those of this scene ({', '.join(different_keys)} "
             "differ); choose a run of the same pieces",
-            START_KEY,
+            WEAR_START_KEY,
         )
     return earlier
 

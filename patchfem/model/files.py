@@ -142,7 +142,7 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     if not is_valid or contact.mesh is not None:
         return ()
     patch_pieces = patch.build_pieces(contact)
-    even_cell = patch_pieces.length / gap.DEFAULT_CELLS
+    even_cell = patch_pieces.length / gap.N_DEFAULT_CELLS
     n_cells = max(1, round(patch_pieces.length / (contact.element_size or even_cell)))
     x = np.linspace(-patch_pieces.length / 2, patch_pieces.length / 2, n_cells + 1)
     _, notes = profile.compute_profile_gap(

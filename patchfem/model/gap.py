@@ -18,7 +18,7 @@ from ..scene.keys.contact import Contact
 from ..scene.keys.types import Table
 from . import profile as profiles
 
-DEFAULT_CELLS = 200  # number of cells along the interface in a uniform mesh
+N_DEFAULT_CELLS = 200  # number of cells along the interface in a uniform mesh
 
 
 NamedShape = tuple[str, Table]  # name of a shape, and its table in the scene
@@ -84,8 +84,8 @@ class Gap:
         return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
-    def jumps(self) -> tuple[float, ...]:
-        """Coordinates [m] of the edges of steps, at which the gap jumps."""
+    def step_edges(self) -> tuple[float, ...]:
+        """Coordinates x [m] of the edges of steps, at which the gap is discontinuous."""
         return tuple(x for _, (x, _) in self._values("edge"))
 
     @property
@@ -164,7 +164,7 @@ class Gap:
                 self.profile,
                 x,
                 ProfileLengths(self.average, self.limit),
-                float(x[-1] - x[0]) / DEFAULT_CELLS,
+                float(x[-1] - x[0]) / N_DEFAULT_CELLS,
                 is_rough=self.is_rough,
                 is_material=self.material,
             )

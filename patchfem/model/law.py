@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Default rest speed of bonds (2.10) as a fraction of the peak speed.
 REST_SPEED_FRACTION = 1e-3
-DEFAULT_LOAD = 1.0  # load [N] at which an unloaded law with a stiffness takes its bond length
+BOND_LENGTH_LOAD = 1.0  # load [N] at which an unloaded law with a stiffness takes its bond length
 
 
 class FrictionLimits(NamedTuple):
@@ -121,7 +121,7 @@ def complete_bond_length(law: Friction, load) -> Friction:
     if law.stiffness is None or not law_takes_stiffness_or_length(law.law):
         return law
     if np.ndim(load) == 0:
-        load = load or DEFAULT_LOAD
+        load = load or BOND_LENGTH_LOAD
     return law.model_copy(update={"bond_length": law.static * load / law.stiffness})
 
 

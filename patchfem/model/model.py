@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .wear import WearModel
 
 MIN_RIG_REST_SPEED = 1e-12  # smallest default of the rest speed of bonds (2.10) in a rig [m/s]
-MAX_SHOWN_EFFECTS = 160  # largest number of characters of the effects in the repr of a model
+MAX_EFFECTS_CHARACTERS = 160  # largest number of characters of the effects in the repr of a model
 
 
 class MeasuredFile(NamedTuple):
@@ -99,7 +99,7 @@ class Model:
     motion: MotionFeatures | None = None
 
     def __repr__(self) -> str:
-        effects = shorten(", ".join(self.source.effects), MAX_SHOWN_EFFECTS)
+        effects = shorten(", ".join(self.source.effects), MAX_EFFECTS_CHARACTERS)
         return f"Model of {self.source.path.name}: {self.kind}; {effects}"
 
     @property

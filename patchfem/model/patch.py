@@ -9,13 +9,13 @@ from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
 from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
-from .gap import DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
+from .gap import N_DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
 
 if TYPE_CHECKING:
     from ..mesh.pieces import Mesh
 
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
-LENGTH_TOL = 1e-9  # largest relative difference of equal lengths
+EQUAL_LENGTHS_TOL = 1e-9  # largest relative difference of equal lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class PatchPiece:
 
         It is that of the end of the piece, or "flat" if the face extends further.
         """
-        if self.half_contact_length > half_length * (1 + LENGTH_TOL):
+        if self.half_contact_length > half_length * (1 + EQUAL_LENGTHS_TOL):
             return "flat"
         return self.end.kind
 
@@ -95,7 +95,7 @@ class PatchPieces:
     @property
     def has_overhang(self) -> bool:
         """Whether a piece is longer than the interface."""
-        limit = self.length * (1 + LENGTH_TOL)
+        limit = self.length * (1 + EQUAL_LENGTHS_TOL)
         return self.lower.length > limit or self.upper.length > limit
 
     @property
@@ -276,7 +276,7 @@ class PatchModel:
         """
         if self.mesh.element_size:
             return self.mesh.element_size
-        automatic = self.pieces.length / DEFAULT_CELLS
+        automatic = self.pieces.length / N_DEFAULT_CELLS
         if self.gap.is_rough and self.gap.average:
             return min(automatic, self.gap.average)
         return automatic
@@ -447,7 +447,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
     """
     if contact.asperities is not None:
         cutoff = find_shortest_wavelength(contact, pieces.length)
-        average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
+        average = cutoff and cutoff / profile.MIN_ELEMENTS_PER_WAVE
         return ProfileLengths(average, None)
     if contact.mesh is not None:
         return ProfileLengths(None, 0.0)
@@ -464,7 +464,7 @@ def _average_over_cells(size: float | None, strips, pieces: PatchPieces) -> Prof
         return ProfileLengths(size, size)
     if strips is None and not pieces.has_overhang:
         return ProfileLengths(None, None)
-    return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
+    return ProfileLengths(None, pieces.length / N_DEFAULT_CELLS)
 
 
 def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
@@ -476,4 +476,4 @@ def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
     cutoff = contact.asperities.cutoff
     if cutoff is not None or contact.profile is None:
         return cutoff
-    return profile.ELEMENTS_PER_WAVE * length / DEFAULT_CELLS
+    return profile.MIN_ELEMENTS_PER_WAVE * length / N_DEFAULT_CELLS

@@ -10,7 +10,7 @@ from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, tra
 from .file_cache import cache_by_file
 from .source import name_key
 
-KEY_PREFIX = "contact.asperities."  # prefix of the keys in messages
+ASPERITY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 
 
 def complete_asperities(
@@ -50,7 +50,7 @@ def complete_asperities(
         table = table.model_copy(update={"from_": str(path), "cutoff": cutoff, **squares})
 
     # Peaks of an isotropic Gaussian surface with these root mean squares.
-    with name_key(KEY_PREFIX + key):
+    with name_key(ASPERITY_PREFIX + key):
         peaks = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     changes = {
         "radius": peaks.radius,
@@ -68,8 +68,8 @@ def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMomen
     try:
         return _compute_spectral_moments(path, cutoff)
     except PatchfemError as error:
-        remedy = f"; {KEY_PREFIX}cutoff sets this cut-off" if "cut-off" in str(error) else ""
-        raise type(error)(f"{error}{remedy}", f"{KEY_PREFIX}from") from None
+        remedy = f"; {ASPERITY_PREFIX}cutoff sets this cut-off" if "cut-off" in str(error) else ""
+        raise type(error)(f"{error}{remedy}", f"{ASPERITY_PREFIX}from") from None
 
 
 @cache_by_file

@@ -7,14 +7,14 @@ from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
 from ..mesh import pieces as piece_meshes
-from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
+from ..mesh.grid import ROW_HEIGHT_GROWTH, TensorGrid, compute_row_scale, make_graded_grid
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
 from .source import name_key
 
 # Largest difference of equal sizes, as a fraction of the interface length; mesh files
 # contain coordinates of few digits.
-MESH_SIZE_TOL = 1e-6
+EQUAL_SIZES_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):
@@ -43,10 +43,10 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     """Generate the grid of a piece of a patch with a flat interface."""
-    grid = graded_grid(
+    grid = make_graded_grid(
         patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
     )
-    growth = 1 + ROW_SLOPE * row_scale(grid.x.size - 1)
+    growth = 1 + ROW_HEIGHT_GROWTH * compute_row_scale(grid.x.size - 1)
     return extend_grid(patch, piece, grid, growth)
 
 
@@ -149,11 +149,11 @@ def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
             ("height", body.height, piece.height),
             ("coating.thickness", body.coating_thickness, piece.thickness),
         ):
-            if abs(in_file - in_scene) <= MESH_SIZE_TOL * pieces.length:
+            if abs(in_file - in_scene) <= EQUAL_SIZES_TOL * pieces.length:
                 continue
             advice = ""
             for name, factor in UNIT_FACTORS["length"].items():
-                if in_scene and abs(in_file / unit * factor / in_scene - 1) <= MESH_SIZE_TOL:
+                if in_scene and abs(in_file / unit * factor / in_scene - 1) <= EQUAL_SIZES_TOL:
                     advice = f': set contact.mesh_unit = "{name}"'
             text = f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh"
             # The unit belongs to the file, not to the size in the scene

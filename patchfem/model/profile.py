@@ -11,10 +11,10 @@ from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.areal import level
 from ..surface.files.read import read_profile
-from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
+from ..surface.nodes import MEANS_OVER_WAVES_NOTE, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, resample_evenly
 from ..surface.roughness.filter import mean_line
-from ..surface.spectrum import ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
+from ..surface.spectrum import MIN_ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -22,14 +22,15 @@ CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a 
 # Standard deviation of heights [m] below which they are round-off of a straight line.
 MIN_HEIGHT_DEVIATION = 1e-10
 # Largest standard deviation of the heights of a straight profile, relative to their range.
-STRAIGHT_TOL = 1e-5
+MAX_STRAIGHT_PROFILE_DEVIATION = 1e-5
 # Ratio (removed slope x length of the trace) / (range of the heights) above
 # which a note reports the slope.
 MAX_UNREPORTED_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # smallest number of samples per cut-off with which a trace is filtered
 # Largest difference of equal node spacings, as a fraction of the interface length.
-SPACING_TOL = 1e-9
-CELL_TOL = 1e-2  # largest relative difference of the node spacing from the averaging length
+NODE_SPACING_TOL = 1e-9
+# Largest relative difference of the node spacing from the averaging length
+AVERAGING_LENGTH_TOL = 1e-2
 
 
 class _LevelledProfile(NamedTuple):
@@ -71,7 +72,7 @@ def compute_profile_gap(
     cell : float
         Cell length [m] of an even mesh; it limits how much of the trace may be missing.
     is_rough : bool
-        Whether asperities represent the waves shorter than ``ELEMENTS_PER_WAVE`` average lengths.
+        Whether asperities represent the waves shorter than ``MIN_ELEMENTS_PER_WAVE`` average lengths.
         The curve is then the waviness for this cut-off.
     is_material : bool
         Whether the heights are those of a surface: a peak of either piece closes the gap.
@@ -104,7 +105,7 @@ def compute_profile_gap(
 
     # The asperities represent the waves below the cut-off, so that the waviness above it is the gap.
     if is_rough:
-        cutoff = ELEMENTS_PER_WAVE * average
+        cutoff = MIN_ELEMENTS_PER_WAVE * average
         shape = _filter_waviness(trace, cutoff)
         if not is_straight:
             notes = (*notes, *_describe_short_waves(trace, cutoff))
@@ -165,7 +166,7 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple[str, ...]:
         f"{trace.source}: waves longer than {format_length(cutoff)} give the shape of the gap; the shorter "
         f"waves ({100 * fraction:.2g} % of the rms height) are represented by [contact.asperities], whose "
         "key `cutoff` sets this limit",
-        f"{trace.source}: pressure_peak and contact_fraction are {MEANS_OVER_WAVES} shorter than "
+        f"{trace.source}: pressure_peak and contact_fraction are {MEANS_OVER_WAVES_NOTE} shorter than "
         f"{format_length(cutoff)}; the real contacts are smaller, and their pressure is higher",
     )
 
@@ -205,7 +206,9 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
             "tilt, give [contact.tilt]",
         )
-    is_straight = np.std(trace.z) <= max(MIN_HEIGHT_DEVIATION, STRAIGHT_TOL * np.ptp(raw.z))
+    is_straight = np.std(trace.z) <= max(
+        MIN_HEIGHT_DEVIATION, MAX_STRAIGHT_PROFILE_DEVIATION * np.ptp(raw.z)
+    )
 
     # Beyond its ends the trace is continued at constant height.
     n_before = int(trace.x[0] > x[0])
@@ -218,8 +221,8 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
 
 def _is_evenly_spaced(x, size: float) -> bool:
     """Return whether the nodes x (m,) [m] are evenly spaced by a size [m]."""
-    is_uniform = np.ptp(np.diff(x)) <= SPACING_TOL * np.ptp(x)
-    return is_uniform and abs(x[1] - x[0] - size) <= CELL_TOL * size
+    is_uniform = np.ptp(np.diff(x)) <= NODE_SPACING_TOL * np.ptp(x)
+    return is_uniform and abs(x[1] - x[0] - size) <= AVERAGING_LENGTH_TOL * size
 
 
 def _fit_spline(trace: Profile):

@@ -22,7 +22,7 @@ from .drive import build_signal
 from .law import InterfaceLaw, build_interface_laws, make_interface_names
 from .structure import (
     build_modes,
-    build_own_modes,
+    build_modes_without_bond,
     build_start,
     compute_joint_stiffnesses,
     find_bolted_scene,
@@ -37,19 +37,19 @@ if TYPE_CHECKING:
     from .patch import PatchModel
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
-MAX_TRAVEL = 1e3
+MAX_COMPUTED_DISPLACEMENT = 1e3
 # Smallest number of drive cycles in a run whose length is given as a duration.
 MIN_RUN_CYCLES = 0.25
 # Slide of the first mode per modal coordinate, relative to the largest one of all
 # modes, below which it is round-off.
-MIN_SLIDE_FRACTION = 1e-9
+MIN_MODE_SLIDE_FRACTION = 1e-9
 # Fraction of the squared motion of the output below which a mode moves the output by round-off only.
-MIN_MODE_FRACTION = 1e-12
+MIN_MODE_OUTPUT_FRACTION = 1e-12
 
 # Tables of the joint that was bolted when the modes were measured.
 JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 # The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
-JOINT_SCENES = {
+SCENES_OF_SUBTRACTED_JOINT = {
     None: "the scene as written",
     "written": "the scene as written",
     "case": "each case",
@@ -120,7 +120,7 @@ class RigSprings:
     - bonded: stiffness [N/m] of the bonded spring.
     - interlock: stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
     - cubic: stiffening at the output [N/m3].
-    - travel: largest displacement [m]: the stop of the scene, `MAX_TRAVEL` if a mode gains energy
+    - travel: largest displacement [m]: the stop of the scene, `MAX_COMPUTED_DISPLACEMENT` if a mode gains energy
       or a spring softens, else infinite.
     """
 
@@ -314,7 +314,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
         If a file or a start cannot be used.
     """
     interfaces = build_interface_laws(scene)
-    rig = _build(scene, build_own_modes(scene, joint), interfaces, joint)
+    rig = _build(scene, build_modes_without_bond(scene, joint), interfaces, joint)
     if scene.structure.reduced is None:
         return rig
     reduced = structure_reduced.build_reduced_modes(scene)
@@ -328,7 +328,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
 
 
 def _build(
-    scene, own_modes: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
+    scene, unbonded: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
 ) -> Rig:
     """Build the rig of a scene from its modes without the spring of the bonded joint.
 
@@ -336,7 +336,7 @@ def _build(
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    own_modes : ModalBasis
+    unbonded : ModalBasis
         Modes without the spring of the bonded joint.
     interfaces : tuple of InterfaceLaw
         Friction laws of the interfaces, or () without friction.
@@ -347,7 +347,7 @@ def _build(
     -------
     Rig
     """
-    modes = build_modes(scene, own_modes)
+    modes = build_modes(scene, unbonded)
     friction = RigFriction(
         interfaces=interfaces,
         names=tuple(make_interface_names(scene.structure)),
@@ -360,7 +360,7 @@ def _build(
         start=build_start(scene, modes),
         friction=friction,
         springs=_build_springs(scene.structure, modes),
-        first_mode=_build_first_mode(scene, own_modes, modes),
+        first_mode=_build_first_mode(scene, unbonded, modes),
         structure=_build_structure(scene, modes, joint),
     )
 
@@ -403,7 +403,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     """Build the springs of a rig beside its modes from the table [structure].
 
     They are the bonded spring and the cubic spring of the output. The travel [m] limits the motion: it is that of the
-    scene, or MAX_TRAVEL if the motion of the `modes` can grow without limit, else inf.
+    scene, or MAX_COMPUTED_DISPLACEMENT if the motion of the `modes` can grow without limit, else inf.
     """
     bonded = structure.bonded
     interlock = None
@@ -413,41 +413,42 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     travel = structure.travel
     if not travel:
         can_grow = find_decay_rate(modes) < 0 or (cubic or 0.0) < 0
-        travel = MAX_TRAVEL if can_grow else np.inf
+        travel = MAX_COMPUTED_DISPLACEMENT if can_grow else np.inf
     stiffness = bonded.stiffness if bonded is not None else None
     return RigSprings(stiffness, interlock, cubic, travel)
 
 
-def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstMode:
+def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMode:
     """Build the record of the first elastic mode of a scene.
 
-    `own_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
+    `unbonded` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
     structure = scene.structure
-    slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
-    elastic = np.flatnonzero(own_modes.omega > 0)
+    interfaces = unbonded.interfaces
+    slide = interfaces[0] if len(interfaces) else unbonded.output
+    elastic = np.flatnonzero(unbonded.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-    frequency = float(own_modes.omega[first]) / (2 * np.pi)
+    frequency = float(unbonded.omega[first]) / (2 * np.pi)
 
     # The mass at the output is that of this mode, or of all coordinates if the mode does not move the output.
     mass = structure.moving_mass
     if mass is None or not (structure.mode or structure.file):
-        squared = np.square(own_modes.output)
+        squared = np.square(unbonded.output)
         total = max(float(squared.sum()), 1e-300)
-        moves_output = squared[first] > MIN_MODE_FRACTION * total
-        mass = float(own_modes.mass / (squared[first] if moves_output else total))
+        moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
+        mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
-    if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
-        contact_mass = float(own_modes.mass / slide[first] ** 2)
+    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
+        contact_mass = float(unbonded.mass / slide[first] ** 2)
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.
-    own_from_modes = np.eye(slide.size)
-    if modes is not own_modes and modes.shapes is not None:
-        own_from_modes = modes.shapes
-        if own_modes.shapes is not None:
-            own_from_modes = np.linalg.lstsq(own_modes.shapes, modes.shapes, rcond=None)[0]
+    unbonded_from_modes = np.eye(slide.size)
+    if modes is not unbonded and modes.shapes is not None:
+        unbonded_from_modes = modes.shapes
+        if unbonded.shapes is not None:
+            unbonded_from_modes = np.linalg.lstsq(unbonded.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
-    return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
+    return FirstMode(frequency, mass, contact_mass, (slide[:, None] * unbonded_from_modes)[order])
 
 
 def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
@@ -459,7 +460,7 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
     bolted = None
     if structure.measured == "stuck":
         bolted_scene = find_bolted_scene(scene)
-        bolted = BoltedJoint(JOINT_SCENES[structure.measured_joint])
+        bolted = BoltedJoint(SCENES_OF_SUBTRACTED_JOINT[structure.measured_joint])
         if joint is not None:
             bolted = bolted._replace(stiffness=(joint,))
         elif has_pressed_joint(bolted_scene):

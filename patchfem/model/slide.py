@@ -17,8 +17,9 @@ from .source import name_key
 MIN_STEPS_PER_LEG = 8
 # Number of steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact for any step.
 STEPS_PER_HOLD = 4
-REFERENCE_STEPS = 400  # number of steps per cycle that gives an error of about REFERENCE_ERROR
-# Relative error with REFERENCE_STEPS; it falls with the square of the time step.
+# Number of steps per cycle that gives an error of about REFERENCE_ERROR
+REFERENCE_STEPS_PER_CYCLE = 400
+# Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
 REFERENCE_ERROR = 1e-3
 STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length of a bond
 # Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
@@ -161,7 +162,7 @@ class SlidePath:
         min_steps = 0 if legs is None else MIN_STEPS_PER_LEG * (legs[0].size - 1)
         if pinned_steps is not None:
             return 4 * ceil(max(pinned_steps, min_steps) / 4)
-        per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_ERROR / tolerance)
+        per_cycle = REFERENCE_STEPS_PER_CYCLE * sqrt(REFERENCE_ERROR / tolerance)
         cycles = 1.0
         if legs is not None:
             path = float(np.abs(np.diff(legs[1])).sum())

@@ -23,7 +23,7 @@ from .source import name_key
 _build_listed_modes = memoize(listed_modes.build_basis)
 
 
-def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
+def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
     """Build the modes of a rig, including the linear spring of the bonded joint.
 
     The field `base` is the participation of the drive. Of a moving base it is the participation of
@@ -35,8 +35,8 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    own_modes : ModalBasis, optional
-        Result of `build_own_modes`, if it is known.
+    unbonded : ModalBasis, optional
+        Result of `build_modes_without_bond`, if it is known.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     PatchfemError
         If a file lacks something, or if a bonded spring has no single interface to act on.
     """
-    modes = build_own_modes(scene) if own_modes is None else own_modes
+    modes = build_modes_without_bond(scene) if unbonded is None else unbonded
     # A mode that yaws the patch gives each strip its own displacement, which is that at its middle.
     if needs_strip_displacements(scene):
         count = scene.contact.strips.count
@@ -70,7 +70,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     return import_effect("structure.bonded").add_spring(modes, bonded.stiffness, bonded.damping)
 
 
-def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
+def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:
     """Build the modes of a rig, excluding the linear spring of the bonded joint.
 
     The joint is subtracted from modes that were measured while it stuck.

@@ -15,7 +15,7 @@ from .file_cache import cache_by_file
 from .source import name_key
 
 NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # pattern of "1201:x" or "1201"
-RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
+NODE_RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
 
 
 class ReducedModes(NamedTuple):
@@ -250,7 +250,7 @@ def _find_moved_rows(name, n: int, places) -> np.ndarray:
     not known.
     """
     text = str(name)
-    row_range = RANGE_PATTERN.fullmatch(text)
+    row_range = NODE_RANGE_PATTERN.fullmatch(text)
     if row_range is None:
         if places is not None and text in DIRECTION_NAMES:
             return np.flatnonzero(places[:, 1] == DIRECTION_NAMES.index(text) + 1)

@@ -27,10 +27,9 @@ PUBLIC = {
         "make_cubic_spring",
         "make_flank_contact",
         "make_interlocking_spring",
-        "make_parallel_contact",
         "make_pressed_contact",
     ),
-    "laws": ("make_point_law",),
+    "laws": ("PointLaw", "make_elements", "make_point_law"),
     "time_march": ("March", "Motion", "Snapshot", "load_kernels", "march"),
     "slides": ("BLOCK", "follow"),
 }

@@ -4,6 +4,11 @@ A step moves the mode exactly under a parabola of the drive and a friction force
 in time, with the mean of the law (`return_maps_kernels`); errors are of order 2 to 3. A step in which the velocity
 changes its sign, or a rigid point is released, is halved up to LEVELS times, because a law takes the net increment as
 its path; events of a rigid point are then located by linear interpolation. A motion that repeats is not computed again.
+
+Kernels get the rows of one case: `case` has its constants (`case_rows.Number`), such as MOBILITY, the acceleration of the
+slide per friction force [1/kg]; `now` is its state at the end of the last step (`case_rows.Now`), and `seen` what was
+observed in the window (`case_rows.Seen`). `numbers[:, j]` and `memory[:, j]` are those of its law; the table of
+`return_maps_kernels` names their rows.
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
@@ -44,20 +49,21 @@ N_READ = 2  # measured cycles of a motion that repeats
 
 
 @njit(**NJIT_KERNEL)
-def solve_step(free, response, h, case, now, numbers, memory, j):
-    """Solve dq = free - response of F for the slide of a step by Newton's method in a bracket.
+def solve_step(free, response, dt, case, now, numbers, memory, j):
+    """Solve the slide dq [m] of a step, on which its friction force depends, by Newton's method in a bracket.
 
-    Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. As the slide is
-    nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K h (v0 - v1)/12 with
+    Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. By the responses
+    beta [m/N] to a constant force and tilt [m/N] to a force t/dt - 1/2, dq = free - beta F_m(dq) - tilt D(dq). As the slide
+    is nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K dt (v0 - v1)/12 with
     the secant K = D/dq of the elastic force, so that steps without a kink of the law are of order 4.
 
     Parameters
     ----------
-    free : float
-        Increment of the slide without friction [m].
+    free : (float, float)
+        Increment of the slide [m] without friction, and velocity [m/s] at the end of the step without friction.
     response : (2, 5) array
         Slide and velocity at the end of the step per unit of `cases.make_responses`.
-    h : float
+    dt : float
         Duration of the step [s].
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
@@ -76,12 +82,13 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         Increment [m], velocity at the end [m/s], path-mean force [N], its time mean [N], and the distance of the path mean
         from the mean of the forces at both ends [N].
     """
-    # Increment and velocity per unit of a constant force, and of a force that changes as t/h - 1/2.
+    # Increment and velocity per unit of a constant force, and of a force that changes as t/dt - 1/2. Columns 2 and 3 of
+    # the response belong to accelerations 1 and t.
     mobility = case[Number.MOBILITY]
     beta = response[0, 2] * mobility
     gamma = response[1, 2] * mobility
-    tilt = (response[0, 3] / h - 0.5 * response[0, 2]) * mobility
-    velocity_tilt = (response[1, 3] / h - 0.5 * response[1, 2]) * mobility
+    tilt = (response[0, 3] / dt - 0.5 * response[0, 2]) * mobility
+    velocity_tilt = (response[1, 3] / dt - 0.5 * response[1, 2]) * mobility
     load = case[Number.LOAD]
     start = now[Now.VELOCITY]
     follows_path = numbers[0, j] != Law.TANH
@@ -98,13 +105,13 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
     # Newton's method; the step falls back to bisection where it would leave the bracket.
     for _ in range(MAX_TRIALS):
-        mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
+        mean = mean_force(numbers, memory, j, load, Step(dq, dt, start, end, gamma))
         force = mean.force
         time_mean = force
         change = mean.end - now[Now.FORCE]
         elastic = mean.bend if numbers[0, j] == Law.LUGRE else change
         if follows_path and dq != 0 and start != end:
-            bend = h / 12 * (start - end)
+            bend = dt / 12 * (start - end)
             if start * end < 0:
                 # The part of the path that is not retraced, as the secant loses its meaning at a reversal.
                 bend *= abs((start + end) / (start - end))
@@ -131,18 +138,18 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
 
 @njit(**NJIT_KERNEL)
-def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
-    """Resolve the event of a Coulomb point inside a shortest step, with slide q and velocity v at its end.
+def end_at_event(q, v, dt, hold, case, now, numbers, memory, j):
+    """Resolve the release, stop or reversal of a Coulomb point inside a shortest step.
 
-    `hold` is the force that would keep the point at rest at the end of the step.
+    Row 0 of the memory is the direction of slip, 0 at rest. The event is located at a fraction `Now.EVENT` of the step.
 
     Parameters
     ----------
     q : float
-        Slide [m].
+        Slide at the end of the step as if there were no event [m].
     v : float
-        Velocity at the end of the step [m/s].
-    h : float
+        Velocity at the end of the step as if there were no event [m/s].
+    dt : float
         Duration of the step [s].
     hold : float
         Force that would keep the point at rest at the end of the step [N].
@@ -169,7 +176,7 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         fraction = (rest_force - first) / (abs(hold) - first) if abs(hold) > first else 1.0
         fraction = min(max(fraction, 0.0), 1.0)
         now[Now.EVENT] = fraction
-        rest = (1 - fraction) * h
+        rest = (1 - fraction) * dt
         memory[0, j] = 1.0 if hold > 0 else -1.0
         # The force beyond that of slip is linear in the rest of the step.
         excess = memory[0, j] * (rest_force - slip_force)
@@ -181,11 +188,11 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     # The slip stops at a fraction of the step, in which the velocity falls linearly.
     fraction = now[Now.VELOCITY] / (now[Now.VELOCITY] - v)
     now[Now.EVENT] = fraction
-    rest = (1 - fraction) * h
+    rest = (1 - fraction) * dt
     if abs(hold) <= rest_force:
         memory[0, j] = 0.0
         now[Now.TURN_FORCE] = nan  # rigid friction at rest takes many values
-        now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * fraction * h
+        now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * fraction * dt
         now[Now.VELOCITY] = 0.0
         return
     # Reversal: for the rest of the step the force has the other sign.
@@ -207,17 +214,16 @@ def count_halvings(part):
 
 
 @njit(**NJIT_KERNEL)
-def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memory, j):
+def try_step(waves, dt, response, is_shortest, max_bend, case, now, numbers, memory, j):
     """Advance a case by a step and return 0, or return how often a step that contains an event has to be halved.
 
-    `waves` are the sines of the drive at the start, in the middle and at the end. `max_bend` [N] is the largest
-    difference of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
+    After the step `now` has slide, velocity and mean forces of its end, and `memory` is that of its end.
 
     Parameters
     ----------
     waves : tuple of float
         Sines of the drive at the start, in the middle and at the end of the step.
-    h : float
+    dt : float
         Duration of the step [s].
     response : (2, 5) array
         Slide and velocity at the end of the step per unit of `cases.make_responses`.
@@ -243,8 +249,8 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     drive = case[Number.DRIVE]
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
-    slope = drive * (4 * waves[1] - 3 * waves[0] - waves[2]) / h
-    curvature = drive * 4 * (waves[0] - 2 * waves[1] + waves[2]) / (h * h)
+    slope = drive * (4 * waves[1] - 3 * waves[0] - waves[2]) / dt
+    curvature = drive * 4 * (waves[0] - 2 * waves[1] + waves[2]) / (dt * dt)
     constant = drive * waves[0]
     row = response[0]
     free = row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature - q
@@ -257,6 +263,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     mobility = case[Number.MOBILITY]
     load = case[Number.LOAD]
 
+    # A rigid point slips under the kinetic force mu_k N, or rests under the force that balances drive and spring.
     if is_rigid:
         direction = memory[0, j]
         force = direction * numbers[2, j] * load
@@ -265,7 +272,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
             if abs(hold) > numbers[1, j] * load:
                 if not is_shortest:
                     return 1
-                end_at_event(q, v, h, hold, case, now, numbers, memory, j)
+                end_at_event(q, v, dt, hold, case, now, numbers, memory, j)
                 return 0
             middle = (drive * waves[1] - case[Number.STIFFNESS] * q) / mobility
             now[Now.MEAN] = 0.5 * (now[Now.FORCE] + hold)
@@ -277,9 +284,9 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         end = free_velocity - response[1, 2] * mobility * force
         time_mean = force
     else:
-        prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
+        prepare(numbers, memory, j, Step(0.0, dt, v, v, 0.0))
         dq, end, force, time_mean, bend = solve_step(
-            (free, free_velocity), response, h, case, now, numbers, memory, j
+            (free, free_velocity), response, dt, case, now, numbers, memory, j
         )
         turns = v * end < 0
         # A law takes the net increment of a reversal inside the step as its path. One of the velocity may jump there.
@@ -297,7 +304,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
             return count_halvings(v / (v - end))
         hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility
         now[Now.MEAN] = force
-        end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
+        end_at_event(q + dq, end, dt, hold, case, now, numbers, memory, j)
         return 0
 
     first = 0.0
@@ -305,15 +312,15 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         # The extreme lies where a linear velocity is 0.
         fraction = v / (v - end)
         now[Now.EVENT] = fraction
-        first = 0.5 * v * fraction * h
-        advance(numbers, memory, j, load, Step(first, fraction * h, v, 0.0, 0.0))
+        first = 0.5 * v * fraction * dt
+        advance(numbers, memory, j, load, Step(first, fraction * dt, v, 0.0, 0.0))
         now[Now.TURN_FORCE] = read(numbers, memory, j, load).force
         now[Now.SHARE_BEFORE] = slip_share(numbers, memory, j, load, v)
         now[Now.SHARE_AFTER] = slip_share(numbers, memory, j, load, end)
-        h -= fraction * h
+        dt -= fraction * dt
         v = 0.0
 
-    advance(numbers, memory, j, load, Step(dq - first, h, v, end, response[1, 2] * mobility))
+    advance(numbers, memory, j, load, Step(dq - first, dt, v, end, response[1, 2] * mobility))
     now[Now.SLIDE] = q + dq
     now[Now.VELOCITY] = end
     now[Now.MEAN] = force
@@ -323,7 +330,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
 
 @njit(**NJIT_KERNEL)
 def find_force(wave, case, now, numbers, memory, j):
-    """Write the friction force and the irreversible slide at the end of a step.
+    """Write friction force and irreversible slide at the end of a step to the rows FORCE and SLIP of `now`.
 
     Parameters
     ----------
@@ -366,32 +373,32 @@ class Middle(NamedTuple):
 
 
 @njit(**NJIT_KERNEL)
-def find_middle(h, start, now):
+def find_middle(dt, start, now):
     """Return the `Middle` of a step.
 
     The slide is the cubic with the velocities at both ends, the force the parabola with the time mean of the step.
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the order of `case_rows.Now`.
     """
-    q = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
-    v = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
+    q = 0.5 * (start[0] + now[Now.SLIDE]) + dt / 8 * (start[1] - now[Now.VELOCITY])
+    v = 1.5 * (now[Now.SLIDE] - start[0]) / dt - 0.25 * (start[1] + now[Now.VELOCITY])
     return Middle(q, v, 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE]))
 
 
 @njit(**NJIT_KERNEL)
-def find_work(h, law, start, now):
+def find_work(dt, law, start, now):
     """Return the friction work of a step [J], exact for a law of the path and by Simpson's rule for one of the velocity.
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     law : float
         Number of the `law_rows.Law`.
@@ -402,22 +409,22 @@ def find_work(h, law, start, now):
     """
     if law != Law.TANH:
         return now[Now.MEAN] * (now[Now.SLIDE] - start[0])
-    middle = find_middle(h, start, now)
+    middle = find_middle(dt, start, now)
     power = start[2] * start[1] + now[Now.FORCE] * now[Now.VELOCITY]
-    return h / 6 * (power + 4 * middle.force * middle.velocity)
+    return dt / 6 * (power + 4 * middle.force * middle.velocity)
 
 
 @njit(**NJIT_KERNEL)
-def add_energies(waves, h, work, case, start, now):
-    """Add the energies per mass of a step.
+def add_energies(waves, dt, work, case, start, now):
+    """Add the energies per mass [J/kg] of a step to the rows WORK_IN, POWER, VISCOUS, FRICTION and STORED of `now`.
 
-    They are integrals of the velocity by Simpson's rule.
+    Those of drive and damper are integrals of the velocity by Simpson's rule.
 
     Parameters
     ----------
     waves : tuple of float
         Sines of the drive at the start, in the middle and at the end of the step.
-    h : float
+    dt : float
         Duration of the step [s].
     work : float
         Friction work of the step [J].
@@ -428,35 +435,35 @@ def add_energies(waves, h, work, case, start, now):
     now : (20,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
     """
-    middle = find_middle(h, start, now).velocity
+    middle = find_middle(dt, start, now).velocity
     end = now[Now.VELOCITY]
-    power = case[Number.DRIVE] * h / 6
+    power = case[Number.DRIVE] * dt / 6
     power *= waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end
     now[Now.WORK_IN] += power
     now[Now.POWER] += abs(power)
     squares = start[1] * start[1] + 4 * middle * middle + end * end
-    now[Now.VISCOUS] += case[Number.DAMPING] * h / 6 * squares
+    now[Now.VISCOUS] += case[Number.DAMPING] * dt / 6 * squares
     now[Now.FRICTION] += case[Number.MOBILITY] * work
     energy = 0.5 * (end * end + case[Number.STIFFNESS] * now[Now.SLIDE] * now[Now.SLIDE])
     now[Now.STORED] = max(now[Now.STORED], energy)
 
 
 @njit(**NJIT_KERNEL)
-def find_turn(h, value, rate, last_value, last):
+def find_turn(dt, value, rate, last_value, last):
     """Return the extreme of a cubic in a step, where its rate, a parabola, is 0.
 
     The rates at both ends differ in sign.
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     value, rate : float
         Value [m] and its rate [m/s] at the start of the step.
     last_value, last : float
         The same at its end.
     """
-    middle = 1.5 * (last_value - value) / h - 0.25 * (rate + last)
+    middle = 1.5 * (last_value - value) / dt - 0.25 * (rate + last)
     slope = 4 * middle - 3 * rate - last
     bend = 2 * (rate + last) - 4 * middle
     # The root between the ends, without a difference of large numbers
@@ -467,16 +474,16 @@ def find_turn(h, value, rate, last_value, last):
         part = -0.5 * sum_ / bend if bend != 0 else 0.5
     if not 0 <= part <= 1:
         part = rate / (rate - last)
-    return value + h * part * (rate + part * (slope / 2 + part * bend / 3))
+    return value + dt * part * (rate + part * (slope / 2 + part * bend / 3))
 
 
 @njit(**NJIT_KERNEL)
-def observe_extremes(h, start, now, seen, observes):
-    """Update the extremes of the slide in the cycle, and the friction forces there.
+def observe_extremes(dt, start, now, seen, observes):
+    """Update the extremes of the slide in the cycle (`Now.MIN`, `Now.MAX`), and the friction forces there in `seen`.
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
@@ -492,7 +499,7 @@ def observe_extremes(h, start, now, seen, observes):
 
     # The law "tanh" has no force at a reversal.
     if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
-        q = find_turn(h, start[0], start[1], q, now[Now.VELOCITY])
+        q = find_turn(dt, start[0], start[1], q, now[Now.VELOCITY])
         force = now[Now.TURN_FORCE] if now[Now.EVENT] >= 0 else 0.0
 
     if q > now[Now.MAX]:
@@ -548,12 +555,12 @@ def find_parabola_extreme(first, middle, last):
 
 
 @njit(**NJIT_KERNEL)
-def observe_acceleration(waves, h, is_steep, case, start, now, seen):
-    """Update the largest acceleration by that of a step.
+def observe_acceleration(waves, dt, is_steep, case, start, now, seen):
+    """Update the largest acceleration of the output, `Seen.MAX_ACCELERATION` [m s-2], by that of a step.
 
     Without an event it is the extreme of the parabola through both ends and the middle of the step. At an event, where the
     point stops, reverses or is released (`Now.EVENT`), the velocity is 0 and the force may jump, so that the accelerations
-    before and after it count. The slide there is taken from the end of the step, which differs by O(h^2), because the
+    before and after it count. The slide there is taken from the end of the step, which differs by O(dt^2), because the
     velocity is 0 at the event. The force of the law "tanh" may bend too sharply for a parabola in a shortest step, and where
     the velocity changes its sign without an event; the value at the end counts there.
 
@@ -561,7 +568,7 @@ def observe_acceleration(waves, h, is_steep, case, start, now, seen):
     ----------
     waves : tuple of float
         Sines of the drive at the start, in the middle and at the end of the step.
-    h : float
+    dt : float
         Duration of the step [s].
     is_steep : bool
         Whether it is a shortest step of the law "tanh".
@@ -585,21 +592,23 @@ def observe_acceleration(waves, h, is_steep, case, start, now, seen):
         peak = max(peak, abs(before), abs(after))
     elif start[1] * v >= 0 and not is_steep:
         first = find_acceleration(waves[0], start[0], start[1], start[2], case)
-        at = find_middle(h, start, now)
+        at = find_middle(dt, start, now)
         middle = find_acceleration(waves[1], at.slide, at.velocity, at.force, case)
         peak = find_parabola_extreme(first, middle, last)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
 
 
 @njit(**NJIT_KERNEL)
-def observe_harmonics(time, h, omega, start, now, seen):
-    """Add the integrals of slide and force, a cubic and a parabola in the step, by Gauss's rule with three points.
+def observe_harmonics(time, dt, omega, start, now, seen):
+    """Add the integrals of slide and force times cos and sin (COS_1 to FORCE_SIN_3, LAST_MEAN) over a step to `seen`.
+
+    Slide and force are a cubic and a parabola in the step, which Gauss's rule with three points integrates.
 
     Parameters
     ----------
     time : float
         Time at the start of the step [s].
-    h : float
+    dt : float
         Duration of the step [s].
     omega : float
         Circular frequency of the drive [rad/s].
@@ -618,13 +627,13 @@ def observe_harmonics(time, h, omega, start, now, seen):
     # Gauss points: the slide is the cubic Hermite polynomial of the step, with cos 3x = 4 cos^3 x - 3 cos x
     for k in range(3):
         s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
-        weight = h * (4 / 9 if k == 1 else 5 / 18)
+        weight = dt * (4 / 9 if k == 1 else 5 / 18)
         rest = 1 - s
         value = start[0] + s * s * (3 - 2 * s) * (q - start[0])
-        value = weight * (value + h * s * rest * (rest * start[1] - s * v))
+        value = weight * (value + dt * s * rest * (rest * start[1] - s * v))
         force = weight * (start[2] + s * (now[Now.FORCE] - start[2]) + bend * s * rest)
-        c = cos(omega * (time + s * h))
-        w = sin(omega * (time + s * h))
+        c = cos(omega * (time + s * dt))
+        w = sin(omega * (time + s * dt))
         seen[Seen.COS_1] += value * c
         seen[Seen.SIN_1] += value * w
         seen[Seen.FORCE_COS_1] += force * c
@@ -632,12 +641,14 @@ def observe_harmonics(time, h, omega, start, now, seen):
         seen[Seen.FORCE_COS_3] += force * c * (4 * c * c - 3)
         seen[Seen.FORCE_SIN_3] += force * w * (3 - 4 * w * w)
         seen[Seen.LAST_MEAN] += value
-    seen[Seen.SPAN] += h
+    seen[Seen.SPAN] += dt
 
 
 @njit(**NJIT_KERNEL)
 def add_stick(angle, turn, speeds, first, last, mean, seen):
-    """Add the phase during which less than half of the motion is irreversible, in a piece without reversal.
+    """Add the phase of stick in a piece without reversal to `Seen.STUCK`, and a start of slip to STARTS and its phases.
+
+    A point sticks while less than half of its motion is irreversible.
 
     Parameters
     ----------
@@ -650,6 +661,7 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
     seen : (29,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
+    # A point counts as stuck while less than half of its motion is irreversible.
     first = abs(first)
     last = abs(last)
     sticks = first < 0.5
@@ -664,6 +676,7 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
         if abs(last - first) > MIN_SHARE_JUMP:
             crossing = (last - mean) / (last - first)
         crossing = min(max(crossing, 0.0), 1.0)
+
         # From the part of the path to that of the time, with a linear velocity
         v = speeds[0]
         crossing *= (v + speeds[1]) / (v + sqrt(v * v + crossing * (speeds[1] * speeds[1] - v * v)))
@@ -678,7 +691,7 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
 
 @njit(**NJIT_KERNEL)
 def observe_stick(angle, turn, share, start, now, seen):
-    """Add the phase of stick in a step.
+    """Add the phase of stick in a step, which is divided at its event, to `seen`.
 
     Parameters
     ----------
@@ -714,7 +727,7 @@ def observe_stick(angle, turn, share, start, now, seen):
 
 
 @njit(**NJIT_KERNEL)
-def find_largest_force(h, start, now, numbers, j, load):
+def find_largest_force(dt, start, now, numbers, j, load):
     """Return the largest magnitude of the force in a step.
 
     The force is smooth in the step if it follows the velocity, or holds a rigid point at rest, which is released at the
@@ -722,7 +735,7 @@ def find_largest_force(h, start, now, numbers, j, load):
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
@@ -737,7 +750,7 @@ def find_largest_force(h, start, now, numbers, j, load):
     """
     law = numbers[0, j]
     force = now[Now.FORCE]
-    middle = find_middle(h, start, now)
+    middle = find_middle(dt, start, now)
     if law == Law.TANH:
         speed = find_parabola_extreme(start[1], middle.velocity, now[Now.VELOCITY])
         return numbers[1, j] * load * tanh(speed / numbers[2, j])
@@ -749,12 +762,12 @@ def find_largest_force(h, start, now, numbers, j, load):
 
 
 @njit(**NJIT_KERNEL)
-def observe_forces(h, work, share, start, now, numbers, j, load, seen):
-    """Add the extremes of force and slip, and the friction work.
+def observe_forces(dt, work, share, start, now, numbers, j, load, seen):
+    """Add the extremes of force and slip and the friction work of a step to MAX_FORCE, MIN_SLIP, MAX_SLIP, WORK of `seen`.
 
     Parameters
     ----------
-    h : float
+    dt : float
         Duration of the step [s].
     work : float
         Friction work of the step [J].
@@ -774,14 +787,14 @@ def observe_forces(h, work, share, start, now, numbers, j, load, seen):
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     dq = now[Now.SLIDE] - start[0]
-    force = find_largest_force(h, start, now, numbers, j, load)
+    force = find_largest_force(dt, start, now, numbers, j, load)
 
     # The irreversible slide turns inside the step where its velocity changes the sign.
     slip = now[Now.SLIP]
     first = seen[Seen.SHARE] * start[1]
     last = share * now[Now.VELOCITY]
     if first * last < 0:
-        slip = find_turn(h, start[3], first, slip, last)
+        slip = find_turn(dt, start[3], first, slip, last)
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], force)
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
     seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
@@ -866,6 +879,9 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     )
     level = 0
     tick = 0
+
+    # A cycle begins at the phase 0 of the drive. `turn_level` is the level of the half step to which half_sine and
+    # half_cosine belong.
     sine = 0.0
     cosine = 1.0
     turn_level = -1
@@ -876,40 +892,41 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     seen[Seen.FORCE_AT_MIN] = seen[Seen.FORCE_AT_MAX] = nan
     while tick < steps * TICKS:
         size = TICKS >> level
-        h = step / (1 << level)
+        dt = step / (1 << level)
         time = tick * (step / TICKS)
         # Sines and cosines by rotation over half steps; each cycle begins with exact ones.
         if level != turn_level:
-            half_sine = sin(0.5 * omega * h)
-            half_cosine = cos(0.5 * omega * h)
+            half_sine = sin(0.5 * omega * dt)
+            half_cosine = cos(0.5 * omega * dt)
             turn_level = level
         middle_sine = sine * half_cosine + cosine * half_sine
         middle_cosine = cosine * half_cosine - sine * half_sine
         drive = sine, middle_sine, middle_sine * half_cosine + middle_cosine * half_sine
         start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
         halvings = try_step(
-            drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
+            drive, dt, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
         )
         if halvings > 0:
             level = min(level + halvings, LEVELS)
             continue
 
+        # Energies, and the integrals of the slide times cos and sin of the drive by the trapezoidal rule
         find_force(drive[2], case, now, numbers, memory, j)
-        work = find_work(h, numbers[0, j], start, now)
-        add_energies(drive, h, work, case, start, now)
+        work = find_work(dt, numbers[0, j], start, now)
+        add_energies(drive, dt, work, case, start, now)
         last_cosine = cosine
         sine = drive[2]
         cosine = middle_cosine * half_cosine - middle_sine * half_sine
-        now[Now.COS] += 0.5 * h * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
-        now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * sine)
-        observe_extremes(h, start, now, seen, observes)
+        now[Now.COS] += 0.5 * dt * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
+        now[Now.SIN] += 0.5 * dt * (start[0] * drive[0] + now[Now.SLIDE] * sine)
+        observe_extremes(dt, start, now, seen, observes)
         if observes:
             share = slip_share(numbers, memory, j, case[Number.LOAD], now[Now.VELOCITY])
-            observe_forces(h, work, share, start, now, numbers, j, case[Number.LOAD], seen)
+            observe_forces(dt, work, share, start, now, numbers, j, case[Number.LOAD], seen)
             is_steep = numbers[0, j] == Law.TANH and level == LEVELS
-            observe_acceleration(drive, h, is_steep, case, start, now, seen)
-            observe_harmonics(time, h, omega, start, now, seen)
-            observe_stick(omega * time, omega * h, share, start, now, seen)
+            observe_acceleration(drive, dt, is_steep, case, start, now, seen)
+            observe_harmonics(time, dt, omega, start, now, seen)
+            observe_stick(omega * time, omega * dt, share, start, now, seen)
         tick += size
         if level > 0 and tick % (2 * size) == 0:
             level -= 1

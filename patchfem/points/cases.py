@@ -79,7 +79,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
-    compiled.load("points.case_kernels").march_cases(
+    compiled.load_compiled_module("points.case_kernels").march_cases(
         steps, make_responses(columns, steps), cases.parameters, cases.numbers,
         cases.memory.copy(), now, seen, history,
     )  # fmt: skip
@@ -198,7 +198,15 @@ def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
 
 
 def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
-    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration.
+    """Return the measures that follow from the first and third harmonics of slide, force and acceleration.
+
+    Over a window of whole cycles, the integral of q'' exp(-i w t) is [q'] + i w ([q] + i w Q) with the integral Q of
+    q exp(-i w t), where [x] is the change of x over the window (integration by parts). At w = 3 omega the drive has no part,
+    so that Q follows from the integral F of the force by the equation of motion q'' + c q' + k q = drive - mobility F:
+
+        Q (k + i w (i w + c)) = -mobility F - [q'] - (i w + c) [q].
+
+    The acceleration of the base, a sin(omega t), has the integral -i a span/2.
 
     Parameters
     ----------
@@ -216,39 +224,44 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, 
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
     span = seen[:, Seen.SPAN]
-    drive = 0.5 * span
+    base = -0.5j * span * columns[Number.BASE]
     q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
     v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
 
-    # Integrals of slide, force and accelerations times exp(-i omega t) and exp(-3 i omega t); the slide of the third
-    # harmonic follows from the force by the equation of motion.
+    # Integrals of slide, force and relative acceleration times exp(-i omega t)
     slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
     force = seen[:, Seen.FORCE_COS_1] - 1j * seen[:, Seen.FORCE_SIN_1]
-    first = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
-    turn = 3j * omega
-    push = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
-    push = -columns[Number.MOBILITY] * push - v_jump - (turn + columns[Number.DAMPING]) * q_jump
-    stiffness = columns[Number.STIFFNESS] + turn * (turn + columns[Number.DAMPING])
-    third = v_jump + turn * (q_jump + turn * push / stiffness)
+    acceleration_1 = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
 
+    # The same of exp(-3 i omega t), with the slide from the force
+    w = 3j * omega
+    force_3 = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
+    damping = columns[Number.DAMPING]
+    load_3 = -columns[Number.MOBILITY] * force_3 - v_jump - (w + damping) * q_jump
+    slide_3 = load_3 / (columns[Number.STIFFNESS] + w * (w + damping))
+    acceleration_3 = v_jump + w * (q_jump + w * slide_3)
+
+    # Amplitudes of the absolute acceleration of the output: an integral over the window is span/2 times the amplitude.
     ratio = columns[Number.OUTPUT]
-    fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
+    fundamental = np.abs(ratio * acceleration_1 + base) * 2 / span
     count = np.maximum(seen[:, Seen.N_CYCLES], 1)
     half_range = seen[:, Seen.RANGE] / count / 2
 
     # Stiffness and damping of a point that hardly moves are NaN.
     n_secants = seen[:, Seen.N_SECANTS]
     moves = slide_range > MIN_SLIDE_RANGE
-    damping = area / (2 * np.pi * cases.reference * half_range**2)
+    loss = area / (2 * np.pi * cases.reference * half_range**2)
     is_known = moves & (cases.reference > 0)
     return {
         "absolute_acceleration_fundamental": fundamental,
         "acceleration_distortion": np.where(
-            fundamental > MIN_ACCELERATION, np.abs(ratio * third) * 2 / span / fundamental, np.nan
+            fundamental > MIN_ACCELERATION,
+            np.abs(ratio * acceleration_3) * 2 / span / fundamental,
+            np.nan,
         ),
         "harmonic_force_ratio": np.abs(force / slide),
         "equivalent_stiffness": np.where(moves, (force / slide).real, np.nan),
-        "equivalent_damping": np.where(is_known, damping, np.nan),
+        "equivalent_damping": np.where(is_known, loss, np.nan),
         "secant_stiffness": np.where(
             moves & (n_secants > 0), seen[:, Seen.SECANT] / n_secants, np.nan
         ),

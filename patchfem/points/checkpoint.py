@@ -28,7 +28,7 @@ MAX_WRITE_FRACTION = 0.02  # largest fraction of the elapsed time that is spent 
 MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
-MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums", "work_sums")
+MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums")
 RECORD_STATE = ("early", "stride", "recent", "energies", "before")
 _FILES = ContextVar("checkpoint_files", default=None)
 

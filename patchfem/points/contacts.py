@@ -5,35 +5,23 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..exceptions import PatchfemError
 from ..friction.bonds.parameters import Bonds
 from ..friction.grooves import Grooves
-from ..friction.protocol import Element
+from ..friction.record import make_law
 from .law_rows import Law
 from .laws import (
-    N_MEMORY,
-    N_NUMBERS,
     PointLaw,
     make_bonds,
-    make_coulomb,
     make_cubic,
     make_interlocking,
     make_jenkins,
     make_list,
-    make_sliders,
-    make_tanh,
+    make_point_law,
 )
 from .march_rows import LOWER
 
 if TYPE_CHECKING:
     from ..contact.contact_sets import ContactSets
-
-# Law of the elements of a single number of memory, by the module of their kernels
-FLOW_LAWS = {
-    "friction.laws.tanh_kernels": Law.TANH,
-    "friction.laws.bouc_wen_kernels": Law.BOUC_WEN,
-    "friction.laws.lugre_kernels": Law.LUGRE,
-}
 
 
 class BondSum(NamedTuple):
@@ -120,76 +108,26 @@ class Contact:
         return any(part is not None for part in parts)
 
 
-def convert_element(element: Element) -> PointLaw:
-    """Return the points of a law of one contact under a constant load.
-
-    Parallel elements become one point each, a density of sliders or bonds at points of equal slide a single point.
-    """
-    numbers = element.numbers
-    if element.form == "rigid":
-        return make_coulomb(numbers[1], numbers[2])
-    if element.density:
-        return make_sliders(element.limit, *element.density)
-    if element.form == "parallel":
-        stiffness, length = np.split(numbers[2:], 2)
-        return make_jenkins(stiffness * length, length)
-
-    rows = np.zeros(N_NUMBERS)
-    memory = np.zeros(N_MEMORY)
-    if element.form == "points":
-        # Points of equal slide and a density of 1 per load are one point.
-        limit = numbers[1] * numbers[2]
-        rows[:9] = (Law.BONDS, limit, numbers[2], *numbers[3:8], element.memory[1])
-        memory[:4] = element.memory[:4]
-        return PointLaw(rows, memory, 1.0)
-
-    if element.kernels in FLOW_LAWS:
-        rows[0] = FLOW_LAWS[element.kernels]
-        rows[1 : numbers.size] = numbers[1:]
-        if rows[0] == Law.TANH:
-            rows[2] = 1 / numbers[2]
-        return PointLaw(rows, memory, 1.0)
-    raise PatchfemError(
-        f"a bench and time steps need the return map of a law, which {element.kernels} lacks; add it to "
-        "points/return_maps_kernels.py, or compute a rig with another method"
-    )
-
-
-def make_contact(elements, rows, springs=(), scale: float = 0.0) -> Contact:
+def make_contact(laws, rows, springs=(), scale: float = 0.0, length: float = 0.0) -> Contact:
     """Return interfaces under constant loads, and springs.
 
     Parameters
     ----------
-    elements : sequence of friction.protocol.Element
-        Law of each interface.
+    laws : sequence of PointLaw
+        Law of each interface under its load.
     rows : (i, n) array
         Slide of each interface per modal coordinate.
     springs : sequence of PointSet
         Springs of the rig, each with its row.
     scale : float
         Force by which residuals are measured where there is no friction [N].
+    length : float
+        Elastic length of the first interface [m].
     """
-    point_sets = [PointSet(convert_element(one), row) for one, row in zip(elements, rows)]
-    limit = sum(one.limit for one in elements)
-    length = elements[0].length if elements else 0.0
+    point_sets = [PointSet(law, row) for law, row in zip(laws, rows)]
+    # The first number of a law is its friction limit per newton of load.
+    limit = sum(float(np.sum(law.numbers[1] * law.load)) for law in laws)
     return Contact([*point_sets, *springs], limit or scale, length)
-
-
-def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact:
-    """Return parallel elastic-plastic elements on one interface.
-
-    Parameters
-    ----------
-    stiffness, yield_slide : (t,) array
-        Stiffnesses [N/m] and slides at which the elements yield [m].
-    row : (n,) array
-        Slide per modal coordinate.
-    elements : slip.shear_modes.JenkinsSet, optional
-        Elements of a patch.
-    """
-    limits = np.multiply(stiffness, yield_slide)
-    points = PointSet(make_jenkins(limits, np.asarray(yield_slide, float)), row)
-    return Contact([points], float(limits.sum()), elements=elements)
 
 
 def make_cubic_spring(stiffness: float, row) -> PointSet:
@@ -287,11 +225,7 @@ def make_pressed_contact(
     # Laws of the resultant make one point of the whole interface.
     elif law.law in ("coulomb", "tanh"):
         nodes = None
-        kinetic = law.static if law.kinetic is None else law.kinetic
-        if law.law == "coulomb":
-            points = make_coulomb(law.static, kinetic, loads.sum())
-        else:
-            points = make_tanh(law.static, law.reference_speed, loads.sum())
+        points = make_point_law(law.law, make_law(law), loads.sum())
     else:
         length = law.bond_length or 0.0
         points = make_jenkins(law.static, length, loads)

@@ -25,7 +25,10 @@ def find_slope(flank, q):
 
 @njit(**NJIT_CALL)
 def climb(flank, q, dq, dt):
-    """Write mean slope, path ratio and vertical force of a trial increment dq [m] from the slide q [m].
+    """Write SLOPE, RATIO and TRIAL_VERTICAL of a trial increment dq [m] from the slide q [m] to the flank.
+
+    They are the means dz/dq and ds/dq over the increment, and the vertical force V [N]; the mean rise speed over the step is
+    dz/dt, so that the speed of the lifted mass at its end is twice this less that at the start.
 
     Parameters
     ----------

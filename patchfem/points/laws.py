@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import MIN_LOAD, PatchfemError
 from ..friction.bonds.parameters import Bonds, growth_numbers
-from ..friction.laws.iwan import max_yield_displacement
 from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
@@ -14,7 +14,13 @@ N_MEMORY = 6  # rows of memory of a point, without a stack of reversals
 # decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
 REVERSALS = 512
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
-MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
+# Number of each law whose rows are attributes of the law of `friction.laws`, and these attributes in the order of the rows
+PLAIN_LAWS = {
+    "coulomb": (Law.COULOMB, "static kinetic"),
+    "tanh": (Law.TANH, "static speed"),
+    "bouc-wen": (Law.BOUC_WEN, "static length exponent shape"),
+    "lugre": (Law.LUGRE, "static kinetic stiffness speed micro_damping viscous"),
+}
 
 
 class PointLaw(NamedTuple):
@@ -61,6 +67,17 @@ def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
     return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
 
 
+def make_elements(stiffness, yield_slide) -> PointLaw:
+    """Return t parallel elastic-plastic elements, a point each.
+
+    Parameters
+    ----------
+    stiffness, yield_slide : (t,) array
+        Stiffnesses [N/m] and slides at which the elements yield [m].
+    """
+    return make_jenkins(np.multiply(stiffness, yield_slide), np.asarray(yield_slide, float))
+
+
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
     """Return a rigid point with static and kinetic friction.
 
@@ -102,7 +119,7 @@ def make_list(bonds: Bonds, load: float) -> PointLaw:
     return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
 
 
-def make_sliders(limit, length, order, beta, load: float = 1.0) -> PointLaw:
+def make_sliders(limit, length, order, beta) -> PointLaw:
     """Return parallel sliders of Segalman's density (`friction.laws.iwan`) under a constant load.
 
     Parameters
@@ -113,12 +130,10 @@ def make_sliders(limit, length, order, beta, load: float = 1.0) -> PointLaw:
         Displacement phi_max [m] at which they do.
     order, beta : float or (c,) array
         Exponent chi + 1 of the density, and weight of the last slider.
-    load : float or (c,) array
-        Normal load [N].
     """
     memory = (*(0.0,) * Masing.VIRGIN, 1.0)
     size = Masing.STACK + 2 * REVERSALS
-    return _pack(Law.MASING, (limit, length, order, beta), memory, load, size)
+    return _pack(Law.MASING, (limit, length, order, beta), memory, n_memory=size)
 
 
 def make_cubic(stiffness: float) -> PointLaw:
@@ -131,45 +146,34 @@ def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     return _pack(Law.INTERLOCK, (stiffness, wavelength))
 
 
-def make_point_law(friction, load) -> PointLaw:
-    """Return the law that the keys of a table [friction] define, under a load [N].
-
-    Bonds of the law "nonlocal" do not grow.
+def make_point_law(name: str, law, load) -> PointLaw:
+    """Return a friction law in the form of a contact point under a load [N].
 
     Parameters
     ----------
-    friction : table
-        Keys in SI units; floats, or arrays (c,) of the values of c points.
-    load : float or (c,)
+    name : str
+        Name of the law, `friction.law`.
+    law : friction law per newton of load, or friction.bonds.parameters.Bonds
+        Law as `friction.record.make_law` returns it. Its numbers are floats, or arrays (c,) of the values of c points.
+    load : float or (c,) array
         Normal load [N].
+
+    Raises
+    ------
+    PatchfemError
+        If the law has no return map.
     """
-    name = friction.law
     load = np.maximum(load, MIN_LOAD)
-    limit = friction.static * load
-    kinetic = getattr(friction, "kinetic", None)
-    kinetic = friction.static if kinetic is None else kinetic
-
-    if name == "coulomb":
-        return make_coulomb(friction.static, kinetic, load)
-    if name == "tanh":
-        return make_tanh(friction.static, friction.reference_speed, load)
-    if name == "elastic-plastic":
-        has_length = friction.bond_length is not None
-        length = friction.bond_length if has_length else limit / friction.stiffness
-        return make_jenkins(friction.static, length, load)
-
     if name == "nonlocal":
-        return make_bonds(Bonds(friction.static, friction.bond_length), load)
-
+        return make_bonds(law, load)
+    if name == "elastic-plastic":
+        return make_jenkins(law.static, law.length, load)
     if name == "iwan":
-        length = max_yield_displacement(limit, friction.stiffness, friction.chi, friction.beta)
-        return make_sliders(limit, length, friction.chi + 1, friction.beta, load)
-    if name == "bouc-wen":
-        length = limit / friction.stiffness
-        numbers = (friction.static, length, friction.exponent, friction.shape)
-        return _pack(Law.BOUC_WEN, numbers, load=load)
-
-    # The kernels multiply stiffness and damping by the present load.
-    per_load = (friction.stiffness / load, kinetic, friction.static, friction.stribeck_speed)
-    damping = (friction.micro_damping / load, friction.viscous / load)
-    return _pack(Law.LUGRE, (*per_load, *damping), load=load)
+        return make_sliders(law.static * load, law.phi_max, law.chi + 1, law.beta)
+    if name not in PLAIN_LAWS:
+        raise PatchfemError(
+            f"a bench and time steps need the return map of a law, which '{name}' lacks; add it to "
+            "points/return_maps_kernels.py, or compute a rig with another method"
+        )
+    number, names = PLAIN_LAWS[name]
+    return _pack(number, [getattr(law, one) for one in names.split()], load=load)

@@ -1,8 +1,8 @@
 """Points whose bonds are summed over a list (eq. 2.17 for any order and reading), for the march (compiled).
 
 `lists` is a `friction.bonds.list_rows_kernels.BondLists`. Its pressures are loads [N], so that its forces and energies are
-those of a point per unit of mu_s, which is numbers[1, j]. A bond keeps the load under which it formed; a point that lifts
-off loses its bonds with the energy that they store.
+those of a point per unit of mu_s, which is numbers[1, j]. `values` has the rows of `march_rows.Point`. A bond keeps the
+load under which it formed; a point that lifts off loses its bonds with the energy that they store.
 """
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_NO_REFCOUNT
@@ -43,7 +43,9 @@ def press_list(lists, j, load):
 
 @njit(**NJIT_CALL)
 def write_list_mean(numbers, values, lists, j, dt):
-    """Write the mean force of point j over its slide, and the slope of that force.
+    """Write the mean force of point j over its slide `Point.SLIDE` to `Point.FORCE` [N], its slope to BY_SLIDE [N/m].
+
+    The slope is that of the list, or the secant from the last trial of Newton's method (TRIAL_SLIDE, TRIAL_FORCE).
 
     Parameters
     ----------
@@ -62,6 +64,8 @@ def write_list_mean(numbers, values, lists, j, dt):
     status = bonds.status
     dq = values[Point.SLIDE, j]
     values[Point.BY_VELOCITY, j] = 0.0
+
+    # A point without bonds and without load has no force.
     is_empty = status[STATUS.head] == status[STATUS.end]
     if is_empty and status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0:
         values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = 0.0

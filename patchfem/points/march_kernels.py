@@ -9,24 +9,30 @@ for the shear coordinates b of the pieces. These are the conditions of the minim
 
     (dq - free)^T C^-1 (dq - free)/2 + sum of the work of the points + kappa (b db + db^2/4),
 
-which Newton's method with a line search finds. It is convex unless the force of a point falls with its slide. Normal
-contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts half
-before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave them
-out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change of db
-instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
+with the vector free of the increments free_p without forces, the compliances C and G of the modes in a step (`Ports`),
+the forces f of the points, and the stiffness kappa and the slides shapes of the points per shear coordinate (`Points`).
+Newton's method with a line search finds the minimum. The potential is convex unless the force of a point falls with its
+slide. Normal contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing
+load acts half before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would
+leave them out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the
+change of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
 point at rest is released, is halved up to the last level. The constant force of a step lets a held port move and come
 back. The work of this motion is taken from that of the drive, as friction at rest does none. Friction without memory
 (rigid or tanh) would also gain energy where a port reverses and moves back in one step. Such a step is halved too, so
 that no law creates energy.
+
+`system` is the `march_rows.System` of all arrays. Their rows are named by enumerations of `march_rows`: `Point` for values
+of the points, `Port` for the places where the points act on the modes, `Shear` for the pieces, `Flank` for grooves. A
+step of level k lasts a whole step over 2^k.
 """
 
 import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
-from ..contact.set_arrays import PRESENT_SLOT, REFERENCE_LOAD, REFERENCE_MOMENT
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
 from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
@@ -169,7 +175,10 @@ def is_held(points, p):
 
 @njit(**NJIT_CALL)
 def move_freely(system, level, drive, row, fraction):
-    """Write the motion at the end of a step without interface forces, and that of the ports.
+    """Compute the motion in a step without interface forces: row 1 of `system.state`, and four rows of `Port`.
+
+    SLIDE and VELOCITY are those of a port at the start of the step, FREE its increment [m] and FREE_VELOCITY its velocity
+    [m/s] at the end without forces. If the displacement of port 0 is prescribed, these are the prescribed ones.
 
     Parameters
     ----------
@@ -219,8 +228,11 @@ def move_freely(system, level, drive, row, fraction):
 
 
 @njit(**NJIT_CALL)
-def prepare_points(system, h):
-    """Press the trial memory of the points to the loads in the middle of the step."""
+def prepare_points(system, dt):
+    """Set the trial memory of the points for a step of `dt` [s]: loads and bond lengths are those in its middle.
+
+    `Point.LOAD` becomes the mean of the loads at both ends, so that half of a change of load acts before the slide.
+    """
     points = system.points
     values = points.values
     options = system.options
@@ -241,13 +253,15 @@ def prepare_points(system, h):
     # The length of bonds grows before they carry the force of the step.
     for j in range(count):
         v = system.ports.values[Port.VELOCITY, points.port[j]]
-        prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
+        prepare(points.numbers, points.trial, j, Step(0.0, dt, v, v, 0.0))
 
 
 @njit(**NJIT_CALL)
-def write_forces(system, level, h):
-    """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
+def write_forces(system, level, dt):
+    """Compute increments and mean forces of ports and points under the assumed port forces `Port.FORCE`.
 
+    With the compliances C and G the port p moves by INCREMENT = FREE_p - sum_k C_pk F_k, and ends with the velocity
+    FREE_VELOCITY_p - sum_k G_pk F_k. SUM, BY_SLIDE and BY_VELOCITY are the forces of its points and their derivatives.
     The forces of rigid points at rest are not known here.
 
     Parameters
@@ -256,7 +270,7 @@ def write_forces(system, level, h):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    h : float
+    dt : float
         Duration of the step [s].
     """
     ports = system.ports
@@ -278,9 +292,9 @@ def write_forces(system, level, h):
         moves[Port.INCREMENT, p] = dq
         moves[Port.END_VELOCITY, p] = v
     if flank.size:
-        flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], h)
+        flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], dt)
 
-    # Slides of the points.
+    # Slides of the points: along the flank of a groove, less the shear of the pieces.
     for p in range(n_ports):
         slide = moves[Port.INCREMENT, p]
         slide *= flank[Flank.RATIO] if flank.size and p == 0 else 1.0
@@ -290,7 +304,7 @@ def write_forces(system, level, h):
         for j in range(count):
             values[Point.SLIDE, j] -= sum_products(points.shapes[:, j], points.shear[Shear.TRIAL])
 
-    write_point_forces(system, level, h)
+    write_point_forces(system, level, dt)
 
     for p in range(n_ports):
         force = 0.0
@@ -309,7 +323,7 @@ def write_forces(system, level, h):
         flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
         ratio = flank[Flank.RATIO]
         vertical = flank[Flank.TRIAL_VERTICAL] * flank[Flank.SLOPE]
-        stiffness = flanks.find_stiffness(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], h)
+        stiffness = flanks.find_stiffness(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], dt)
         moves[Port.SUM, 0] = vertical + ratio * moves[Port.SUM, 0]
         moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
         moves[Port.BY_VELOCITY, 0] *= ratio
@@ -319,8 +333,8 @@ def write_forces(system, level, h):
 
 
 @njit(**NJIT_CALL)
-def write_point_forces(system, level, h):
-    """Write the mean forces of the points of any law, and their slopes.
+def write_point_forces(system, level, dt):
+    """Compute the mean force FORCE [N] of each point, and its derivatives BY_SLIDE [N/m] and BY_VELOCITY [N s/m].
 
     Parameters
     ----------
@@ -328,7 +342,7 @@ def write_point_forces(system, level, h):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    h : float
+    dt : float
         Duration of the step [s].
     """
     ports = system.ports
@@ -337,7 +351,7 @@ def write_point_forces(system, level, h):
 
     for j in range(points.port.size):
         if points.numbers[0, j] == Law.LIST:
-            lists.write_list_mean(points.numbers, values, system.lists, j, h)
+            lists.write_list_mean(points.numbers, values, system.lists, j, dt)
             continue
 
         # Bonds depend on the slide alone; without the step of other laws a patch takes a tenth less time.
@@ -359,7 +373,7 @@ def write_point_forces(system, level, h):
 
         step = Step(
             values[Point.SLIDE, j],
-            h,
+            dt,
             ports.values[Port.VELOCITY, p],
             ports.values[Port.END_VELOCITY, p],
             ports.compliance[level, 1, p, p],
@@ -371,8 +385,10 @@ def write_point_forces(system, level, h):
 
 
 @njit(**NJIT_CALL)
-def write_residual(system, level, h):
-    """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance.
+def write_residual(system, level, dt):
+    """Compute the residuals [N] of port forces and shear coordinates; return the largest one over its tolerance.
+
+    `ports.vector` receives first the residuals of the ports, then those of the shear coordinates.
 
     Parameters
     ----------
@@ -380,7 +396,7 @@ def write_residual(system, level, h):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    h : float
+    dt : float
         Duration of the step [s].
     """
     ports = system.ports
@@ -403,7 +419,7 @@ def write_residual(system, level, h):
         slides = moves[Port.SLIDE]
         normal.path_mean(
             system.sets,
-            system.sets.counters[PRESENT_SLOT],
+            system.sets.counters[PRESENT_SLOT_INDEX],
             slides[heave],
             slides[pitch],
             increments[heave],
@@ -434,7 +450,7 @@ def write_residual(system, level, h):
     forces = points.values[Point.FORCE, : points.port.size]
     for k in range(points.stiffness.size):
         increment = shear[Shear.TRIAL, k]
-        change = increment - h * shear[Shear.LAST, k]
+        change = increment - dt * shear[Shear.LAST, k]
         residual = points.stiffness[k] * (shear[Shear.VALUE, k] + 0.5 * increment)
         residual += damping * points.stiffness[k] * change
         residual -= sum_products(points.shapes[k], forces)
@@ -445,7 +461,7 @@ def write_residual(system, level, h):
 
 @njit(**NJIT_CALL)
 def write_matrix(system, level):
-    """Write the Jacobian of the residuals of a step of length h / 2^level to `ports.matrix`.
+    """Write the Jacobian of the residuals of a step of this level to `ports.matrix`.
 
     A force at port k reduces the slide of port p by C_pk and its velocity at the end of the step by G_pk, the compliances
     of the structure. Entry (p, k) is -(df/dq C_pk + df/dv G_pk), summed over the points of port p, less 1 on the diagonal.
@@ -504,7 +520,11 @@ def write_matrix(system, level):
 
 @njit(**NJIT_CALL)
 def find_descent(system, level):
-    """Return the slope of the potential along the present step, which subtracts `ports.step` from the unknowns."""
+    """Return the slope [J] of the potential of the module along Newton's step, which subtracts `ports.step`.
+
+    The derivative of the potential by the port forces is -C r with the residuals r, and that by the shear increments is
+    their residual. A step that decreases the potential has a negative slope.
+    """
     ports = system.ports
     moves = ports.values
     compliance = ports.compliance[level]
@@ -522,7 +542,7 @@ def find_descent(system, level):
 
 @njit(**NJIT_CALL)
 def find_step(system, level):
-    """Write Newton's step; return the slope of the potential along it, which is below 0, or 0 if there is no step.
+    """Write Newton's step to `ports.step`; return the slope of the potential along it, below 0, or 0 without a step.
 
     If the potential rises along the step, because forces fall with the slide, the step is that without such slopes.
     """
@@ -550,8 +570,8 @@ def find_step(system, level):
 
 
 @njit(**NJIT_CALL)
-def take_step(system, level, h, fraction):
-    """Subtract a fraction of the step from the unknowns at its start; return the relative residual.
+def take_step(system, level, dt, fraction):
+    """Subtract a fraction of Newton's step from the unknowns (rows BASE); return the residual over its tolerance.
 
     Parameters
     ----------
@@ -559,7 +579,7 @@ def take_step(system, level, h, fraction):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    h : float
+    dt : float
         Duration of the step [s].
     fraction : float
         Fraction of the step of Newton's method.
@@ -571,13 +591,15 @@ def take_step(system, level, h, fraction):
         ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.step[p]
     for k in range(system.points.stiffness.size):
         shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.step[n_ports + k]
-    write_forces(system, level, h)
-    return write_residual(system, level, h)
+    write_forces(system, level, dt)
+    return write_residual(system, level, dt)
 
 
 @njit(**NJIT_CALL)
-def solve_forces(system, level, h):
-    """Solve the port forces and shear increments by Newton's method; return whether it converged.
+def solve_forces(system, level, dt):
+    """Solve the port forces `Port.FORCE` and shear increments `Shear.TRIAL` by Newton's method; return whether it did.
+
+    It starts from the present values of these rows.
 
     Parameters
     ----------
@@ -585,7 +607,7 @@ def solve_forces(system, level, h):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    h : float
+    dt : float
         Duration of the step [s].
     """
     ports = system.ports
@@ -616,7 +638,7 @@ def solve_forces(system, level, h):
         high = np.inf
         fraction = 1.0
         for _ in range(MAX_CUTS):
-            residual = take_step(system, level, h, fraction)
+            residual = take_step(system, level, dt, fraction)
             slope = find_descent(system, level)
             if residual <= 1.0:
                 return True
@@ -664,10 +686,9 @@ def interpolate_pressure(x, pattern):
 
 @njit(**NJIT_CALL)
 def find_loads(system, row, fraction, is_solved):
-    """Write the loads of the points at the end of a step; return their largest change, -1 without a contact set.
+    """Compute the loads `Point.END_LOAD` [N] at the end of a step; return their largest change, -1 without a contact set.
 
-    `row` and `fraction` are the time at the end of the step in whole steps; `is_solved` says whether the motion of the
-    step is known. The change is relative to the resultant, and 0 for loads that do not follow from the motion.
+    The change is relative to the resultant, and 0 for loads that do not follow from the motion.
 
     Parameters
     ----------
@@ -692,15 +713,17 @@ def find_loads(system, row, fraction, is_solved):
     resultant = 0.0
     if heave >= 0:
         pitch = int(ports.contact[1])
-        h = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
-        t = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -h, t)
+        up = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
+        turn = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
         if slot < 0:
             return -1.0
-        normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
+        normal.press_state(
+            system.sets, slot, -up, turn, values[Point.NODE_FORCE, : system.sets.x.size]
+        )
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD]
-            - normal.compute_energy(system.sets, slot, h, t)[1],
+            system.sets.reference[REFERENCE_LOAD_INDEX]
+            - normal.compute_energy(system.sets, slot, up, turn)[1],
             0.0,
         )
 
@@ -735,7 +758,11 @@ def find_loads(system, row, fraction, is_solved):
 
 @njit(**NJIT_CALL)
 def write_trial(system, level):
-    """Write the state at the end of the step under the port forces, which complete the inputs of the step."""
+    """Write the state at the end of the step under the port forces to row 2 of `system.state`.
+
+    Modes are linear, so it is that without forces plus the responses to the modal forces, which complete the inputs of
+    the step (`Structure.inputs`).
+    """
     response = system.structure.responses[level]
     inputs = system.structure.inputs
     state = system.state
@@ -752,7 +779,9 @@ def write_trial(system, level):
 
 @njit(**NJIT_CALL)
 def find_holds(system, state, drive):
-    """Write the forces of the ports at an instant that hold rigid points at rest.
+    """Write the forces that hold rigid points at rest at an instant, to `Port.HOLD` [N].
+
+    Other ports receive the force of their points and of the normal contact.
 
     Parameters
     ----------
@@ -779,9 +808,11 @@ def find_holds(system, state, drive):
     heave = int(ports.contact[0])
     if heave >= 0:
         pitch = int(ports.contact[1])
-        h = sum_products(ports.rows[heave], state[:n])
-        t = sum_products(ports.rows[pitch], state[:n])
-        energy = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
+        up = sum_products(ports.rows[heave], state[:n])
+        turn = sum_products(ports.rows[pitch], state[:n])
+        energy = normal.compute_energy(
+            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
+        )
         ports.vector[heave] += energy[1]
         ports.vector[pitch] += energy[2]
 
@@ -884,8 +915,12 @@ def find_event(system, drive, is_shortest):
 
 
 @njit(**NJIT_CALL)
-def commit(system, h):
-    """Advance memories, shear coordinates and loads after an accepted step; bring held ports to rest."""
+def commit(system, dt):
+    """Advance memories, shear coordinates and loads after an accepted step of `dt` [s]; bring held ports to rest.
+
+    `Port.FREE` of a port with a rigid point becomes the displacement that is taken back because the point was at rest, and
+    0 for a port that slips.
+    """
     ports = system.ports
     points = system.points
     values = points.values
@@ -901,18 +936,21 @@ def commit(system, h):
         slide = values[Point.SLIDE, j]
         values[Point.TOTAL, j] += slide
         if points.numbers[0, j] == Law.LIST:
-            commit_list(system, j, h)
+            commit_list(system, j, dt)
         elif points.numbers[0, j] == Law.COULOMB:
             is_any_held = is_any_held or points.trial[0, j] == 0
             was_held = is_held(points, p) and points.trial[0, j] == 0
             ports.values[Port.FREE, p] = slide if was_held else 0.0
             values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
             rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
+
         else:
             v0 = ports.values[Port.VELOCITY, p]
             v1 = ports.values[Port.END_VELOCITY, p]
-            step = Step(slide, h, v0, v1, 0.0)
+            step = Step(slide, dt, v0, v1, 0.0)
             advance(points.numbers, points.trial, j, values[Point.LOAD, j], step)
+
+        # The second half of the change of load acts after the slide.
         if options.has_loads:
             if points.node[j] == LOWER:
                 # Bonds keep the pressure under which they formed until their point leaves the pressed area.
@@ -931,7 +969,7 @@ def commit(system, h):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
         shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
         shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
-        shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / h
+        shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / dt
     if options.has_loads and not options.has_lists and points.stiffness.size:
         relax_pieces(system)
 
@@ -939,16 +977,16 @@ def commit(system, h):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
     energy = find_motion_energy(system)
-    if is_any_held and system.sets.counters[PRESENT_SLOT] >= 0:
+    if is_any_held and system.sets.counters[PRESENT_SLOT_INDEX] >= 0:
         return_ports_to_rest(system)
         rest += energy - find_motion_energy(system)
         if ports.contact[0] >= 0:
             press_at_rest(system)
     system.totals[Total.REST] = rest
 
-    # The mean of the rise speed over the step is slope dq/h.
+    # The mean of the rise speed over the step is slope dq/dt.
     if flank.size:
-        rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / h
+        rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / dt
         flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
         flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
         if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
@@ -1029,7 +1067,7 @@ def relax_pieces(system):
 
 
 @njit(**NJIT_CALL)
-def commit_list(system, j, h):
+def commit_list(system, j, dt):
     """Advance the list of bonds of a point over an accepted step.
 
     The growth of bonds needs the velocities v0 and v1 at both ends of the step. Without shear of the pieces they are those
@@ -1041,12 +1079,12 @@ def commit_list(system, j, h):
         Arrays of the march, changed in place.
     j : int
         Number of the point.
-    h : float
+    dt : float
         Duration of the step [s].
     """
     points = system.points
     values = points.values
-    speed = abs(values[Point.SLIDE, j]) / h
+    speed = abs(values[Point.SLIDE, j]) / dt
     v0 = speed
     v1 = speed
     if points.stiffness.size == 0:
@@ -1057,7 +1095,7 @@ def commit_list(system, j, h):
         # Mean speeds hold in the middle of a step. A line through the last two gives the speed at the end of this one.
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
-    if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
+    if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, dt):
         system.totals[Total.IS_FULL] = 1.0
 
 
@@ -1112,8 +1150,8 @@ def find_motion_energy(system):
     if heave >= 0:
         up = sum_products(ports.rows[heave], state[:n])
         turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT], -up, turn)
-        system.sets.counters[PRESENT_SLOT] = slot
+        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
+        system.sets.counters[PRESENT_SLOT_INDEX] = slot
         if slot >= 0:
             energy += normal.compute_energy(system.sets, slot, up, turn)[0]
     return energy
@@ -1157,7 +1195,7 @@ def press_at_rest(system):
     points = system.points
     values = points.values
     n = system.state.shape[1] // 2
-    if system.sets.counters[PRESENT_SLOT] < 0:
+    if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
         return  # the march ends without a contact set
 
     for i in range(2):
@@ -1200,21 +1238,21 @@ def try_step(system, level, row, begin, end, drive):
     bool
         False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
         halved. Then the motion has not advanced. True after a step, and also if no contact set was found, in which case
-        the counter `PRESENT_SLOT` is -1.
+        the counter `PRESENT_SLOT_INDEX` is -1.
     """
     points = system.points
     shear = points.shear
     values = points.values
     options = system.options
     levels = system.structure.responses.shape[0]
-    h = options.step / (1 << level)
+    dt = options.step / (1 << level)
     move_freely(system, level, drive, row, begin)
 
     # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
     moves = system.ports.values
     for k in range(points.stiffness.size):
         rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
-        shear[Shear.TRIAL, k] = h * rate
+        shear[Shear.TRIAL, k] = dt * rate
     if points.stiffness.size and not options.has_lists:
         for p in range(moves.shape[1]):
             force = moves[Port.FORCE, p]
@@ -1234,12 +1272,12 @@ def try_step(system, level, row, begin, end, drive):
         if options.has_loads:
             change = find_loads(system, row, end, count > 0)
             if change < 0:
-                system.sets.counters[PRESENT_SLOT] = -1
+                system.sets.counters[PRESENT_SLOT_INDEX] = -1
                 return True
             if count > 0 and change <= LOAD_RESIDUAL:
                 break
-        prepare_points(system, h)
-        is_solved = solve_forces(system, level, h)
+        prepare_points(system, dt)
+        is_solved = solve_forces(system, level, dt)
         if not options.has_loads:
             break
 
@@ -1247,7 +1285,7 @@ def try_step(system, level, row, begin, end, drive):
     write_trial(system, level)
     is_shortest = level == levels - 1
     if options.has_events and find_event(
-        system, drive[0] + h * (drive[1] + 0.5 * h * drive[2]), is_shortest
+        system, drive[0] + dt * (drive[1] + 0.5 * dt * drive[2]), is_shortest
     ):
         return False
     if not is_solved:
@@ -1255,7 +1293,7 @@ def try_step(system, level, row, begin, end, drive):
             return False
         system.totals[Total.UNSOLVED] += 1
 
-    commit(system, h)
+    commit(system, dt)
     add_energies(system, level)
     return True
 
@@ -1297,7 +1335,7 @@ def add_energies(system, level):
 
 @njit(**NJIT_CALL)
 def write_sample(system, row, sample):
-    """Write a sample of forces and energies at the present state.
+    """Write forces, slips and energies at the present state to a sample; its first 2 n columns stay as they are.
 
     Parameters
     ----------
@@ -1317,7 +1355,8 @@ def write_sample(system, row, sample):
     if system.options.has_events:
         find_holds(system, system.state[0], structure.drive[row, 0])
 
-    # Displacements of the ports; their sums start at 0.
+    # Displacements of the ports. Force and slip of a port are summed over its points from 0, and `ports.vector` is the sum
+    # of the weights of its slips.
     energy = 0.0
     first = size + Sample.PORTS
     n_ports = ports.values.shape[1]
@@ -1345,7 +1384,8 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        # The slip is a mean over the points, weighted by their friction limits.
+        # The slip is a mean over the points, weighted by their friction limits (load times the first number of the law).
+        # A rigid point at rest has no force of its own: it carries the force that holds its port.
         weight = load * points.numbers[1, j]
         if is_held(points, p):
             force = min(max(ports.values[Port.HOLD, p], -weight), weight)
@@ -1355,6 +1395,7 @@ def write_sample(system, row, sample):
         )
         ports.vector[p] += weight
 
+    # A port whose points are all without load does not stick at all.
     for p in range(n_ports):
         if ports.vector[p] > 0:
             sample[first + N_PORT_COLUMNS * p + 1] /= ports.vector[p]
@@ -1367,24 +1408,28 @@ def write_sample(system, row, sample):
         t = flanks.find_slope(flank, q)
         length = np.sqrt(1 + t * t)
         energy += flanks.find_energy(flank, q)
-        # The points know the path along the flank; the slip is the displacement less the stretch along it.
+        # The points know the path along the flank; the slip is the displacement less the stretch along it. The force of
+        # the port is V t + f sqrt(1 + t^2), with the vertical force V and the friction f along the flank.
         stretch = points.values[Point.TOTAL, 0] - sample[first + 1]
         sample[first + 1] = q - stretch / length
         sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
         sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
 
+    # The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
     sample[size + Sample.ENERGY] = energy
     heave = int(ports.contact[0])
     if heave >= 0:
-        h = ports.values[Port.SLIDE, heave]
-        t = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = normal.compute_energy(system.sets, system.sets.counters[PRESENT_SLOT], h, t)
+        up = ports.values[Port.SLIDE, heave]
+        turn = ports.values[Port.SLIDE, int(ports.contact[1])]
+        contact = normal.compute_energy(
+            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
+        )
         reference = system.sets.reference
-        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
-        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
+        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - contact[1], 0.0)
+        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - contact[2]
         sample[size + Sample.CONTACT_ENERGY] = contact[0]
-        sample[size + Sample.HEAVE] = h
-        sample[size + Sample.PITCH] = t
+        sample[size + Sample.HEAVE] = up
+        sample[size + Sample.PITCH] = turn
 
 
 @njit(cache=True, **NJIT_KERNEL)
@@ -1411,7 +1456,7 @@ def march(system, steps, samples):
     ports = system.ports
     size = system.state.shape[1]
     ticks = 1 << (structure.responses.shape[0] - 1)
-    h = system.options.step
+    dt = system.options.step
     level = 0
     if steps == 0 and ports.contact[0] >= 0:
         press_at_rest(system)
@@ -1428,6 +1473,7 @@ def march(system, steps, samples):
         if i == steps:
             break
 
+        # Mean forces of the ports in the whole step; `add_work` sums them over its parts.
         first_column = size + Sample.PORTS + 2
         for p in range(ports.values.shape[1]):
             samples[i, first_column + N_PORT_COLUMNS * p] = 0.0
@@ -1437,7 +1483,7 @@ def march(system, steps, samples):
         tick = 0
         while tick < ticks:
             part = ticks >> level
-            tau = h * tick / ticks
+            tau = dt * tick / ticks
             coefficients = structure.drive[i]
             drive = (
                 coefficients[0] + tau * (coefficients[1] + 0.5 * tau * coefficients[2]),
@@ -1447,7 +1493,7 @@ def march(system, steps, samples):
             if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
                 level += 1
                 continue
-            if system.sets.counters[PRESENT_SLOT] < 0:
+            if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
                 return i, NO_CONTACT_SET
             if system.totals[Total.IS_FULL] > 0:
                 return i, LISTS_FULL
@@ -1458,7 +1504,6 @@ def march(system, steps, samples):
             if level > 0 and tick % (2 * part) == 0:
                 level -= 1
         samples[i, size + Sample.WORK] = work
-        system.totals[Total.FRICTION] += work
     return steps, DONE
 
 
@@ -1480,7 +1525,9 @@ def add_work(system, sample, first_column, part):
     ports = system.ports
     points = system.points
 
-    # Work is mean force times increment. That of a port at rest is taken back, and counts for the drive.
+    # Work is mean force times increment, for points behind shear of the pieces too: their work includes the energy of the
+    # pieces. Ports of rigid points at rest are moved back by `commit`, which left this displacement in FREE, so that
+    # friction at rest does no work. All other laws keep their increment; their FREE has another meaning.
     work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:
@@ -1491,10 +1538,13 @@ def add_work(system, sample, first_column, part):
         if points.numbers[0, j] == Law.COULOMB:
             force = ports.values[Port.FORCE, p]
             slide -= ports.values[Port.FREE, p]
+        # On a flank the points slide along it by ds = RATIO dq, so that their work f ds is that of the force RATIO f.
         if system.flank.size and p == 0:
             force *= system.flank[Flank.RATIO]
         work += force * slide
         sample[first_column + N_PORT_COLUMNS * p] += force * part
+
+    # The vertical force V lifts the load by dz = SLOPE dq.
     if system.flank.size:
         force = system.flank[Flank.TRIAL_VERTICAL] * system.flank[Flank.SLOPE]
         work += force * ports.values[Port.INCREMENT, 0]

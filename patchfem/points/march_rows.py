@@ -126,7 +126,7 @@ class Total(IntEnum):
 
     - WORK_IN: work of the drive since the start, without that on motions of ports at rest [J]
     - POWER: sum over the steps of the magnitude of this work [J]
-    - VISCOUS, FRICTION: viscous loss and friction work since the start [J]
+    - VISCOUS: viscous loss since the start [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
     - IS_FULL: 1 if a list of bonds is full
@@ -136,12 +136,11 @@ class Total(IntEnum):
     WORK_IN = 0
     POWER = 1
     VISCOUS = 2
-    FRICTION = 3
-    STORED = 4
-    ITERATIONS = 5
-    UNSOLVED = 6
-    IS_FULL = 7
-    REST = 8
+    STORED = 3
+    ITERATIONS = 4
+    UNSOLVED = 5
+    IS_FULL = 6
+    REST = 7
 
 
 class Sample(IntEnum):
@@ -204,11 +203,14 @@ class Ports(NamedTuple):
     """P ports on n modes.
 
     - rows (P, n): displacement of the ports per coordinate
-    - compliance (levels, 2, P, P): decrease of displacement and velocity per constant force in a step
-    - grip (P, P): decrease of the acceleration per force [1/kg]
+    - compliance (levels, 2, P, P): displacement [m/N] and velocity [m/(s N)] of a port at the end of a step of each level
+      that a constant force on another port takes away; C and G in `march_kernels`
+    - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
     - values (14, P): see `Port`
-    - matrix (P + r, P + r), vector, step (P + r,): Newton system and its solution
-    - contact (11,): press workspace: numbers of the heave and pitch ports (-1 for none) and the results of `path_mean`
+    - matrix (P + r, P + r), vector, step (P + r,): Jacobian, residuals and step of Newton's method for P port forces and r
+      shear coordinates
+    - contact (11,): numbers of the heave and pitch ports (-1 for none), then the results of `path_mean` in the order of
+      `contact.set_arrays.PathMean`: slopes of the contact energy by heave [N] and pitch [N m], and their derivatives
     """
 
     rows: np.ndarray

@@ -20,7 +20,7 @@ TANH          mu, v_0 [m/s]                                        force
 JENKINS       mu, length [m]                                       force/mu, springs (load at which they yield)
 MASING        F_S, phi_max [m], chi + 1, beta                      see `Masing`
 BOUC_WEN      mu, length [m], exponent n, shape s                  z
-LUGRE         stiffness, kinetic, static, v_s, sigma_1, sigma_2    stretch [m], force
+LUGRE         mu_s, mu_k, stiffness, v_s, sigma_1, sigma_2         stretch [m], force
 BONDS         mu, eps_0 [m], growth (5) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
 CUBIC         k_3 [N/m3]                                           slide [m]
 INTERLOCK     k [N/m], wavelength [m]                              slide [m]
@@ -139,11 +139,11 @@ def mean_force(numbers, memory, j, load, step):
         force = relaxed.mean
         last = _lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
         # A change of the increment changes the velocity at the end by about twice the mean velocity.
-        change = DIFFERENCE * (abs(dq) + numbers[3, j] / numbers[1, j])
+        change = DIFFERENCE * (abs(dq) + numbers[1, j] / numbers[3, j])
         velocity = step.end_velocity + 2 * change / step.duration
         other = Step(dq + change, step.duration, step.start_velocity, velocity, step.mobility)
         slope = (_mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
-        elastic = load * numbers[1, j] * (relaxed.end - memory[0, j])
+        elastic = load * numbers[3, j] * (relaxed.end - memory[0, j])
         return MeanForce(force, slope, 0.0, last, elastic)
     if law == Law.CUBIC or law == Law.INTERLOCK:
         force, slope = _mean_spring(numbers, memory[0, j], j, dq)
@@ -274,7 +274,7 @@ def _mean_lugre(numbers, stretch, j, load, step):
 
     # Rows 5 and 6 are the damping of the bristles and the viscous friction per unit of load [s/m].
     damping = numbers[5, j] * (z - stretch) / duration + numbers[6, j] * dq / duration
-    return Relaxed(z, load * (numbers[1, j] * mean + damping))
+    return Relaxed(z, load * (numbers[3, j] * mean + damping))
 
 
 @njit(**NJIT_CALL)
@@ -588,7 +588,7 @@ def read(numbers, memory, j, load):
         return PointState(mu * load * state, 0.5 * mu * load * state * stretch, stretch)
 
     if law == Law.LUGRE:
-        return PointState(memory[1, j], 0.5 * mu * load * state * state, state)
+        return PointState(memory[1, j], 0.5 * numbers[3, j] * load * state * state, state)
     if law == Law.CUBIC:
         return PointState(mu * state**3, 0.25 * mu * state**4, 0.0)
 

@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import dataclass
+from enum import IntEnum
 from itertools import pairwise
 from math import ceil
 from typing import NamedTuple
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
-from ..contact.set_arrays import PRESENT_SLOT, hash_set, make_set_arrays
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
 from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
@@ -67,9 +68,27 @@ MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before t
 WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of cycles
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 # Sums that a repeated cycle continues
-REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
-NUMBER = -4  # column of the number of the step in a row of a record; the energies follow
+REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS]
+NUMBER = (
+    -4
+)  # column of the number of the step in a row of a record; the first three of `Energy` follow
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
+
+
+class Energy(IntEnum):
+    """Sums of a record over all steps [J]. The first three are also columns of its rows, after the number of the step.
+
+    - WORK: friction work, by mean forces of the steps
+    - DISSIPATED, CREATED: work that is not stored, where it is above 0 and where it is below
+    - SAMPLED: friction work by the forces at the samples
+    - PASSED: sum of the magnitudes of the friction works of the steps
+    """
+
+    WORK = 0
+    DISSIPATED = 1
+    CREATED = 2
+    SAMPLED = 3
+    PASSED = 4
 
 
 class Snapshot(NamedTuple):
@@ -231,7 +250,8 @@ def make_system(
     start : core.InitialState, optional
         Modal coordinates and velocities; at rest by default.
     """
-    # Rows of the ports; heave and pitch of a normal contact are two more.
+    # Rows of the ports; heave and pitch of a normal contact are two more, with their numbers in the first entries of `press`
+    # (`Ports.contact`), which are -1 without them.
     n = 0 if modes is None else modes.omega.size
     rows = [
         np.zeros(n) if modes is None else np.asarray(point_set.row, float)
@@ -249,6 +269,7 @@ def make_system(
         for point_set in contact.point_sets
         for law in np.unique(point_set.law.numbers[0])
     }
+    # Laws without memory jump or nearly jump at a reversal, which short steps have to locate.
     has_events = bool(laws & {Law.COULOMB, Law.TANH})
     levels = EVENT_LEVELS if has_events else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
@@ -448,14 +469,14 @@ def _make_no_sets():
 
 def _press_first(system: System, contact: Contact) -> None:
     """Find the contact set at the start."""
-    press = compiled.load("contact.press_kernels")
+    press = compiled.load_compiled_module("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
     heave, pitch = (
         float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
     )
     slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
-    system.sets.counters[PRESENT_SLOT] = slot
+    system.sets.counters[PRESENT_SLOT_INDEX] = slot
 
 
 def _climb_first(system: System, contact: Contact) -> None:
@@ -521,7 +542,6 @@ class March:
     - shift: time of step number 0 of the present step size, in steps; below 0 after a first part with shorter steps
     - n_first, first_step: number and duration [s] of the steps of the first part
     - outcome, message: how the march ended, None and "" as long as it goes on
-    - work_sums: friction work from samples, and sum of the magnitudes of the friction works of the steps [J]
     """
 
     def __init__(
@@ -539,7 +559,6 @@ class March:
         self.first_step = self.step
         self.outcome = None
         self.message = ""
-        self.work_sums = np.zeros(2)
         n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
         self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
         self.kernels = load_kernels(contact)
@@ -549,7 +568,6 @@ class March:
         """Return a copy that goes on by itself, under another drive if one is given."""
         other = copy(self)
         other.system = copy_system(self.system)
-        other.work_sums = self.work_sums.copy()
         if drive is not None:
             other.drive = drive
         return other
@@ -585,7 +603,6 @@ class March:
         """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
         totals = self.system.totals
         totals[:] = 0.0
-        self.work_sums[:] = 0.0
         self.done = 0
         self.shift = 0.0
         sample = np.zeros((1, self.width))
@@ -630,7 +647,6 @@ class March:
         samples = samples[: n_done + 1]
         self.done += n_done
         self._judge(status)
-        self._add_works(samples)
         return samples
 
     def _judge(self, status: int) -> None:
@@ -660,11 +676,10 @@ class March:
                 f"{RESIDUAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
             )
 
-    def _add_works(self, samples) -> None:
-        """Add the friction work of samples: by the forces at the samples, and its magnitude."""
+    def find_sampled_works(self, samples) -> np.ndarray:
+        """Return the friction work (k,) [J] in each step between samples (k + 1, w), by the forces at the samples."""
         n = 2 * self.modes.omega.size
-        works = samples[:-1, n + Sample.WORK]
-        sampled = np.zeros(works.size)
+        sampled = np.zeros(len(samples) - 1)
         for k, point_set in enumerate(self.contact.point_sets):
             if point_set.is_spring:
                 continue
@@ -673,7 +688,7 @@ class March:
             mean = columns[:-1, 2] if is_rigid else None
             slide = samples[:, : n // 2] @ np.asarray(point_set.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
-        self.work_sums += float(sampled.sum()), float(np.abs(works).sum())
+        return sampled
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""
@@ -686,12 +701,11 @@ class March:
             self.kernels, self.system, (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
         )
 
-    def find_ledger(self, sample) -> dict[str, float]:
-        """Return energies [J] and counters by name at a sample of the present state."""
+    def find_ledger(self, sample, energies) -> dict[str, float]:
+        """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""
         n = 2 * self.modes.omega.size
         totals = self.system.totals
-        friction = float(totals[Total.FRICTION])
-        sampled, passed = self.work_sums
+        friction = float(energies[Energy.WORK])
 
         # Friction dissipates its work less the change of the energy stored in the interface.
         ledger = {
@@ -703,8 +717,8 @@ class March:
             "iterations": float(totals[Total.ITERATIONS]),
             "stored": self.find_stored_energy(sample),
             "booked": friction,
-            "sampled": float(sampled),
-            "passed": float(passed),
+            "sampled": float(energies[Energy.SAMPLED]),
+            "passed": float(energies[Energy.PASSED]),
         }
         if self.system.options.has_lists:
             names = ("created", "dissipated", "substeps", "strips")
@@ -924,11 +938,13 @@ def march(
         if run.done < run.n_first:
             size = run.n_first
 
+        # Sums of this part, which copies of it continue. The last part of all has the snapshots.
         totals = run.system.totals.copy()
-        works = run.work_sums.copy()
         is_last = size == n_left
         record.add(*advance_with_frames(run, size, frames if is_last else 0))
 
+        # If the march is where it was a part before, all parts up to the window are copies of the last one. State and
+        # memory are compared, relative to the largest motion of the part and to the memory itself.
         count = (n_steps - record.n_window - run.done) // size
         state = run.system.state[0]
         memory = np.concatenate(
@@ -942,7 +958,6 @@ def march(
                 record.repeat(count)
                 run.done += count * size
                 run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
-                run.work_sums += count * (run.work_sums - works)
 
         record.before = now if size % steps_per_cycle == 0 else np.zeros(0)
         if run.done < n_steps:
@@ -985,14 +1000,14 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
 class Record:
     """Samples of a march: all of the window at its end, and some of each earlier cycle.
 
-    A row is a sample, the number of its step and the friction work, dissipated and created energy up to it [J].
+    A row is a sample, the number of its step and friction work, dissipated and created energy up to it [J].
 
     - run, n_steps, n_window: March, its number of steps, and that of the window
     - keeps_samples: whether rows from before the window are kept
     - early: rows (k, w) from before the last parts, at equal distances
     - last, recent: rows of the last part, and of the last parts, which contain the window
     - extremes, phasors: of the output in each cycle
-    - energies (3,): energies up to the last sample [J]
+    - energies (5,), change (5,): sums up to the last sample, and over the last part [J], see `Energy`
     - snapshots: of the last cycle
     - stride: distance of the samples of earlier cycles
     - before: state and memory at the end of the part before the last, if both have whole cycles, or (0,) without such a
@@ -1009,7 +1024,8 @@ class Record:
         self.recent = []
         self.extremes = []
         self.phasors = []
-        self.energies = np.zeros(3)
+        self.energies = np.zeros(len(Energy))
+        self.change = np.zeros(len(Energy))
         self.snapshots = []
         self.before = np.zeros(0)
         # The distance of early samples divides a cycle, so that each one begins with a sample.
@@ -1034,15 +1050,19 @@ class Record:
         losses = split_losses(samples, n, run.system.options.scale)
         # Only lists of bonds can create energy; of other laws a loss below 0 is an error of the step.
         created = np.maximum(-losses, 0) * run.system.options.has_lists
-        steps = np.stack([samples[:-1, n + Sample.WORK], losses + created, created], axis=1)
-        energies = self.energies + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        works = samples[:-1, n + Sample.WORK]
+        sampled = run.find_sampled_works(samples)
+        steps = np.stack([works, losses + created, created, sampled, np.abs(works)], axis=1)
+        energies = self.energies + np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
         numbers = first + np.arange(count + 1.0)[:, None]
-        self.last = np.hstack([samples, numbers, energies])
+        self.last = np.hstack([samples, numbers, energies[:, : Energy.SAMPLED]])
         self._keep(self.last)
+        self.change = energies[-1] - self.energies
         self.energies = energies[-1]
         self.snapshots = list(snapshots)
 
-        # Extremes and phasor of each cycle; the first and the last one may be a part of a cycle.
+        # Extremes and phasor (2/n times the sum of x exp(-i phase) over n samples) of each cycle; the first and the last one
+        # may be a part of a cycle.
         output = samples[:, : n // 2] @ run.modes.output
         speed = samples[:, n // 2 : n] @ run.modes.output
         for begin in range(0, max(count, 1), run.steps):
@@ -1081,7 +1101,7 @@ class Record:
         change[NUMBER:] = self.last[-1, NUMBER:] - self.last[0, NUMBER:]
         for k in range(1, count + 1):
             self._keep(self.last + k * change)
-        self.energies = self.energies + count * change[NUMBER + 1 :]
+        self.energies = self.energies + count * self.change
         self.extremes += count * self.extremes[-n_cycles:]
         self.phasors += count * self.phasors[-n_cycles:]
 
@@ -1107,7 +1127,7 @@ class Record:
             float(window_rows[:, n + Sample.WORK].sum()),
             np.array(self.extremes),
             np.array(self.phasors),
-            run.find_ledger(self.last[-1]),
+            run.find_ledger(self.last[-1], self.energies),
             run.outcome,
             run.message,
             (run.done + run.shift) / run.steps,
@@ -1128,7 +1148,8 @@ def find_extremes(q, v, step: float) -> tuple[float, float]:
     """
     # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
     turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * (v**2).max())
-    # The velocity is the parabola with the mean of the increment.
+    # The velocity is the parabola v(x) = first + linear x + square x^2 of the fraction x of the step, with the velocities at
+    # both ends and the mean of the increment. The displacement is the integral up to the root of v.
     first = v[turn]
     last = v[turn + 1]
     mean = (q[turn + 1] - q[turn]) / step
@@ -1154,7 +1175,7 @@ def make_histories(run: March, rows) -> Response:
     run : March
         March that was run.
     rows : (k, w) array
-        Samples, then the number of the step and friction work, dissipated and created energy up to it [J].
+        Rows of a record (`Record`).
     """
     modes = run.modes
     contact = run.contact
@@ -1172,9 +1193,9 @@ def make_histories(run: March, rows) -> Response:
     push = run.drive.values(time)
     forces = columns[..., 0]
     pull = forces @ port_rows
-    work, dissipated, created = rows[:, NUMBER + 1 :].T
-
-    extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
+    energies = rows[:, NUMBER + 1 :].T
+    stored = rows[:, 2 * n + Sample.ENERGY]
+    extra = {"ledger": np.insert(energies, Energy.DISSIPATED, stored, axis=0)}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
     if contact.sets is not None or contact.load is not None:
         extra |= dict(zip(PRESS_COLUMNS, press.T))

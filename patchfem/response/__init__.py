@@ -17,7 +17,7 @@ PUBLIC = {
     "decay_curve": (
         "DecayCurve",
         "HalfCycles",
-        "MIN_HALF_CYCLE",
+        "MIN_HALF_CYCLE_RATIO",
         "fit_decay_curve",
         "locate_reversals",
         "make_half_cycles",
@@ -26,7 +26,7 @@ PUBLIC = {
     ),
     "errors": (
         "ERROR_MEASURES",
-        "MAX_ORDER",
+        "MAX_CONVERGENCE_ORDER",
         "absolute_change",
         "add_errors",
         "add_run_error_estimates",
@@ -63,7 +63,7 @@ PUBLIC = {
         "secant_stiffness",
     ),
     "measures": (
-        "MIN_SLIDE_RANGE",
+        "MAX_RESTING_SLIDE_RANGE",
         "compute_ledger_measures",
         "compute_step_harmonic",
         "energy_balance",
@@ -74,7 +74,7 @@ PUBLIC = {
     ),
     "outcome": (
         "AMPLITUDE_ROUND_OFF",
-        "OPEN_LOOP",
+        "OPEN_LOOP_MESSAGE",
         "describe_ringing",
         "find_ringing",
         "is_ringing_visible",
@@ -100,7 +100,7 @@ PUBLIC = {
         "STEADY_AMPLITUDE",
         "INTERNAL_VALUES",
         "LastCycles",
-        "TABLE",
+        "MOTION_TABLE",
         "add_interface_number",
         "compute_measures",
         "error_floor",
@@ -111,7 +111,7 @@ PUBLIC = {
         "set_final_floors",
     ),
     "settling": (
-        "CLASSES",
+        "MOTION_CLASSES",
         "MotionEnds",
         "judge_motions",
         "measure_windows",

@@ -10,11 +10,11 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import NamedTuple
 
-from .errors import MAX_ORDER, convergence_errors
+from .errors import MAX_CONVERGENCE_ORDER, convergence_errors
 from .measures import Values
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.
-second_order_errors = partial(convergence_errors, order=MAX_ORDER)
+second_order_errors = partial(convergence_errors, order=MAX_CONVERGENCE_ORDER)
 
 
 class CoarserRuns(NamedTuple):

@@ -16,28 +16,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .errors import MAX_ORDER, convergence_error
+from .errors import MAX_CONVERGENCE_ORDER, convergence_error
 from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
-SPAN_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+CANDIDATE_HALF_SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 # Largest difference between the slopes fitted over two spans, in standard deviations.
-MAX_SLOPE_DIFFERENCE = 2.0
+MAX_SLOPE_DEVIATIONS = 2.0
 # Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is
 # chosen by means of the same data.
-INTERVAL_DEVIATIONS = 2.5
+INTERVAL_HALF_WIDTH_IN_DEVIATIONS = 2.5
 # Number of half cycles on either side from whose third differences the noise is estimated.
-NOISE_HALF_WIDTH = 8
+NOISE_HALF_WIDTH_IN_HALF_CYCLES = 8
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 # Largest speed at which a sample counts as a reversal, relative to the largest speed.
 REST_SPEED_TOL = 1e-12
 # Smallest half cycle that is not attributed to round-off, relative to the largest one.
-MIN_HALF_CYCLE = 1e-9
-STEP_END_TOL = 1e-9  # Round-off of a period by which a sample may lie before it.
+MIN_HALF_CYCLE_RATIO = 1e-9
+PERIOD_START_TOL = 1e-9  # Round-off of a period by which a sample may lie before it.
 # Largest motion between two reversals, relative to the range in one period, that is attributed to a
 # faster mode.
-MAX_RIPPLE = 0.25
-RANGE_TOL = 1e-6  # Relative distance by which a curve is extrapolated beyond its ends.
+MAX_RIPPLE_RATIO = 0.25
+CURVE_END_TOL = 1e-6  # Relative distance by which a curve is extrapolated beyond its ends.
 
 
 class HalfCycles(NamedTuple):
@@ -85,7 +85,7 @@ class DecayCurve(NamedTuple):
         if not knots.size:
             return np.full(len(amplitudes), np.nan)
         x = np.log(amplitudes)
-        inside = (x > knots[0] - RANGE_TOL) & (x < knots[-1] + RANGE_TOL)
+        inside = (x > knots[0] - CURVE_END_TOL) & (x < knots[-1] + CURVE_END_TOL)
         return np.where(inside, np.interp(x, knots, getattr(self, name)[indices]), np.nan)
 
     def add_change(self, coarse: "DecayCurve", reference: "DecayCurve") -> "DecayCurve":
@@ -96,7 +96,7 @@ class DecayCurve(NamedTuple):
         errors = {}
         for name in ("frequency", "damping"):
             curves = [curve.interpolate(name, self.amplitude) for curve in (coarse, reference)]
-            added = convergence_error(curves[0] - curves[1], order=MAX_ORDER)
+            added = convergence_error(curves[0] - curves[1], order=MAX_CONVERGENCE_ORDER)
             error = getattr(self, f"{name}_error")
             errors[f"{name}_error"] = error + np.where(np.isnan(added), np.inf, added)
         return self._replace(**errors)
@@ -129,7 +129,7 @@ def locate_reversals(time, position, speed) -> ArrayPair:
 def measure_last_cycle_amplitude(time, position, speed, period: float) -> float | None:
     """Return half the peak-to-peak value [m] of the last complete cycle of a motion.
 
-    A cycle has three reversals. Motions between reversals that are smaller than MAX_RIPPLE times the range
+    A cycle has three reversals. Motions between reversals that are smaller than MAX_RIPPLE_RATIO times the range
     in the last period are attributed to a faster mode and ignored.
 
     Parameters
@@ -145,8 +145,8 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
         Half the range in the last period if the motion is at rest there; None if it has fewer than
         three reversals.
     """
-    last_range = float(np.ptp(position[time >= time[-1] - period * (1 + STEP_END_TOL)]))
-    if last_range <= MIN_HALF_CYCLE * np.ptp(position):
+    last_range = float(np.ptp(position[time >= time[-1] - period * (1 + PERIOD_START_TOL)]))
+    if last_range <= MIN_HALF_CYCLE_RATIO * np.ptp(position):
         return last_range / 2
     # Turning points backwards from the end of the motion, where the first one is not a reversal.
     turns = [float(position[-1])]
@@ -154,7 +154,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
         goes_on = len(turns) > 1 and (reversal - turns[-1]) * (turns[-1] - turns[-2]) > 0
         if goes_on:
             turns[-1] = reversal
-        elif abs(reversal - turns[-1]) > MAX_RIPPLE * last_range:
+        elif abs(reversal - turns[-1]) > MAX_RIPPLE_RATIO * last_range:
             turns.append(reversal)
         if len(turns) == 5:
             return float(np.abs(np.diff(turns[1:4])).max()) / 2
@@ -175,16 +175,11 @@ def make_half_cycles(times, positions) -> HalfCycles:
     distances = np.abs(np.diff(positions))
     ends = np.flatnonzero(
         (np.diff(distances, prepend=np.inf) >= 0)
-        | (distances <= MIN_HALF_CYCLE * distances.max(initial=0.0))
+        | (distances <= MIN_HALF_CYCLE_RATIO * distances.max(initial=0.0))
     )
     count = int(ends[0]) if ends.size else distances.size
     no_noise = np.zeros(count)
-    return HalfCycles(
-        (times[1:] + times[:-1])[:count] / 2,
-        distances[:count],
-        no_noise,
-        no_noise,
-    )
+    return HalfCycles((times[1:] + times[:-1])[:count] / 2, distances[:count], no_noise, no_noise)
 
 
 def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
@@ -289,7 +284,7 @@ def fit_slopes(values, noise) -> Slopes:
     """
     # Slopes of the least-squares lines over 2 m + 1 values and their standard deviations, one row for each span.
     count = values.size - 2
-    spans = np.array([m for m in SPAN_LENGTHS if 2 * m < values.size])
+    spans = np.array([m for m in CANDIDATE_HALF_SPANS if 2 * m < values.size])
     # The last row is that of a span that exists nowhere. It follows the longest span and precedes the shortest one.
     slopes, noises = np.full((2, spans.size + 1, count), np.nan)
     for k, m in enumerate(spans):
@@ -303,7 +298,7 @@ def fit_slopes(values, noise) -> Slopes:
     is_accepted = ~np.isnan(slopes)
     for k in range(1, spans.size):
         excess = np.sqrt(np.maximum(noises[:k] ** 2 - noises[k] ** 2, 0.0))
-        limits = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
+        limits = MAX_SLOPE_DEVIATIONS * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
         differs = (np.abs(slopes[k] - slopes[:k]) > limits).any(axis=0)
         is_accepted[k] &= is_accepted[k - 1] & ~differs
     longest = is_accepted.sum(axis=0) - 1
@@ -312,7 +307,8 @@ def fit_slopes(values, noise) -> Slopes:
     spread = noises[longest, points]
     span = spans[longest]
 
-    # A span that is too long shows the bias b m^2 of the longest accepted one.
+    # Curvature biases the slope over 2 m + 1 values by b m^2 with a constant b. Between the longest accepted span m and
+    # the next one n the slope therefore changes by b (n^2 - m^2), from which b m^2 follows.
     bias = np.abs(slopes[longest + 1, points] - slope)
     next_span = np.append(spans, 0)[longest + 1]
     bias /= np.where(spread > 0, (next_span / span) ** 2 - 1, 1.0)
@@ -322,7 +318,7 @@ def fit_slopes(values, noise) -> Slopes:
     # noise is estimated from the second difference.
     curvature = np.where(spread > 0, 0.0, np.abs(np.diff(values, 2)) / 2)
     bias = np.where(np.isnan(bias), curvature, bias)
-    error = INTERVAL_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
+    error = INTERVAL_HALF_WIDTH_IN_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
     return Slopes(slope, error, span)
 
 
@@ -359,7 +355,7 @@ def _limit_noise(noise, values) -> np.ndarray:
         return noise
     variance = np.diff(values, 3) ** 2 / 20
     middle = np.arange(values.size) - 1
-    first = np.clip(middle - NOISE_HALF_WIDTH, 0, variance.size)
-    last = np.clip(middle + NOISE_HALF_WIDTH, 0, variance.size)
+    first = np.clip(middle - NOISE_HALF_WIDTH_IN_HALF_CYCLES, 0, variance.size)
+    last = np.clip(middle + NOISE_HALF_WIDTH_IN_HALF_CYCLES, 0, variance.size)
     sums = np.concatenate([[0.0], np.cumsum(variance)])
     return np.sqrt(np.maximum(noise**2, (sums[last] - sums[first]) / np.maximum(last - first, 1)))

@@ -2,7 +2,7 @@
 
 In a run that is coarser by a factor `ratio` (in steps, elements, cells of a density, harmonics, modes
 or the tolerance of a step), a measure changes by ratio**p - 1 times its error, where p is the order of
-convergence. The error estimate is therefore SAFETY_FACTOR times the change divided by ratio**p - 1
+convergence. The error estimate is therefore ERROR_SAFETY_FACTOR times the change divided by ratio**p - 1
 (Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three
 runs with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed
 order depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md
@@ -20,28 +20,28 @@ from .measures import Measures, Values
 from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
-SAFETY_FACTOR = 3.0
-MIN_ORDER = 1.0  # Lowest order of convergence in an estimate.
+ERROR_SAFETY_FACTOR = 3.0
+MIN_CONVERGENCE_ORDER = 1.0  # Lowest order of convergence in an estimate.
 # Highest order of convergence in an estimate, which is the order of the numerical methods.
-MAX_ORDER = 2.0
+MAX_CONVERGENCE_ORDER = 2.0
 # Largest plausible ratio of two successive changes (order 4); beyond it, the last change is accidentally
 # small.
-MAX_CHANGE_RATIO = 16.0
+MAX_PLAUSIBLE_CHANGE_RATIO = 16.0
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
 MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 # Measures that are errors of the solution, so that their own error is their value.
 ERROR_MEASURES = select_names("error")
-PHASES = select_names("phase")  # Angles modulo pi.
+PHASE_MEASURES = select_names("phase")  # Angles modulo pi.
 # Round-off error of the mean position of a motion, relative to its amplitude.
-MEAN_ROUND_OFF = 1e-13
+MEAN_POSITION_ROUND_OFF = 1e-13
 
 
 def signed_change(fine: Values, coarse: Values) -> Values:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
-    for name in PHASES:
+    for name in PHASE_MEASURES:
         if name in changes:
             changes[name] = (changes[name] + np.pi / 2) % np.pi - np.pi / 2
     return changes
@@ -52,18 +52,20 @@ def absolute_change(fine: Values, coarse: Values) -> Values:
     return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
 
 
-def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float = MIN_ORDER):
+def convergence_error(
+    change, *coarser_changes, ratio: float = 2.0, order: float = MIN_CONVERGENCE_ORDER
+):
     """Estimate the error of a value from its changes between successive runs.
 
-    The estimate is SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
+    The estimate is ERROR_SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
     errors of a run and of the next coarser one.
 
     - Two runs (one change): growth = ratio**order.
-    - Three runs: growth is the ratio of the two changes, at most 2**MAX_ORDER, if it lies between
-      ratio**order and MAX_CHANGE_RATIO. The change counts as at least 2**-MAX_ORDER of the previous
+    - Three runs: growth is the ratio of the two changes, at most 2**MAX_CONVERGENCE_ORDER, if it lies between
+      ratio**order and MAX_PLAUSIBLE_CHANGE_RATIO. The change counts as at least 2**-MAX_CONVERGENCE_ORDER of the previous
       one, so that a change that is small by accident does not give a small error.
     - More runs: the estimate without the finest run is an upper limit if its interval contains the
-      value; the error is assumed to decrease by at most 2**MAX_ORDER from run to run.
+      value; the error is assumed to decrease by at most 2**MAX_CONVERGENCE_ORDER from run to run.
 
     Parameters
     ----------
@@ -89,20 +91,23 @@ def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float
         previous = coarser_changes[0]
         with np.errstate(divide="ignore", invalid="ignore"):
             observed = np.divide(previous, change)
-        shows_order = (observed > growth) & (observed <= MAX_CHANGE_RATIO)
-        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_ORDER), growth)
-        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_ORDER)
-    error = (SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
+        shows_order = (observed > growth) & (observed <= MAX_PLAUSIBLE_CHANGE_RATIO)
+        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_CONVERGENCE_ORDER), growth)
+        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_CONVERGENCE_ORDER)
+    error = (ERROR_SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
     if len(coarser_changes) > 1:
         coarser_error = convergence_error(*coarser_changes, ratio=ratio, order=order)
         if abs(change) <= coarser_error:  # the value lies in the error interval of the coarser run
             error = min(error, coarser_error)
-        error = max(error, coarser_error / 2**MAX_ORDER)
+        error = max(error, coarser_error / 2**MAX_CONVERGENCE_ORDER)
     return error
 
 
 def convergence_errors(
-    *values: Values, ratio: float = 2.0, order: float = MIN_ORDER, steps: int | None = None
+    *values: Values,
+    ratio: float = 2.0,
+    order: float = MIN_CONVERGENCE_ORDER,
+    steps: int | None = None,
 ) -> Values:
     """Estimate the error of each measure from two or more successive runs (`convergence_error`).
 
@@ -144,7 +149,7 @@ def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     The finer run has twice as many of them, and the coarser run half as many. The truncation error of
     the Fourier series of a friction force with corners is of second order. Where the change to the
     finer run is small by accident, the error is that of the change from the coarser run, reduced by
-    2**MAX_ORDER.
+    2**MAX_CONVERGENCE_ORDER.
 
     Parameters
     ----------
@@ -158,11 +163,11 @@ def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     dict
         Errors by name.
     """
-    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_ORDER)
+    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_CONVERGENCE_ORDER)
     for run in coarser:
-        for name, error in convergence_errors(values, run, order=MAX_ORDER).items():
+        for name, error in convergence_errors(values, run, order=MAX_CONVERGENCE_ORDER).items():
             if name in errors:
-                errors[name] = np.maximum(errors[name], error / 2.0**MAX_ORDER)
+                errors[name] = np.maximum(errors[name], error / 2.0**MAX_CONVERGENCE_ORDER)
     return errors
 
 
@@ -226,11 +231,7 @@ def friction_errors(values: Values, fraction: float, law, load: float, works) ->
 
 
 def add_errors(
-    values: Values,
-    errors=(),
-    *,
-    min_relative_error: float = 0.0,
-    size: float = np.inf,
+    values: Values, errors=(), *, min_relative_error: float = 0.0, size: float = np.inf
 ) -> Measures:
     """Return the measures with given values, with total errors from their errors by source.
 
@@ -321,10 +322,10 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * min_relative_error
-    if name in PHASES:  # a phase modulo pi has an error of at most pi/2
+    if name in PHASE_MEASURES:  # a phase modulo pi has an error of at most pi/2
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))
     if name == "drift_per_cycle":  # a difference of mean values has their round-off
-        return error + max(MEAN_ROUND_OFF, min_relative_error) * np.abs(size)
+        return error + max(MEAN_POSITION_ROUND_OFF, min_relative_error) * np.abs(size)
     return error

@@ -10,18 +10,18 @@ import numpy as np
 from .measures import slip_round_off
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
-STOP = 0
+STOP_KIND = 0
 RELEASE_UP = 1
 RELEASE_DOWN = 2
 REVERSAL_UP = 3
 REVERSAL_DOWN = 4
 SEGMENT_BORDER = 5
 EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
-MAX_EVENTS = 100_000  # largest number of events of a run that are kept, the last ones
+MAX_KEPT_EVENTS = 100_000  # largest number of events of a run that are kept, the last ones
 
 
 class Events(NamedTuple):
-    """Last events of a run in chronological order, at most MAX_EVENTS.
+    """Last events of a run in chronological order, at most MAX_KEPT_EVENTS.
 
     - time (k,): time [s].
     - interface (k,): number of the interface, from 1; 0 for the border between two segments of the
@@ -39,7 +39,7 @@ class Events(NamedTuple):
 def sort_events(rows) -> Events:
     """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time."""
     rows = np.array(rows, float).reshape(-1, 4)
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_EVENTS:]
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_KEPT_EVENTS:]
     time, interface, kind, slide = rows.T.copy()
     return Events(time, interface.astype(np.int32), kind.astype(np.int8), slide)
 
@@ -55,7 +55,7 @@ def classify_changes(before, after) -> np.ndarray:
     is_reversal = (before != 0) & (after != 0)
     upwards = np.where(is_reversal, REVERSAL_UP, RELEASE_UP)
     downwards = np.where(is_reversal, REVERSAL_DOWN, RELEASE_DOWN)
-    return np.where(after == 0, STOP, np.where(after > 0, upwards, downwards))
+    return np.where(after == 0, STOP_KIND, np.where(after > 0, upwards, downwards))
 
 
 def join_events(parts: list[Events], shifts: list[float]) -> Events:

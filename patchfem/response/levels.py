@@ -13,7 +13,7 @@ from .rows import AMPLITUDE, select_names
 
 LEVEL_MEASURES = select_names("level")
 # Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
-MIN_DISTORTION = 0.03
+MIN_SLIP_DISTORTION = 0.03
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,7 +40,7 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     Parameters
     ----------
     kind : str
-        "slip": an interface slips; "distortion": H3/H1 of the acceleration exceeds MIN_DISTORTION;
+        "slip": an interface slips; "distortion": H3/H1 of the acceleration exceeds MIN_SLIP_DISTORTION;
         "gauge": the amplitude at the output (half peak-to-peak) exceeds `length`.
     length : float, optional
         Limit of the amplitude for "gauge" [m].
@@ -48,12 +48,14 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     return {
         "slip": lambda level: not level.stuck,
         "gauge": lambda level: level.values[AMPLITUDE] > length,
-    }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
+    }.get(
+        kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_SLIP_DISTORTION
+    )
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
     """Return the reason why no onset of slip was found in a sequence of drive levels."""
-    event = f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic"
+    event = f"has an acceleration whose third harmonic is more than {MIN_SLIP_DISTORTION:g} of its first harmonic"
     if kind == "slip":
         event = "slips"
     elif kind == "gauge":

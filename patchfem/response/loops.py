@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
+from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
 
-EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
+SAME_EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
-REST_RATE_TOL = 1e-9
+REST_SLIDE_RATE_TOL = 1e-9
 # Largest displacement in a time step that counts as rest, relative to that in any step.
-MIN_REST_END_STEP = 1e-3
+MIN_MOVING_STEP_RATIO = 1e-3
 
 
 class Reversal(NamedTuple):
@@ -76,11 +76,11 @@ def find_reversals(
         displacement is largest at an end of the cycle and does not reverse within one step of it.
     """
     reversals = []
-    time_tolerance = EVENT_TIME_TOL * period
+    time_tolerance = SAME_EVENT_TIME_TOL * period
     for begin, end in cycle_spans(time, period):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         pair = []
-        # The smallest displacement is the largest one of the reversed motion
+        # The smallest displacement is the largest one of the motion -q(t).
         for sign in (-1, 1):
             sample, value, fraction = _find_largest(
                 time[cycle], sign * slide[cycle], sign * rate[cycle], time_tolerance
@@ -132,7 +132,7 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
     Returns the index of the preceding sample and the position as a fraction of the step, or (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
-    if abs(v[sample]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
+    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * np.abs(v).max(initial=0.0):
         return sample, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
@@ -178,10 +178,10 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
         None if there is no motion before or after the rest.
     """
     step = np.abs(np.diff(slide))
-    is_moving = step > MIN_REST_END_STEP * step.max(initial=0.0)
+    is_moving = step > MIN_MOVING_STEP_RATIO * step.max(initial=0.0)
     is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
-    ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
+    ) > MODAL_COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
     before = np.flatnonzero(is_moving[:sample])
     after = np.flatnonzero(is_moving[sample:])
     if not before.size or not after.size:

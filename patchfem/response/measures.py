@@ -16,23 +16,24 @@ Measures = dict[str, Measure]  # by name
 ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
-SLIP_FRACTION = 0.5
-COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
-MIN_ENERGY_GAP = 1e-18  # Smallest significant difference of energies [J].
+MAX_STICKING_SLIP_FRACTION = 0.5
+MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
+MIN_ENERGY_DIFFERENCE = 1e-18  # Smallest significant difference of energies [J].
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
-WORK_ROUND_OFF = 1e-10
-FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
-MIN_SLIDE_RANGE = 1e-15  # Largest range of the relative displacement [m] of an interface at rest.
+RELATIVE_WORK_ROUND_OFF = 1e-10
+STEP_FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
+# Largest range of the relative displacement [m] of an interface at rest.
+MAX_RESTING_SLIDE_RANGE = 1e-15
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
-MAX_SMOOTH_RATIO = 4.0
+MAX_SMOOTH_CURVATURE_RATIO = 4.0
 
 
 def energy_balance(energies: Values):
     """Return the relative error of the energy balance [1] of one run, or (n,) of n runs.
 
     The error is |work in - stored - dissipated| / (integral |power in| + peak stored). Differences up to
-    MIN_ENERGY_GAP count as round-off; without energy, the result is 0.
+    MIN_ENERGY_DIFFERENCE count as round-off; without energy, the result is 0.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def energy_balance(energies: Values):
         energies["work_in"] - energies["stored"] - energies["friction"] - energies["viscous"]
     )
     return ratio_or_zero(
-        imbalance * (imbalance > MIN_ENERGY_GAP), energies["power"] + energies["peak_stored"]
+        imbalance * (imbalance > MIN_ENERGY_DIFFERENCE), energies["power"] + energies["peak_stored"]
     )
 
 
@@ -57,7 +58,7 @@ def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
     exchanged_work : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].
     energy : float or (n,) array, optional
-        Energy that is exchanged and stored in the whole run [J]. The fraction `WORK_ROUND_OFF` of
+        Energy that is exchanged and stored in the whole run [J]. The fraction `RELATIVE_WORK_ROUND_OFF` of
         it is added to `exchanged_work`, so that the result for a stuck interface is not dominated
         by round-off.
 
@@ -68,7 +69,8 @@ def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
     """
     difference = np.abs(sampled_work - balance_work)
     return ratio_or_zero(
-        difference * (difference > MIN_ENERGY_GAP), exchanged_work + WORK_ROUND_OFF * energy
+        difference * (difference > MIN_ENERGY_DIFFERENCE),
+        exchanged_work + RELATIVE_WORK_ROUND_OFF * energy,
     )
 
 
@@ -79,14 +81,16 @@ def ratio_or_zero(part, total):
 
 
 def compute_harmonic(time, weight, values, omega) -> complex:
-    """Return the Fourier coefficient of sampled values at the drive frequency.
+    """Return the complex amplitude c of sampled values f(t) at the drive frequency: f(t) ~ Re(c exp(i omega t)).
+
+    c = 2/T int f(t) exp(-i omega t) dt over the span T of the samples, by a quadrature.
 
     Parameters
     ----------
     time : (k,)
-        Times [s].
+        Times [s], whole periods.
     weight : (k,)
-        Weights of the quadrature.
+        Weights of the quadrature; their sum is arbitrary.
     values : (k,)
         Samples; the result has the same unit.
     omega : float
@@ -96,16 +100,17 @@ def compute_harmonic(time, weight, values, omega) -> complex:
 
 
 def compute_step_harmonic(time, means, omega) -> complex:
-    """Return the Fourier coefficient of a force from its mean value in each time step.
+    """Return the complex amplitude c [N] of a force F(t) from its means in the time steps: F(t) ~ Re(c exp(i omega t)).
 
-    The result is exact for a force that is constant in each step, even if it jumps at a sample.
+    c = 2/T int F(t) exp(-i omega t) dt over the span T of the steps. It is exact for a force that is constant in each
+    step, even if it jumps at a sample.
 
     Parameters
     ----------
     time : (k,)
-        Times [s].
+        Times [s], from the first sample to the last one, whole periods.
     means : (k - 1,)
-        Mean of the force in each step.
+        Mean of the force in each step [N].
     omega : float
         Angular frequency [rad/s].
     """
@@ -116,7 +121,7 @@ def compute_step_harmonic(time, means, omega) -> complex:
 def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Values:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
 
-    The interface sticks while less than SLIP_FRACTION of the change of its relative displacement is
+    The interface sticks while less than MAX_STICKING_SLIP_FRACTION of the change of its relative displacement is
     irreversible, or while it is at rest. The transition time is interpolated linearly between the
     midpoints of the steps. The phase, modulo pi, is that of the start of slip after stick.
 
@@ -129,7 +134,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     steps_per_cycle : int
         Number of samples per cycle.
     """
-    if interpolate_range(window.slide)[0] <= MIN_SLIDE_RANGE:
+    if interpolate_range(window.slide)[0] <= MAX_RESTING_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
 
@@ -145,9 +150,9 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip_steps = np.abs(np.diff(slip[last_cycles]))
     slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
-    is_moving = slide_steps > COORDINATE_ROUND_OFF * np.abs(window.slide).max()
+    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * np.abs(window.slide).max()
     ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
-    excess = ratio - SLIP_FRACTION
+    excess = ratio - MAX_STICKING_SLIP_FRACTION
 
     # The excess is known at the midpoints of the steps and linear in between.
     before = excess[:-1]
@@ -171,7 +176,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
 def slip_round_off(window: Response) -> float:
     """Return the round-off error of the slip [m]."""
-    return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
+    return MODAL_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start_measure(phases) -> Values:
@@ -198,10 +203,10 @@ def compute_ledger_measures(ledger) -> Values:
 
 
 def work_difference(work, loops, jumps: bool = False) -> float:
-    """Return the relative difference [1] between the friction works of energies and samples.
+    """Return the relative difference [1] between the friction work of the engine and int F dx over the samples.
 
-    The difference between the trapezoidal rule and `work` is divided by the sum of |work| over all steps.
-    It decreases with the square of the step size.
+    |sum of int F dx over all directions by the trapezoidal rule - work| / (sum over all steps of |change of work|). It
+    decreases with the square of the step size, and shows whether the samples resolve the loop.
 
     Parameters
     ----------
@@ -234,7 +239,7 @@ def interpolate_peak(samples) -> tuple[float, float]:
 
     If the curve is smooth, its peak is the vertex of the parabola through the largest sample and its
     neighbours. It is smooth if neighbouring second differences around its largest sample differ by
-    at most a factor of MAX_SMOOTH_RATIO; next to a jump, their signs differ. With a jump at the largest
+    at most a factor of MAX_SMOOTH_CURVATURE_RATIO; next to a jump, their signs differ. With a jump at the largest
     sample, the error is the change over one step on the smooth side. With a kink between two samples, it is the
     distance of the largest sample from the crossing of the lines through the samples on both sides.
 
@@ -254,7 +259,7 @@ def interpolate_peak(samples) -> tuple[float, float]:
     left, centre, right = samples[middle - 1 : middle + 2].tolist()
     curvature = left - 2 * centre + right
     curvatures = np.diff(samples[max(middle - 2, 0) : middle + 3], 2)
-    if curvatures.max() * MAX_SMOOTH_RATIO <= curvatures.min():
+    if curvatures.max() * MAX_SMOOTH_CURVATURE_RATIO <= curvatures.min():
         # The slope at the middle sample vanishes within one step of it.
         if curvature < 0 and abs(right - left) <= -2 * curvature:
             vertex = centre - (right - left) ** 2 / (8 * curvature)
@@ -369,7 +374,7 @@ def find_reversal_steps(time, position, rate) -> StepReversals:
     with np.errstate(divide="ignore", invalid="ignore"):
         first = p / scaled_root
         second = scaled_root / (3 * cubic)
-    is_first = np.abs(first - 0.5) <= 0.5 + FRACTION_TOL
+    is_first = np.abs(first - 0.5) <= 0.5 + STEP_FRACTION_TOL
     s = np.clip(np.where(is_first, first, second), 0.0, 1.0)
     height = slopes[k] * s * (p + s * (quadratic + s * cubic))
     return StepReversals(k, s, position[k] + height)

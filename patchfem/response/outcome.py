@@ -15,7 +15,7 @@ from . import stationary
 from .measures import Measures
 from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
-    CLASSES,
+    MOTION_CLASSES,
     classify_motions,
     judge_motions,
     measure_windows,
@@ -23,10 +23,10 @@ from .settling import (
     select_reported,
 )
 
-OPEN_LOOP = "the friction loop of the last cycle does not close"
+OPEN_LOOP_MESSAGE = "the friction loop of the last cycle does not close"
 # Safety factor for the proposed number of cycles of a decay, because the last amplitudes may
 # contain a beat.
-CYCLES_SAFETY_FACTOR = 1.5
+PROPOSED_CYCLES_SAFETY_FACTOR = 1.5
 MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
 # Round-off error of an amplitude, relative to the displacement a/omega^2 of the drive.
 AMPLITUDE_ROUND_OFF = 1e-12
@@ -118,7 +118,7 @@ def judge_outcome(
             return Outcome.STEADY, {}
         classes = classify_motions(windows.amplitude[None], tolerance, floor)
         drift = windows.find_drift(window)
-    outcome = CLASSES[classes[0]]
+    outcome = MOTION_CLASSES[classes[0]]
 
     # For several tones, the drift from cycle to cycle is part of their beat.
     if (is_periodic or drive.segments) and _has_drift(measures, tolerance, drift):
@@ -273,7 +273,7 @@ def describe_ringing(ratio: float, limits: tuple[float, float], cycles: float) -
     more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
     advice = 'set accuracy.method = "harmonic" for the steady motion'
     if more_cycles < MAX_PROPOSED_CYCLES:
-        proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
+        proposed = float(f"{cycles + PROPOSED_CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
     return (
         f"the interface sticks, but the amplitude has not settled: by up to {100 * ratio:.2g} % (limit "

@@ -12,13 +12,18 @@ from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..structure import drive_sizes
 from .measures import Measures
-from .rows import STEADY_AMPLITUDE, TABLE
+from .rows import MOTION_TABLE, STEADY_AMPLITUDE
 
-ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
+ACCELERATION_MEASURES = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # Largest contribution of other modes to the relative displacement, as a fraction, at which the
 # damping ratio is attributed to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
-CYCLE_MEASURES = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
+PERIODIC_MEASURES = (
+    "equivalent_stiffness",
+    "secant_stiffness",
+    "equivalent_damping",
+    *ACCELERATION_MEASURES,
+)
 ALWAYS_STICKS_REASON = "the whole interface sticks throughout the last cycles"
 UNBOUNDED_REASON = "no bounded motion exists at this drive"
 OUTPUT_AT_REST_REASON = (
@@ -63,7 +68,7 @@ def find_missing(
         Fraction of the relative displacement due to modes other than the first [1].
     """
     reasons = {}
-    for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATIONS:
+    for name in PERIODIC_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
         reasons[name] = _reason_for_missing_cycle_value(
             name, values, window, drive, other_modes_fraction
         )
@@ -107,7 +112,7 @@ def find_invalid(
     reasons = {}
     stick = measures.get("stick_fraction")
     if is_rigid and stick is not None and stick.value is not None:
-        if stick.value > TABLE["stick_fraction"].floor + (stick.error or 0.0):
+        if stick.value > MOTION_TABLE["stick_fraction"].floor + (stick.error or 0.0):
             reasons["secant_stiffness"] = STICKS_AT_REVERSAL_REASON
     is_periodic = drive_sizes.is_periodic(drive)
     if not is_periodic:
@@ -126,12 +131,13 @@ def find_invalid(
 
 
 def _list_open_loops(measures: Measures, window, drive) -> list[str]:
-    """Return the names of the areas of friction loops that are not closed.
+    """Return the names of those measures loop_area, loop_area_2, ... whose friction loop is not closed.
 
     The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a release, the
     interface also stores or returns energy. If this exceeds the dissipation, the area has no meaning. For several
     interfaces, only the sum of the energies is known: a loop does not close if its interface returns more energy than it
-    takes although no energy is created. `window` has the histories of the last cycles with the sums of energy.
+    takes although no energy is created. `measures` are those of the run by name, `drive` has the period, and `window` has
+    the histories of the last cycles with the sums of energy.
     """
     ledger = window.extra.get("ledger")
     loop = measures.get("loop_area")
@@ -149,7 +155,7 @@ def _list_open_loops(measures: Measures, window, drive) -> list[str]:
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
     """Return a measure without a value, with the reason."""
-    row = TABLE[name]
+    row = MOTION_TABLE[name]
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
@@ -197,9 +203,9 @@ def _reason_for_missing_cycle_value(
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
-    if name in ACCELERATIONS and ACCELERATIONS[0] in values:
+    if name in ACCELERATION_MEASURES and ACCELERATION_MEASURES[0] in values:
         return OUTPUT_AT_REST_REASON
-    if name in ACCELERATIONS:
+    if name in ACCELERATION_MEASURES:
         return "the output has no acceleration"
     if "equivalent_stiffness" not in values:
         return f"{ALWAYS_STICKS_REASON}, so the slide does not change and the loop has no width"

@@ -24,7 +24,7 @@ from .loops import (
     secant_stiffness,
 )
 from .measures import (
-    MIN_SLIDE_RANGE,
+    MAX_RESTING_SLIDE_RANGE,
     Measures,
     Values,
     compute_ledger_measures,
@@ -32,7 +32,7 @@ from .measures import (
     compute_slip_measures,
     energy_balance,
 )
-from .spectrum import MIN_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
+from .spectrum import MIN_MOVING_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +50,11 @@ class LastCycles:
     - integrated: measures that the engine integrated.
     - loop: first harmonics of relative displacement [m] and friction force [N], and work per cycle
       [J]; None if the window contains no complete cycle.
-    - ledger (4, k): friction work and energies [J], or None.
+    - ledger (4, k): friction work, and stored, dissipated and created energy [J] of the whole run, or None.
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - is_single_interface: whether the interfaces are parts of a single one.
+    - is_single_interface: whether the columns `slides` of the window are strips of a single interface.
     """
 
     window: Response
@@ -105,7 +105,7 @@ class LastCycles:
         if self.loop is None or self.load is None:
             return {}
         is_moving = self.is_sine and np.ptp(self.window.slide) > max(
-            2 * self.slide_round_off, MIN_SLIDE_RANGE
+            2 * self.slide_round_off, MAX_RESTING_SLIDE_RANGE
         )
         if not is_moving:
             return interface_loop(0.0, *self.loop, self.stiffness)
@@ -138,7 +138,10 @@ class LastCycles:
         )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure, or None if it has none, as one of a sine under another drive."""
+        """Return the value of a measure by its row in the table, in the unit of the row.
+
+        None if it has no value: measures with the flag "sine" have none under a drive that is no sine.
+        """
         if row.has("sine") and not self.is_sine:
             return None
         if isinstance(row.function, str):
@@ -214,12 +217,7 @@ def _random_rows(
     """
     scatter = f"{name}_scatter"
     value_row = MeasureDefinition(
-        name,
-        unit,
-        floor,
-        definition,
-        "random_response_measures",
-        group=group,
+        name, unit, floor, definition, "random_response_measures", group=group
     )
 
     # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
@@ -241,10 +239,10 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapo
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-UNIT_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
+UNIT_LARGER_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
 # Order of convergence of values that are interpolated by cubics between samples.
 CUBIC_CONVERGENCE_ORDER = 4.0
-ROWS = (
+MOTION_MEASURE_ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
         "m",
@@ -281,14 +279,14 @@ ROWS = (
         "sum of the exchanged energy and the largest stored energy",
         lambda s: energy_balance(s.run_energies),
         group="energy",
-        larger_term=UNIT_TERM,
+        larger_term=UNIT_LARGER_TERM,
         flags="error",
         friction_scale=lambda _: 0.0,
     ),
     MeasureDefinition(
         "absolute_acceleration_fundamental",
         "m s-2",
-        MIN_HARMONIC,
+        MIN_MOVING_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
         "acceleration_measures",
         flags="level curve sine",
@@ -336,7 +334,7 @@ ROWS = (
         "slip_measures",
         0.35,
         group="friction",
-        larger_term=UNIT_TERM,
+        larger_term=UNIT_LARGER_TERM,
         flags="interface level",
     ),
     MeasureDefinition(
@@ -475,7 +473,7 @@ ROWS = (
         lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
         4.0,
         group="friction",
-        larger_term=UNIT_TERM,
+        larger_term=UNIT_LARGER_TERM,
     ),
     MeasureDefinition(
         "relative_displacement_amplitude_steady",
@@ -583,12 +581,12 @@ INTERNAL_ROWS = (
     ),
 )
 INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
-TABLE = {row.name: row for row in (*ROWS, *INTERNAL_ROWS)}
+MOTION_TABLE = {row.name: row for row in (*MOTION_MEASURE_ROWS, *INTERNAL_ROWS)}
 
 
 def select_names(flag: str) -> tuple[str, ...]:
     """Return the names of the measures of a motion that belong to a set, in the order of the table."""
-    return tuple(row.name for row in TABLE.values() if row.has(flag))
+    return tuple(row.name for row in MOTION_TABLE.values() if row.has(flag))
 
 
 INTERFACE_MEASURES = select_names("interface")
@@ -605,14 +603,14 @@ def compute_measures(last_cycles: LastCycles) -> Values:
     """
     known = last_cycles.integrated.values
     values = {}
-    for row in TABLE.values():
+    for row in MOTION_TABLE.values():
         if row.name in known:
             values[row.name] = known[row.name]
         elif row.function is not None:
             values[row.name] = last_cycles.evaluate(row)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
-            values[add_interface_number(name, number)] = interface.evaluate(TABLE[name])
+            values[add_interface_number(name, number)] = interface.evaluate(MOTION_TABLE[name])
     return {name: value for name, value in (values | known).items() if value is not None}
 
 
@@ -683,7 +681,7 @@ def set_final_floors(measures: Measures, tolerance: float) -> Measures:
     values = {name: value for name, value in values.items() if value is not None}
     updated = {name: one for name, one in measures.items() if name not in INTERNAL_VALUES}
     for name in values.keys() & updated.keys():
-        if remove_interface_number(name) in TABLE:
+        if remove_interface_number(name) in MOTION_TABLE:
             floor = tolerance * float(larger_term(name, values))
             if floor > measures[name].floor:
                 updated[name] = replace(measures[name], floor=floor)
@@ -695,4 +693,4 @@ def find_definition(name: str) -> MeasureDefinition:
 
     KeyError is raised for an unknown name.
     """
-    return TABLE[remove_interface_number(name)]
+    return MOTION_TABLE[remove_interface_number(name)]

@@ -10,27 +10,27 @@ import numpy as np
 
 from ..core import Outcome
 
-CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
-STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
-GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
-MIN_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
+MOTION_CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
+STEADY_CLASS = 1  # Index of Outcome.STEADY in MOTION_CLASSES.
+GROWS_CLASS = 2  # Index of Outcome.GROWS in MOTION_CLASSES.
+MIN_FREE_MOTION_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
 # Number of the last windows from which a steady amplitude is extrapolated.
 N_FINAL_WINDOWS = 5
 # Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
-SLIP_SPEED_TOL = 1e-3
+MAX_STUCK_SPEED_RATIO = 1e-3
 # Largest sine of the angle between two phasor differences that count as collinear.
-COLLINEAR_SINE = 0.02
+MAX_COLLINEAR_PHASOR_SINE = 0.02
 # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
-PERIODIC_TOL = 0.1
+MIN_PERIODIC_BEAT_DECAY = 0.1
 # Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
 # reported.
-ESTIMATE_TOL = 0.02
+MIN_REPORTED_CHANGE_FRACTION = 0.02
 
 
 class MotionEnds(NamedTuple):
     """How n motions under periodic drives end.
 
-    - classes (n,): indices of CLASSES.
+    - classes (n,): indices of MOTION_CLASSES.
     - steady (2, n): steady amplitudes and their errors [m], or NaN if unknown.
     """
 
@@ -92,7 +92,8 @@ def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> 
     """Return the steady amplitudes that are measures of n motions, with the errors of the computed amplitudes added.
 
     They are those of transient motions, and of steady motions whose amplitude will still change by more than
-    ESTIMATE_TOL times the tolerance. The relative error of the computed amplitude is also that of the steady one.
+    MIN_REPORTED_CHANGE_FRACTION times the tolerance. The relative error of the computed amplitude is also that of the
+    steady one.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> 
     """
     value, error = steady
     change = np.abs(value - amplitude) + error
-    is_changing = change > ESTIMATE_TOL * tolerance * np.abs(amplitude)
+    is_changing = change > MIN_REPORTED_CHANGE_FRACTION * tolerance * np.abs(amplitude)
     is_reported = (outcomes == Outcome.TRANSIENT) | ((outcomes == Outcome.STEADY) & is_changing)
     total = error + amplitude_error * value / np.maximum(np.abs(amplitude), 1e-300)
     return np.where(is_reported, [value, total], np.nan)
@@ -137,7 +138,7 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
     Returns
     -------
     (n,) array
-        Indices of CLASSES.
+        Indices of MOTION_CLASSES.
     """
     classes = np.zeros(len(amplitudes), int)
     if amplitudes.shape[1] == 1:
@@ -257,7 +258,7 @@ def plane_map_remainders(p) -> np.ndarray:
     """
     d1, d2, d3 = np.diff(np.asarray(p, complex), axis=1).T
     area = (d1.conj() * d2).imag
-    is_contraction = np.abs(area) > COLLINEAR_SINE * np.abs(d1) * np.abs(d2)
+    is_contraction = np.abs(area) > MAX_COLLINEAR_PHASOR_SINE * np.abs(d1) * np.abs(d2)
     area = np.where(is_contraction, area, 1.0)
     t = (d1.conj() * d3).imag / area
     q = (d2.conj() * d3).imag / area
@@ -339,7 +340,7 @@ def remaining_free_motion(windows: Windows, decay=0.0):
     """
     amplitude = windows.amplitude
     count = amplitude.shape[-1]
-    if count < MIN_WINDOWS:
+    if count < MIN_FREE_MOTION_WINDOWS:
         return np.zeros(amplitude.shape[:-1])[()]
 
     n_third = max(1, count // 3)
@@ -350,7 +351,9 @@ def remaining_free_motion(windows: Windows, decay=0.0):
     excess = windows.excess
     decayed_fraction = 1 - np.exp(-np.asarray(decay) * n_third)
     least_excess = (1 - decayed_fraction / 2) * excess[..., previous].max(axis=-1)
-    persists = (decayed_fraction > PERIODIC_TOL) & (excess[..., last].max(axis=-1) > least_excess)
+    persists = (decayed_fraction > MIN_PERIODIC_BEAT_DECAY) & (
+        excess[..., last].max(axis=-1) > least_excess
+    )
 
     # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
@@ -419,7 +422,7 @@ def slip_period(time, rate) -> float:
 
     The result is 0 if there are fewer than two slip intervals, or if the last one started more than 1.5
     times this period before the end, so that the interface sticks. The interface slips while its rate
-    exceeds SLIP_SPEED_TOL times the largest rate. A motion without stick has two slip intervals per cycle.
+    exceeds MAX_STUCK_SPEED_RATIO times the largest rate. A motion without stick has two slip intervals per cycle.
 
     Parameters
     ----------
@@ -427,7 +430,9 @@ def slip_period(time, rate) -> float:
         Times [s] and rates of the relative displacement [m/s].
     """
     rate = np.asarray(rate, float)
-    direction = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))
+    direction = np.sign(rate) * (
+        np.abs(rate) > MAX_STUCK_SPEED_RATIO * np.abs(rate).max(initial=0.0)
+    )
     time = np.asarray(time, float)
     start_steps = np.flatnonzero((direction[1:] != 0) & (direction[1:] != direction[:-1]))
     # slip starts at the last sample of the preceding stick interval

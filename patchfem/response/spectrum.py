@@ -9,12 +9,13 @@ import numpy as np
 
 from .measures import Values
 
-MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
+# Smallest first harmonic [m s-2] of an output that counts as moving.
+MIN_MOVING_HARMONIC = 1e-4
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
-GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a step of length 1.
-GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
+STEP_GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a step of length 1.
+STEP_GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
 def motion_harmonic(time, value, rate, omega: float) -> complex:
@@ -37,10 +38,10 @@ def motion_harmonic(time, value, rate, omega: float) -> complex:
     # The cubic of a step is its chord plus s (1 - s) (a (1 - s) + b s), with the excess slopes a and b of its ends.
     first_excess = rate[:-1] * step - rise
     last_excess = rise - rate[1:] * step
-    s = GAUSS_POINTS[:, None]
+    s = STEP_GAUSS_POINTS[:, None]
     motion = value[:-1] + s * (rise + (1 - s) * ((1 - s) * first_excess + s * last_excess))
     phases = np.exp(-1j * omega * (time[:-1] + s * step))
-    return 2 / (time[-1] - time[0]) * np.sum(GAUSS_WEIGHTS @ (motion * phases) * step)
+    return 2 / (time[-1] - time[0]) * np.sum(STEP_GAUSS_WEIGHTS @ (motion * phases) * step)
 
 
 def differentiate_harmonic(harmonic, values, time, omega: float):
@@ -122,7 +123,7 @@ def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> 
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
     """
-    is_moving = first_harmonic > MIN_HARMONIC
+    is_moving = first_harmonic > MIN_MOVING_HARMONIC
     return {
         "absolute_acceleration_fundamental": float(first_harmonic),
         "acceleration_distortion": third_harmonic / first_harmonic if is_moving else None,

@@ -23,10 +23,11 @@ from .welch import CrossDensities, Segments, average_segments, transform_segment
 
 SEGMENTS_PER_RECORD = 16  # Ratio of the record length to the segment length.
 # Number of parts of the record for the estimate of the scatter; in the jackknife, groups of segments.
-N_GROUPS = 10
-FIT_BAND = 6.0, 8.0  # Half-width of the fitted band, in half-power widths and in spectral lines.
+N_RECORD_PARTS = 10
+# Half-width of the band in which a peak is fitted, in half-power widths and in spectral lines.
+FIT_BAND_HALF_WIDTHS = 6.0, 8.0
 # Smallest record length in decay times of the mode; parts of a shorter record are correlated.
-MIN_DECAY_TIMES = 50.0
+MIN_RECORD_DECAY_TIMES = 50.0
 MIN_SEGMENT_SAMPLES = 64  # Smallest number of samples of a segment.
 
 
@@ -126,11 +127,11 @@ def warn_if_short(measures: Measures, window) -> list[str]:
     frequency, zeta = (measures[name].value for name in names)
     span = float(window.time[-1] - window.time[0])
     decay = 1 / (2 * np.pi * frequency * zeta)
-    if span >= MIN_DECAY_TIMES * decay:
+    if span >= MIN_RECORD_DECAY_TIMES * decay:
         return []
     return [
         f"the response lasts only {span / decay:.2g} decay times of the mode at {frequency:.4g} Hz, too short for a "
-        f"reliable scatter between random drives; set drive.duration = '{1.5 * MIN_DECAY_TIMES * decay:.2g} s'"
+        f"reliable scatter between random drives; set drive.duration = '{1.5 * MIN_RECORD_DECAY_TIMES * decay:.2g} s'"
     ]
 
 
@@ -147,26 +148,27 @@ def compute_rms(time, values) -> float:
 def rms_scatter(values) -> float:
     """Return the confidence half-width of the root mean square of equally spaced samples.
 
-    The interval follows from the mean squares of N_GROUPS parts. It is computed for the logarithm of the
+    The interval follows from the mean squares of N_RECORD_PARTS parts. It is computed for the logarithm of the
     mean square, because the distribution is skewed for few oscillations; its upper half is returned.
     """
-    if values.size < N_GROUPS:
+    if values.size < N_RECORD_PARTS:
         return np.nan
     square = (values - values.mean()) ** 2
-    parts = square[: square.size // N_GROUPS * N_GROUPS].reshape(N_GROUPS, -1).mean(axis=1)
+    parts = (
+        square[: square.size // N_RECORD_PARTS * N_RECORD_PARTS]
+        .reshape(N_RECORD_PARTS, -1)
+        .mean(axis=1)
+    )
     mean = square.mean()
     if not mean > 0:
         return 0.0
-    relative_half_width = (
-        stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS) / mean
-    )
-    return float(np.sqrt(mean) * np.expm1(relative_half_width / 2))
+    return float(np.sqrt(mean) * np.expm1(_confidence_half_width(parts) / mean / 2))
 
 
 def mean_power(time, work) -> tuple[float, float]:
     """Return the mean power [W] and its confidence half-width [W] from the cumulative work.
 
-    The half-width comes from the means over N_GROUPS parts of equal length.
+    The half-width comes from the means over N_RECORD_PARTS parts of equal length.
 
     Parameters
     ----------
@@ -175,9 +177,14 @@ def mean_power(time, work) -> tuple[float, float]:
     work : (k,)
         Work done since the start [J].
     """
-    edges = np.linspace(time[0], time[-1], N_GROUPS + 1)
+    edges = np.linspace(time[0], time[-1], N_RECORD_PARTS + 1)
     parts = np.diff(np.interp(edges, time, work)) / np.diff(edges)
-    return parts.mean(), stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS)
+    return parts.mean(), _confidence_half_width(parts)
+
+
+def _confidence_half_width(parts) -> float:
+    """Return the half-width of the 95 % interval of the mean of N_RECORD_PARTS independent values, by Student's t."""
+    return stdtrit(N_RECORD_PARTS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_RECORD_PARTS)
 
 
 def is_stationary(window, drive) -> bool:
@@ -255,7 +262,7 @@ def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
     line = frequency[1]
     span = 1 / line
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
-    if inside.size < 5 or len(drive_transforms) < N_GROUPS:
+    if inside.size < 5 or len(drive_transforms) < N_RECORD_PARTS:
         return None
 
     # H1 = G_ax/G_aa, averaged over the segments.
@@ -277,7 +284,9 @@ def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
     for _ in range(3):  # the fitted band is adapted to the width of the peak
         frequency_fit = np.exp(theta[0]) / (2 * np.pi)
         half_width = np.exp(theta.sum()) / (2 * np.pi)
-        in_fit_band = np.abs(f - frequency_fit) <= max(FIT_BAND[0] * half_width, FIT_BAND[1] * line)
+        in_fit_band = np.abs(f - frequency_fit) <= max(
+            FIT_BAND_HALF_WIDTHS[0] * half_width, FIT_BAND_HALF_WIDTHS[1] * line
+        )
         theta = _fit_mode(f[in_fit_band], gain[in_fit_band], span, theta)
     if (
         in_fit_band.sum() < 5
@@ -287,9 +296,9 @@ def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
         return None
 
     # Jackknife: the fit is repeated without each group, and var = (g - 1)/g sum (theta_i - mean)^2.
-    group_of_segment = np.arange(len(drive_transforms)) * N_GROUPS // len(drive_transforms)
+    group_of_segment = np.arange(len(drive_transforms)) * N_RECORD_PARTS // len(drive_transforms)
     estimates = []
-    for group in range(N_GROUPS):
+    for group in range(N_RECORD_PARTS):
         is_used = group_of_segment != group
         partial_gain = cross[is_used][:, in_fit_band].sum(axis=0) / drive_powers[is_used][
             :, in_fit_band
@@ -297,7 +306,9 @@ def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
         estimates.append(np.exp(_fit_mode(f[in_fit_band], partial_gain, span, theta)))
 
     scale = np.array([1 / (2 * np.pi), 1.0])
-    half_widths = np.sqrt((N_GROUPS - 1) * np.var(estimates, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
+    half_widths = np.sqrt((N_RECORD_PARTS - 1) * np.var(estimates, axis=0)) * stdtrit(
+        N_RECORD_PARTS - 1, 0.975
+    )
     return np.exp(theta) * scale, half_widths * scale
 
 
@@ -327,13 +338,8 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
         return basis @ (basis.T @ target) - target
 
     max_change = np.array([0.5, 7.0])
-    return least_squares(
-        compute_residual,
-        theta,
-        bounds=(theta - max_change, theta + max_change),
-        xtol=1e-10,
-        ftol=1e-10,
-    ).x
+    bounds = theta - max_change, theta + max_change
+    return least_squares(compute_residual, theta, bounds=bounds, xtol=1e-10, ftol=1e-10).x
 
 
 def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:

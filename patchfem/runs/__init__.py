@@ -62,11 +62,11 @@ PUBLIC = {
         "compute_pieces",
     ),
     "plan": (
-        "GROUPS",
+        "DIMENSIONLESS_GROUPS",
         "Plan",
     ),
     "results.patch_rows": (
-        "TABLE",
+        "PATCH_TABLE",
         "find_unknown_measures",
     ),
     "results.result": (

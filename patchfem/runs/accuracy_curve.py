@@ -10,9 +10,9 @@ from ..response.errors import ERROR_MEASURES, absolute_change
 from .refine import is_main
 from .results.patch_rows import Measures, Values
 
-SUM_ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
+LONG_SUM_ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
-NO_EFFECT_RATIO = 0.9
+INEFFECTIVE_STEPS_ERROR_RATIO = 0.9
 
 
 class StepSetting(NamedTuple):
@@ -71,8 +71,8 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
         # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))
-    has_effect = settings[0].error * NO_EFFECT_RATIO >= present
-    return settings if has_effect and present >= SUM_ROUND_OFF else []
+    has_effect = settings[0].error * INEFFECTIVE_STEPS_ERROR_RATIO >= present
+    return settings if has_effect and present >= LONG_SUM_ROUND_OFF else []
 
 
 def _select_measures(measures: Measures, step_runs) -> Measures:

@@ -12,12 +12,12 @@ from ..response import outcome
 from .results.result import Result
 
 # Largest relative residual of the load; the contact solver reaches 1e-9 or less.
-LOAD_TOL = 1e-6
+LOAD_BALANCE_TOL = 1e-6
 # Largest residual of the energy of a bench relative to the exchanged energy. All terms are integrated by the same rule,
 # so that the residual falls with the number of steps.
-BENCH_TOL = 0.01
+BENCH_ENERGY_TOL = 0.01
 # The same of a march, whose energies differ by round-off only. A billion steps have less.
-MARCH_TOL = 1e-8
+MARCH_ENERGY_TOL = 1e-8
 
 
 def mark_unbalanced(result: Result) -> Result:
@@ -48,11 +48,11 @@ def _check_load(result: Result) -> Iterator[str]:
         return
     load = model.patch.loading.load
     total = float(patch.pressure.sigma_n @ patch.pieces.interface.weight)
-    if abs(total - load) > LOAD_TOL * load:
+    if abs(total - load) > LOAD_BALANCE_TOL * load:
         yield (
             f"equilibrium: the integral of the normal stress is {total:.6g} N, but the load is {load:.6g} N; they differ "
-            f"by {abs(total - load) / load:.2g} of the load (limit {LOAD_TOL:g}); do not use this result, and report it "
-            "with the scene and what `patchfem doctor` prints"
+            f"by {abs(total - load) / load:.2g} of the load (limit {LOAD_BALANCE_TOL:g}); do not use this result, and "
+            "report it with the scene and what `patchfem doctor` prints"
         )
 
 
@@ -64,9 +64,9 @@ def _check_energy(result: Result) -> Iterator[str]:
     residual = result.measures.get("energy_balance")
     if residual is None or residual.value is None:
         return
-    limit = BENCH_TOL
+    limit = BENCH_ENERGY_TOL
     if result.plan.model.rig is not None:
-        limit = MARCH_TOL if result.settings.steps_per_cycle else inf
+        limit = MARCH_ENERGY_TOL if result.settings.steps_per_cycle else inf
     if abs(residual.value) > limit:
         yield (
             f"energy balance: {abs(residual.value):.2g} of the exchanged energy is missing or was created (limit "

@@ -24,14 +24,14 @@ from .results.result import Advice, Finding, Result
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
 PROPOSED_TOLERANCE_RATIO = 0.1
 # Largest number of halvings of a time step that the scene fixes; with more of them, the key is to be left out.
-MAX_FIXED_HALVINGS = 4
+MAX_FIXED_STEP_HALVINGS = 4
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
 MAX_PROPOSED_STRIPS = 64
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
-ELEMENT_SIZE = "contact.element_size"
-STEPS_KEY = "accuracy.steps_per_cycle"
+ELEMENT_SIZE_KEY = "contact.element_size"
+STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
 # Ratio of the proposed accuracy.max_seconds to the expected CPU time, which varies by tens of per cent.
 MAX_SECONDS_MARGIN = 2.0
 
@@ -115,7 +115,7 @@ def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Findin
 
     def find_on_face(face: Face) -> list[Finding]:
         """Return the findings on one interface, whose measures have no number there."""
-        numbered = {name: face.name_measure(name) for name in patch_rows.TABLE}
+        numbered = {name: face.name_measure(name) for name in patch_rows.PATCH_TABLE}
         own = {name: measures[full] for name, full in numbered.items() if full in measures}
         missed = {name: excess.pop(full) for name, full in numbered.items() if full in excess}
         if not missed:
@@ -177,11 +177,11 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
 
 def _advise_strips(patch_model, excess: Mapping) -> Advice:
     """Return the advice to use as many strips as second order requires, at least twice as many."""
-    ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_ORDER))
+    ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_CONVERGENCE_ORDER))
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_PROPOSED_STRIPS:
         return NO_ADVICE
-    also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
+    also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE_KEY}"
     return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
 
 
@@ -206,7 +206,7 @@ def _advise_mesh(
     if any(patch_model.mesh.file is not None for patch_model, _ in solved):
         return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
     if not all(patch_model.mesh.is_automatic for patch_model, _ in solved):
-        return Advice(f"{cause}leave out {ELEMENT_SIZE}", ELEMENT_SIZE)
+        return Advice(f"{cause}leave out {ELEMENT_SIZE_KEY}", ELEMENT_SIZE_KEY)
     if missed.is_time_short("mesh"):
         return _advise_time(missed, "finer meshes", cause)
     if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
@@ -257,17 +257,19 @@ def _advise_steps(missed: Missed) -> Advice | None:
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
-    halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_ORDER)
+    halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_CONVERGENCE_ORDER)
 
     # A rig doubles its steps while this reduces the errors, or needs none, unless the scene fixes them.
     model = missed.model
     fixed = ["method"] * (model.accuracy.method != "auto")
     if model.accuracy.steps_per_cycle is not None:
         fixed.append("steps_per_cycle")
-    if model.kind == "rig" and fixed and halvings > MAX_FIXED_HALVINGS:
+    if model.kind == "rig" and fixed and halvings > MAX_FIXED_STEP_HALVINGS:
         keys = " and ".join(f"accuracy.{key}" for key in fixed)
         return Advice(f"leave out {keys}; the steps then follow from the tolerance", keys)
-    return Advice.set_key(STEPS_KEY, steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS))
+    return Advice.set_key(
+        STEPS_PER_CYCLE_KEY, steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
+    )
 
 
 def _advise_motion_mesh(missed: Missed) -> Advice | None:

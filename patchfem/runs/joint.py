@@ -29,7 +29,7 @@ from .patch import mesh_levels, store
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
-MAX_LOG_FACTOR = 5.0
+MAX_LOG_COMPLIANCE_FACTOR = 5.0
 
 
 class FreeRig(NamedTuple):
@@ -230,7 +230,11 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
 def _match_stiffness(
     patches: Sequence, stiffness: StickStiffness | None, n_errors: int
 ) -> list[Patch | None]:
-    """Return patches with a given stiffness in full stick, plus a number of its errors."""
+    """Return patches whose tangential stiffness in full stick is `stiffness.value + n_errors * stiffness.error`.
+
+    With `n_errors` = 1 a comparison run shows the effect of the error of the stiffness. Patches without load, and all
+    patches if `stiffness` is None, are unchanged; None stands for a missing mesh.
+    """
     if stiffness is None:
         return list(patches)
     out = []
@@ -246,6 +250,7 @@ def _match_stiffness(
 def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray:
     """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
 
+    `bond_length` [m] is that of the friction law, whose bonds are in series with the pieces; 0 for rigid contact.
     Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
     such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """
@@ -256,9 +261,11 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
         """Return the relative excess of the stiffness for a scaled compliance."""
         return _sum_nodal_forces(patch, np.exp(log_factor), bond_length) / stiffness - 1
 
-    if not excess(-MAX_LOG_FACTOR) > 0 > excess(MAX_LOG_FACTOR):
+    if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
-    factor = np.exp(brentq(excess, -MAX_LOG_FACTOR, MAX_LOG_FACTOR, xtol=1e-14))
+    factor = np.exp(
+        brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
+    )
     return frozen_array(factor * patch.slip_compliance)
 
 

@@ -13,14 +13,15 @@ from ..points import checkpoint
 from .plan import Plan
 from .rig import engines, numerics
 
-FIXED_BYTES = 160e6  # packages and compiled code [bytes]
-# Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
-NODE_BYTES = {True: 4.6e3, False: 8.1e3}
-STRIP_NODE_BYTES = 3e3  # per strip and interface node [bytes]
-SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
-MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
-DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
-HYBRID_SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
+PROGRAM_BYTES = 160e6  # packages and compiled code [bytes]
+BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them [bytes]
+BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion [bytes]
+BYTES_PER_STRIP_NODE = 3e3  # per strip and interface node [bytes]
+BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide [bytes]
+# Per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
+BYTES_PER_MODE_PAIR = 125.0
+BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive [bytes]
+HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
 
@@ -73,14 +74,14 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     if any(patch.mesh.file for patch in patches):
         remedy = "give contact.mesh fewer nodes on the interface"
 
-    size = NODE_BYTES[model.kind == "patch"] * nodes
+    size = nodes * (BYTES_PER_STATIC_NODE if model.kind == "patch" else BYTES_PER_MOVING_NODE)
     parts = [
-        MemoryPart(FIXED_BYTES, "packages and compiled code"),
+        MemoryPart(PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),
     ]
     layers = [patch.interface.strips for patch in patches]
     if strips := max((layer.count for layer in layers if layer is not None), default=0):
-        size = STRIP_NODE_BYTES * strips * points
+        size = BYTES_PER_STRIP_NODE * strips * points
         parts.append(MemoryPart(size, f"{strips} strips of them", "lower contact.strips.count"))
 
     # The histories of a motion count by its stored samples, which the scene may set by the steps.
@@ -89,7 +90,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
         remedy = f"lower {'accuracy.steps_per_cycle' if has_steps else 'slide.cycles'}"
         if model.slide.kind == "file":
             remedy = "give fewer rows in slide.file"
-        size = SLIDE_SAMPLE_BYTES * plan.samples
+        size = BYTES_PER_SLIDE_SAMPLE * plan.samples
         parts.append(MemoryPart(size, f"{plan.samples} samples of the slide", remedy))
     elif model.rig is not None:
         parts += _list_parts_of_motion(plan, has_steps=has_steps)
@@ -109,8 +110,8 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     n_rows = 0 if drive.signal.segments else len(getattr(drive.signal, "breaks", ()))
     shorter = "give fewer rows in drive.file, or lower drive.duration"
     parts = [
-        MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "give fewer modes"),
-        MemoryPart(DRIVE_ROW_BYTES * n_rows, f"{n_rows} rows of the drive", shorter),
+        MemoryPart(BYTES_PER_MODE_PAIR * n_modes**2, f"{n_modes} modes", "give fewer modes"),
+        MemoryPart(BYTES_PER_DRIVE_ROW * n_rows, f"{n_rows} rows of the drive", shorter),
     ]
     if engines.ENGINES[plan.engine].finds_periodic_motion:
         return parts
@@ -118,7 +119,7 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = numerics.choose_numerics(model)
     history = HISTORY_BYTES[plan.engine]
-    steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_CYCLE
+    steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)

@@ -144,7 +144,7 @@ def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
     cells = recovery.get_cells(piece)
     u = compute_displacement(piece, shear, normal)
     motion = u[:1] + u[1:]
-    stress = recovery.centre_stress(cells, motion)
+    stress = recovery.compute_centre_stress(cells, motion)
     gauss_points = recovery.make_points(cells, "gauss")
     fit = recovery.fit_recovery(cells)
     error = recovery.estimate_error(fit, motion, stress, gauss_points)

@@ -23,7 +23,7 @@ from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
 
-GROUPS = {  # Definition and SI unit of each group.
+DIMENSIONLESS_GROUPS = {  # Definition and SI unit of each group.
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive, both on the first mode",
         "1",
@@ -139,7 +139,7 @@ def plan(source) -> Plan:
 
 
 def _make_plan(model: Model) -> Plan:
-    """Collect what `plan` states of a Model: its effects, stiffnesses, groups of numbers, sizes and verdict."""
+    """Collect what `plan` states of a Model: its stiffnesses, dimensionless groups, numbers of unknowns and verdict."""
     if model.measured is not None:
         try:
             # An invalid table of measured responses is reported before anything runs.
@@ -155,13 +155,8 @@ def _make_plan(model: Model) -> Plan:
 
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     if model.has_bolted_patch:
-        build_rig = rig.structure.bolted.build_rig
-        model, patches, _ = joint.solve_without_joint(model)
-        values = {name: measure.value for name, measure in patches[0].measures.items()}
-        # The run subtracts the joint again, because its comparison run needs the solved patch.
-        bolted = model.rig.structure.bolted._replace(build_rig=build_rig)
-        rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
-        model = replace(model, rig=rig)
+        model, values = _subtract_joint(model)
+        rig = model.rig
     motion_sentences += model.describe_removed_joint()
 
     # Structure of the rig and contact of the patch.
@@ -186,6 +181,7 @@ def _make_plan(model: Model) -> Plan:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
+            # The whole patch slips when its pieces are sheared by mu_s N/k.
             slip_force = interface.numbers.static * interface.load
             slip_length = slip_force / interface.patch.pieces.shear_stiffness
             patch_sentences.append(
@@ -217,15 +213,21 @@ def _make_plan(model: Model) -> Plan:
     sentences = [*motion_sentences, *patch_sentences, *law_sentences]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
-    return Plan(
-        model,
-        engine,
-        unknowns,
-        samples,
-        chain,
-        groups,
-        tuple(sentences),
-    )
+    return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
+
+
+def _subtract_joint(model: Model) -> tuple[Model, Values]:
+    """Subtract the stiffness of a bolted joint from the modes that were measured with it.
+
+    Returns the model with the modes of the structure alone, and the static measures of the solved joint by name.
+    """
+    build_rig = model.rig.structure.bolted.build_rig
+    model, patches, _ = joint.solve_without_joint(model)
+    values = {name: measure.value for name, measure in patches[0].measures.items()}
+    # The run subtracts the joint again, because its comparison run needs the solved patch.
+    bolted = model.rig.structure.bolted._replace(build_rig=build_rig)
+    rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
+    return replace(model, rig=rig), values
 
 
 def _interface_stiffnesses(model: Model) -> "of_rig.Chain":

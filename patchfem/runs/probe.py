@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 from ..response import rows
 from .plan import Plan
-from .results.patch_rows import TABLE
+from .results.patch_rows import PATCH_TABLE
 from .run import run
 
 # Ratio of the times of the contact on a mesh with half the element size and on the mesh itself (measured: 3.2 to 5.8).
-ELEMENT_FACTOR = 5
+HALF_ELEMENT_SIZE_TIME_RATIO = 5
 
 
 class Probe(NamedTuple):
@@ -51,7 +51,7 @@ def run_probe(plan: Plan) -> Probe:
     sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
     static = {}
     for name, measure in result.measures.items():
-        row = TABLE.get(rows.remove_interface_number(name))
+        row = PATCH_TABLE.get(rows.remove_interface_number(name))
         if row is not None and row.group == "patch":
             static[name] = measure.value
     return Probe(seconds, static, tuple(sentences))
@@ -71,7 +71,7 @@ def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> lis
             factors.append("twice accuracy.steps_per_cycle takes twice the time of the motion")
     if has_contact:
         factors.append(
-            f"half contact.element_size takes about {ELEMENT_FACTOR} times the time of the contact"
+            f"half contact.element_size takes about {HALF_ELEMENT_SIZE_TIME_RATIO} times the time of the contact"
         )
     if plan.model.wear is not None:
         factors.append("each jump over cycles of wear solves the contact about 20 times")

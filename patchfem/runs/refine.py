@@ -19,20 +19,20 @@ from ..formatting import format_number
 from ..model.model import Model
 from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
-from .results.patch_rows import TABLE as PATCH_TABLE
-from .results.patch_rows import Measures, Values
+from .results.patch_rows import PATCH_TABLE, Measures, Values
 from .results.result import TimeShortage
 
-MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
-MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
+DEFAULT_MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
+HALVED_MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
 # The same of runs with twice the steps, or with a hundredth of the step error.
-STEP_COST_RATIO = 2.0
-ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
+DOUBLED_STEPS_COST_RATIO = 2.0
+PASS_ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
-MIN_ERROR_GAIN = 1.5
-MIN_SHARE = 0.5  # Smallest share of an axis in an error that its refinement reduces noticeably.
+MIN_PASS_ERROR_GAIN = 1.5
+# Smallest share of an axis in an error that its refinement reduces noticeably.
+MIN_AXIS_ERROR_FRACTION = 0.5
 MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
-MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
+MAX_REFINED_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.
 FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
 Resolution = TypeVar("Resolution")
@@ -55,13 +55,13 @@ class Verdict(NamedTuple):
     finer: Hashable = None
     axis: str = ""
     seconds: float = 0.0
-    cost_ratio: float = MESH_COST_RATIO
+    cost_ratio: float = HALVED_MESH_COST_RATIO
     max_passes: float = inf
     reason: str = ""
 
     def predict_seconds(self) -> float:
-        """Return the expected CPU time [s] of all further passes, each of which divides the excess by ERROR_RATIO."""
-        n_passes = int(min(ceil(log(self.excess) / log(ERROR_RATIO)), self.max_passes))
+        """Return the expected CPU time [s] of all further passes, each of which divides the excess by PASS_ERROR_RATIO."""
+        n_passes = int(min(ceil(log(self.excess) / log(PASS_ERROR_RATIO)), self.max_passes))
         return self.seconds * sum(self.cost_ratio**k for k in range(1, n_passes + 1))
 
 
@@ -180,7 +180,9 @@ def find_refinable_axis(measure: Measure, name: str, tolerance: float, axes: Ite
     allowed = measure.error / measure.error_ratio(tolerance)
     for axis in sorted(axes, key=lambda axis: -parts.get(axis, 0.0)):
         part = parts.get(axis, 0.0)
-        if part > MIN_SHARE * measure.error or (part > 0 and measure.error - part <= allowed):
+        if part > MIN_AXIS_ERROR_FRACTION * measure.error or (
+            part > 0 and measure.error - part <= allowed
+        ):
             return axis
     return ""
 
@@ -234,19 +236,19 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
         # The mesh has no effect on static measures at the points of a profile.
         main = {name: one for name, one in main.items() if name not in PATCH_TABLE}
     excess, name, axis = find_worst_measure(main, model.accuracy.tolerance, axes)
-    if not axis or (excesses and excess * MIN_ERROR_GAIN > excesses[-1]):
+    if not axis or (excesses and excess * MIN_PASS_ERROR_GAIN > excesses[-1]):
         return Verdict(excess)
 
     finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     if finer is None:
         return Verdict(excess)
     resolution = "half the element size"
-    cost_ratio = MESH_COST_RATIO
+    cost_ratio = HALVED_MESH_COST_RATIO
     max_passes = inf
     if axis == "steps":
         resolution = "twice the steps"
-        cost_ratio = STEP_COST_RATIO
-        max_passes = int(log2(MAX_BENCH_STEPS / result.settings.steps_per_cycle))
+        cost_ratio = DOUBLED_STEPS_COST_RATIO
+        max_passes = int(log2(MAX_REFINED_BENCH_STEPS / result.settings.steps_per_cycle))
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
@@ -270,25 +272,25 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
         earlier = before.get(name)
         if measure.error is None or earlier is None or earlier.error is None:
             continue
-        error = earlier.error / ERROR_RATIO
+        error = earlier.error / PASS_ERROR_RATIO
         if error > measure.error and np.isfinite(error):
             parts = measure.parts
             if parts is not None and earlier.parts is not None:
-                parts = {axis: one / ERROR_RATIO for axis, one in earlier.parts.items()}
+                parts = {axis: one / PASS_ERROR_RATIO for axis, one in earlier.parts.items()}
             bounded[name] = replace(measure, error=error, parts=parts)
     return bounded
 
 
 def is_main(name: str) -> bool:
     """Return whether a run is refined until this measure meets the tolerance; warnings are about all measures."""
-    row = PATCH_TABLE.get(name) or rows.TABLE.get(name)
+    row = PATCH_TABLE.get(name) or rows.MOTION_TABLE.get(name)
     return row is not None and row.has("main")
 
 
 def _refine_steps(model: Model, result) -> Model | None:
     """Return the model of a bench with twice the steps per cycle of a result; None if there are too many."""
     steps = result.settings.steps_per_cycle
-    if 2 * steps > MAX_BENCH_STEPS:
+    if 2 * steps > MAX_REFINED_BENCH_STEPS:
         return None
     accuracy = model.accuracy.model_copy(update={"steps_per_cycle": 2 * steps})
     return replace(model, accuracy=accuracy)

@@ -32,8 +32,8 @@ from .rig import engines, rig
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
-NO_FRICTION_MESSAGE = "no friction acts and no motion was computed"
-NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed patch at rest"
+NO_FRICTION_NO_MOTION_MESSAGE = "no friction acts and no motion was computed"
+NO_MOTION_FOUND_MESSAGE = "no motion was found; the measures are those of the pressed patch at rest"
 
 
 class StateFile(NamedTuple):
@@ -139,7 +139,7 @@ class _Passes:
         self.progress = progress
         self.state_file = state_file
         self.estimate = estimate
-        max_seconds = run_plan.model.accuracy.max_seconds or refine.MAX_SECONDS
+        max_seconds = run_plan.model.accuracy.max_seconds or refine.DEFAULT_MAX_SECONDS
         self.limit = refine.TimeLimit(max_seconds, measure_cpu_time())
         self._count = 0
         self._pressed: tuple[Face, ...] = ()
@@ -221,7 +221,7 @@ class _Passes:
         )
 
         if _is_open(inputs.patch) and model.kind != "patch":
-            warnings.append(NO_FRICTION_MESSAGE)
+            warnings.append(NO_FRICTION_NO_MOTION_MESSAGE)
             result = patch_result.make_static_result(inputs)
         elif _has_no_load(model):
             result = _make_result_without_load(inputs)
@@ -262,7 +262,7 @@ class _Passes:
         return result, moved.faces
 
     def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
-        """Compute the wear of a patch, continuing from a saved state if there is one."""
+        """Compute the wear of a patch, continuing from a saved state if there is one; without a file no state is saved."""
         model = inputs.plan.model
         file = self.state_file
         key = file and hash_run(model, inputs.patch, file.version)
@@ -346,14 +346,17 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
         outcome=Outcome.NO_CONTACT,
         measures={"normal_load": Measure(0.0, "N", 0.0)},
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
+        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_NO_MOTION_MESSAGE],
         notes=inputs.notes,
     )
 
 
 def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
-    """Return the Result of a pressed patch whose motion was not found."""
-    warnings = [*inputs.warnings, NO_MOTION_FOUND]
+    """Return the Result of a pressed patch at rest, marked as not converged, because its motion was not found.
+
+    `run_plan` is the plan before any wear, and `inputs` are those of the motion.
+    """
+    warnings = [*inputs.warnings, NO_MOTION_FOUND_MESSAGE]
     result = patch_result.make_static_result(replace(inputs, plan=run_plan, warnings=warnings))
     result = replace(result, outcome=Outcome.NOT_CONVERGED)
     inputs.seconds["total"] = sum(inputs.seconds.values())
@@ -362,7 +365,10 @@ def _make_result_at_rest(inputs: RunInputs, run_plan: Plan) -> Result:
 
 
 def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunInputs:
-    """Return the inputs of a run with worn surfaces."""
+    """Return the inputs of a run with the worn patch, and with the law and the grooves at its worn depth.
+
+    If no wear could be computed, the law and the grooves are those of the unworn patch.
+    """
 
     def wear_model(model: Model) -> Model:
         """Return a model after wear; unchanged if the last state of the wear is not known."""

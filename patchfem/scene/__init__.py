@@ -9,9 +9,9 @@ Read `scene` first, then `keys/tables`. README.md in this folder explains every 
 PUBLIC = {
     "assignments": (
         "Axis",
-        "BOUNDS",
-        "LISTS",
-        "RANDOM",
+        "BOUNDS_FORM",
+        "LIST_FORM",
+        "RANDOM_FORM",
         "Range",
         "make_axis",
         "read_assignments",
@@ -29,8 +29,8 @@ PUBLIC = {
         "require_files",
     ),
     "joint_laws": (
-        "KNOWLEDGE",
-        "WISHES",
+        "KNOWLEDGE_OF_JOINT",
+        "WISHES_FOR_LAW",
         "choose_law",
         "compose_scene",
     ),
@@ -95,7 +95,7 @@ PUBLIC = {
         "require_units",
     ),
     "starting": (
-        "NEXT_VERBS",
+        "NEXT_VERB_BY_KIND",
         "TEMPLATE_DESCRIPTIONS",
         "find_shipped_scene",
         "read_template",

@@ -62,14 +62,14 @@ class Form(NamedTuple):
     has_ranges: bool
 
 
-LISTS = Form(
+LIST_FORM = Form(
     "--over",
     "table.key=v1,v2,... or table.key=low..high:n, such as contact.tilt.angle=1e-6 rad..1e-2 rad:9",
     has_lists=True,
     has_ranges=False,
 )
-RANDOM = LISTS._replace(has_ranges=True)
-BOUNDS = Form(
+RANDOM_FORM = LIST_FORM._replace(has_ranges=True)
+BOUNDS_FORM = Form(
     "--free",
     "table.key=low..high, such as friction.bond_length=0.2 um..20 um",
     has_lists=False,
@@ -151,7 +151,7 @@ class Range:
 
 
 def read_assignments(
-    texts: Iterable[str], form: Form = LISTS
+    texts: Iterable[str], form: Form = LIST_FORM
 ) -> tuple[list[Axis | Range], list[str]]:
     """Read strings ``table.key=values``.
 
@@ -199,7 +199,7 @@ def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if isinstance(values, str):
-            _append_values(axes, sentences, "", (key, values), LISTS)
+            _append_values(axes, sentences, "", (key, values), LIST_FORM)
         else:
             sentences.append('the values must be a string, such as "0.1..0.6:6"')
         mistakes += [(f"sweep.{key}", sentence) for sentence in sentences]
@@ -257,7 +257,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     return Axis(key, texts, texts, "")
 
 
-def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
+def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
     """Parse the values of a key.
 
     Parameters

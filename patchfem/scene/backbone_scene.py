@@ -19,7 +19,7 @@ ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
 # Drive that a rig must have in a scene. No result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
-STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
+KEYS_OF_MODES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 # Names of modes that are given without names
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
 
@@ -144,7 +144,7 @@ class BackboneTables:
         self.ignored = [name for name in ("slide", "drive") if name in raw]
         raw.pop("slide", None)
         structure = raw.get("structure", {})
-        has_structure = not isinstance(structure, dict) or bool(STRUCTURES & structure.keys())
+        has_structure = not isinstance(structure, dict) or bool(KEYS_OF_MODES & structure.keys())
         if not (self.modes or has_structure) and {"contact", "normal"} & raw.keys():
             self.modes = parse_modes(ASSUMED_MODES)
             self.is_assumed = True
@@ -156,7 +156,7 @@ class BackboneTables:
     def _write_modes(self, raw: TomlTable) -> None:
         """Write the modes into the table [structure] of the plain values `raw` of a scene."""
         structure = raw.setdefault("structure", {})
-        if not isinstance(structure, dict) or (STRUCTURES - {"mode"}) & structure.keys():
+        if not isinstance(structure, dict) or (KEYS_OF_MODES - {"mode"}) & structure.keys():
             raise PatchfemError(
                 "modes: the scene has a structure of masses or files; leave the modes out, or leave out [structure]"
             )

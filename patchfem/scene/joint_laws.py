@@ -15,14 +15,14 @@ from .starting import TEMPLATE_FOLDER
 
 GUIDE_SECTION = 'patchfem/scene/guide/friction.md, "Which law for my joint?"'
 COMMENT_WIDTH = 120  # width of a scene file in characters
-NOTHING = "nothing"  # word of KNOWLEDGE that excludes the others
+NOTHING_KNOWN = "nothing"  # word of KNOWLEDGE_OF_JOINT that excludes the others
 
 
 class JointLaw(NamedTuple):
     """Friction law, with the questions about a joint that it answers.
 
-    - known: words of KNOWLEDGE that the keys of the law need.
-    - wanted: words of WISHES that the law answers.
+    - known: words of KNOWLEDGE_OF_JOINT that the keys of the law need.
+    - wanted: words of WISHES_FOR_LAW that the law answers.
     - law: value of `friction.law`.
     - keys: keys of [friction] besides `law` and `static`, and tables of [contact].
     - gives: accuracy of the answer, with its condition.
@@ -42,8 +42,8 @@ class JointLaw(NamedTuple):
 _ROWS = tomllib.loads((TEMPLATE_FOLDER.parent / "joint_laws.toml").read_text(encoding="utf-8"))
 JOINT_LAWS = tuple(JointLaw(**row) for row in _ROWS["law"])
 # Words that a user may answer, with their meanings.
-KNOWLEDGE: dict[str, str] = _ROWS["knowledge"]
-WISHES: dict[str, str] = _ROWS["wishes"]
+KNOWLEDGE_OF_JOINT: dict[str, str] = _ROWS["knowledge"]
+WISHES_FOR_LAW: dict[str, str] = _ROWS["wishes"]
 
 
 class Choice(NamedTuple):
@@ -85,8 +85,8 @@ def parse_choice(text: str, allowed_words: Iterable[str], option: str) -> list[s
             raise PatchfemError(
                 f"{option}: unknown answer '{word}'; {advise_on_name(word, permitted)}"
             )
-    if NOTHING in chosen and len(chosen) > 1:
-        raise PatchfemError(f"{option}: '{NOTHING}' excludes other answers")
+    if NOTHING_KNOWN in chosen and len(chosen) > 1:
+        raise PatchfemError(f"{option}: '{NOTHING_KNOWN}' excludes other answers")
     return chosen
 
 
@@ -96,17 +96,17 @@ def choose_law(known: str, wanted: str) -> Choice:
     Parameters
     ----------
     known : str
-        Words of KNOWLEDGE, separated by commas.
+        Words of KNOWLEDGE_OF_JOINT, separated by commas.
     wanted : str
-        Words of WISHES, separated by commas.
+        Words of WISHES_FOR_LAW, separated by commas.
 
     Raises
     ------
     PatchfemError
         If an answer has an unknown word or none.
     """
-    known_words = parse_choice(known, KNOWLEDGE, "--know")
-    wanted_words = parse_choice(wanted, WISHES, "--want")
+    known_words = parse_choice(known, KNOWLEDGE_OF_JOINT, "--know")
+    wanted_words = parse_choice(wanted, WISHES_FOR_LAW, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
         """Return the costs of the law in a row of the table.
@@ -143,7 +143,7 @@ def describe_choice(choice: Choice) -> list[str]:
         f"what it cannot do: {row.cannot}",
     ]
     if missing:
-        assumed = "; ".join(f"{word} ({KNOWLEDGE[word]})" for word in missing)
+        assumed = "; ".join(f"{word} ({KNOWLEDGE_OF_JOINT[word]})" for word in missing)
         sentences.append(f"assumed in the scene, because you do not know it: {assumed}")
     if unanswered:
         sentences.append(

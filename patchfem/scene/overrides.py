@@ -13,7 +13,7 @@ import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
-from .keys.contact import MAX_SMALL_ANGLE
+from .keys.contact import MAX_ANGLE_BETWEEN_PIECES
 from .keys.types import KeyValue, Table
 from .lines import find_key_lines, find_scene_value
 from .reader import apply_set
@@ -32,7 +32,7 @@ MAX_CACHED_TABLES = 4096
 PLAIN_KEYS = {
     "normal.load": inf,
     "contact.load": inf,
-    "contact.tilt.angle": MAX_SMALL_ANGLE,
+    "contact.tilt.angle": MAX_ANGLE_BETWEEN_PIECES,
     "contact.crown.radius": inf,
     "friction.static": inf,
     "friction.bond_length": inf,

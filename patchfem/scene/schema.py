@@ -9,11 +9,11 @@ from typing import Any
 
 from .keys.choices import find_selectors, format_keys, split_keys
 from .keys.contact import Material
-from .keys.materials import MATERIALS, SEPARATORS, is_case_sensitive, list_spellings
+from .keys.materials import IGNORED_SEPARATORS_PATTERN, MATERIALS, is_case_sensitive, list_spellings
 from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
-    TABLE_WORD,
+    INNER_TABLE_WORD,
     Key,
     Table,
     list_inner_tables,
@@ -22,7 +22,7 @@ from .keys.types import (
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # Words of a schema that restrict a number.
-NUMBER_WORDS = ("type", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
+NUMBER_SCHEMA_WORDS = ("type", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
 # Regular expressions of all spellings of a part of a unit.
 UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
@@ -36,7 +36,7 @@ def make_schema() -> dict[str, Any]:
     scene["properties"]["sweep"] = _describe_sweep()
     schema = {"$schema": SCHEMA_DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
     # Pydantic describes each table by itself, in which an inner table is only named.
-    text = json.dumps(schema).replace(f'"{TABLE_WORD}": "', '"$ref": "#/$defs/')
+    text = json.dumps(schema).replace(f'"{INNER_TABLE_WORD}": "', '"$ref": "#/$defs/')
     return json.loads(text)
 
 
@@ -69,7 +69,7 @@ def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
     if key.kind:
         _add_units(schema, key.kind)
     elif schema.get("type") == "number":
-        number = {word: schema.pop(word) for word in NUMBER_WORDS if word in schema}
+        number = {word: schema.pop(word) for word in NUMBER_SCHEMA_WORDS if word in schema}
         schema["anyOf"] = [number, {"type": "string", "pattern": f"^{PERCENTAGE_PATTERN}$"}]
     if key.inner in (None, Material):
         clauses = (key.record.meaning, _describe_selection(key.table, key.name))
@@ -141,8 +141,8 @@ def _make_material_pattern() -> str:
         letters = map(_make_letter_pattern, spelling)
         if is_case_sensitive(spelling):
             letters = map(re.escape, name)
-        spellings.append(f"{SEPARATORS}*".join(letters))
-    return rf"^{SEPARATORS}*(?:{'|'.join(spellings)}){SEPARATORS}*$"
+        spellings.append(f"{IGNORED_SEPARATORS_PATTERN}*".join(letters))
+    return rf"^{IGNORED_SEPARATORS_PATTERN}*(?:{'|'.join(spellings)}){IGNORED_SEPARATORS_PATTERN}*$"
 
 
 def _make_letter_pattern(letter: str) -> str:

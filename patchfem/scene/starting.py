@@ -21,7 +21,7 @@ TEMPLATE_DESCRIPTIONS = {
     "wear": "how a tilted patch wears in over many cycles",
 }
 # Verb of patchfem for each kind of scene that does not use `run`.
-NEXT_VERBS = {
+NEXT_VERB_BY_KIND = {
     "beam": "backbone",
     "damper": "sweep",
     "shroud": "sweep",

@@ -25,7 +25,7 @@ from .lines import split_key
 SIMILAR_NAME_RATING = 0.75
 # Rating of a table with the name of an unknown key, above all other ratings
 SAME_NAME_RATING = 2.0
-MIN_RATING = 0.5  # rating above which a table is suggested
+MIN_TABLE_RATING = 0.5  # rating above which a table is suggested
 
 
 class UnknownKey(NamedTuple):
@@ -187,15 +187,16 @@ def _suggest_name(
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
 
     # The first candidate, from the best reason to the weakest: a similar spelling; a common word; the first key that is
-    # needed, which for --set must be the only one; a similar key for another kind of value; a similar key that is there
-    # already.
+    # needed; a similar key for another kind of value; a similar key that is there already. The scene that --set changes
+    # is complete in general, so that a needed key is proposed to --set only if no other one is needed.
     word = key.lower()
     words = set(word.split("_"))
+    needed = () if is_set and len(lacking) > 1 else lacking
     return next(
         chain(
             _list_similar(key, fitting),
             (name for name in fitting if words & set(name.split("_")) or name.startswith(word)),
-            lacking if len(lacking) == 1 or not is_set else (),
+            needed,
             _list_similar(key, free),
             _list_similar(key, written if table_key else keys),
         ),
@@ -221,7 +222,7 @@ def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
         return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same
 
     best = max((*similar, *tables), key=rate, default="")
-    return best if best and rate(best) > MIN_RATING else ""
+    return best if best and rate(best) > MIN_TABLE_RATING else ""
 
 
 def _list_similar(key: str, names: Collection[str]) -> list[str]:

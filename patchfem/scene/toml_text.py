@@ -13,7 +13,7 @@ from .lines import find_key_lines
 from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
-MAX_BYTES = 4 * 2**20
+MAX_SCENE_FILE_BYTES = 4 * 2**20
 # Largest number of characters of a value in the advice on missing quotes.
 MAX_QUOTED_CHARACTERS = 60
 # Key with a value that opens neither quotes nor a bracket.
@@ -45,18 +45,18 @@ def read_text(path: str | Path) -> str:
     """
     try:
         with open_for_reading(path) as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(MAX_SCENE_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
         raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
 
     # A large file would take minutes to read.
-    if len(content) > MAX_BYTES:
+    if len(content) > MAX_SCENE_FILE_BYTES:
         raise SceneError(
             [
-                f"{path}: more than {MAX_BYTES >> 20} MiB, too large for a scene; put matrices into a file and give "
-                "its name in structure.file"
+                f"{path}: more than {MAX_SCENE_FILE_BYTES >> 20} MiB, too large for a scene; put matrices into a file "
+                "and give its name in structure.file"
             ]
         )
     try:

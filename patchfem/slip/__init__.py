@@ -12,9 +12,9 @@ prescribed stiffness in full stick. Read `shear_modes` first.
 # Names that other folders use, by module
 PUBLIC = {
     "edge_springs": ("add_edge_springs",),
-    "fields": ("element_fields",),
+    "fields": ("compute_element_fields",),
     "mesh_correction": (
-        "SPREAD_FACTOR",
+        "ERROR_TO_SPREAD_CHANGE",
         "spread_elements",
     ),
     "shear_modes": (
@@ -22,6 +22,6 @@ PUBLIC = {
         "N_SHEAR_MODES",
         "comparison_mode_count",
         "find_sufficient_modes",
-        "jenkins_set",
+        "make_jenkins_set",
     ),
 }

@@ -11,12 +11,12 @@ from scipy.optimize import brentq
 from ..core import frozen_array
 
 # Smallest compliance of a spring relative to that of its node: a node does not become much stiffer.
-MIN_SPRING_RATIO = -0.5
+MIN_SPRING_COMPLIANCE_RATIO = -0.5
 # Largest compliance of a spring relative to that of its node, which then carries no force.
-MAX_SPRING_RATIO = 1e6
+MAX_SPRING_COMPLIANCE_RATIO = 1e6
 
 
-def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: float) -> np.ndarray:
+def add_edge_springs(compliance: np.ndarray, is_loaded: np.ndarray, stiffness: float) -> np.ndarray:
     """Return a compliance matrix with springs at the edges of the contact.
 
     With the loaded nodes stuck, the sum of the nodal forces per displacement is K(c) = K - sum_i q_i^2 c/(1 + c
@@ -28,7 +28,7 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     ----------
     compliance : (m, m) ndarray
         Tangential compliance of the nodes [m/N].
-    loaded : (m,) ndarray of bool
+    is_loaded : (m,) ndarray of bool
         Whether a node carries a normal force.
     stiffness : float
         Tangential stiffness in full stick [N/m].
@@ -38,12 +38,12 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     (m, m) ndarray
         Compliance with the springs [m/N].
     """
-    points = np.flatnonzero(loaded)
+    points = np.flatnonzero(is_loaded)
     inverse = np.linalg.inv(compliance[np.ix_(points, points)])
     forces = inverse.sum(axis=1)
     excess = forces.sum() - stiffness
     # Loaded nodes beside an unloaded one; the ends of the interface have no neighbour.
-    neighbours = np.pad(loaded, 1, mode="edge")
+    neighbours = np.pad(is_loaded, 1, mode="edge")
     is_edge = ~(neighbours[:-2] & neighbours[2:])[points]
     nodes = points[is_edge]
     scale = np.sqrt(compliance[nodes, nodes])
@@ -58,11 +58,11 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
         return excess - float((weight * ratio / (1 + ratio * values)).sum())
 
     # The matrix is positive definite above -1/lambda_max.
-    low = max(MIN_SPRING_RATIO, -0.5 / values.max(initial=1.0))
-    if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_RATIO):
+    low = max(MIN_SPRING_COMPLIANCE_RATIO, -0.5 / values.max(initial=1.0))
+    if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_COMPLIANCE_RATIO):
         return frozen_array(compliance * (forces.sum() / stiffness))
 
     out = compliance.copy()
-    ratio = brentq(remaining_excess, low, MAX_SPRING_RATIO, xtol=1e-15)
+    ratio = brentq(remaining_excess, low, MAX_SPRING_COMPLIANCE_RATIO, xtol=1e-15)
     out[nodes, nodes] += ratio * scale**2
     return frozen_array(out)

@@ -16,7 +16,7 @@ class ShearFields(NamedTuple):
     local_slip: np.ndarray
 
 
-def element_fields(patch, elements, states, length: float) -> ShearFields:
+def compute_element_fields(patch, elements, states, length: float) -> ShearFields:
     """Compute traction and slip at the nodes of a patch from the states of its Jenkins elements.
 
     Parameters

@@ -13,11 +13,11 @@ import numpy as np
 
 # Ratio of the error of a measure to its change when each element is spread over a range of yield
 # displacements (measured in tests/README.md)
-SPREAD_FACTOR = 1.5
+ERROR_TO_SPREAD_CHANGE = 1.5
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
 # Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
 # halving; displacements down to 1/256 of this range then cause slip
-N_RANGE_HALVINGS = 8
+N_YIELD_RANGE_HALVINGS = 8
 # Largest relative difference of yield displacements for which nodes at both ends of a contact count
 # as one
 MIRRORED_YIELD_TOL = 1e-6
@@ -65,7 +65,7 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
 
     # The widths of the parts of the first element decrease by a constant ratio towards zero
     # displacement.
-    number = np.arange(N_ELEMENT_PARTS * N_RANGE_HALVINGS + 1)
+    number = np.arange(N_ELEMENT_PARTS * N_YIELD_RANGE_HALVINGS + 1)
     borders = np.append(2.0 ** (-number / N_ELEMENT_PARTS), 0.0)
     first_fraction = -np.diff(borders)
     first_position = (borders[1:] + borders[:-1]) / 2 - 0.5

@@ -4,7 +4,7 @@ Node i has the relative displacement q - sum_j C_ij f_j, with C the shear compli
 force of node j. Both forms hold while the contact set does not change:
 
 * Nodes that yield at a fixed force D_i (Coulomb's law, or the elastic-plastic law at constant load and tilt) are
-  together exactly equivalent to parallel Jenkins elements (`jenkins_set`), springs in series with sliders. The inverse
+  together exactly equivalent to parallel Jenkins elements (`make_jenkins_set`), springs in series with sliders. The inverse
   of C has off-diagonal entries <= 0 and row sums > 0, so slip zones only grow within a stroke, and Masing's rule holds.
   Corner nodes of bilinear cells may have a small negative row sum; such a node sticks until its neighbours have slipped.
   This costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401; leaving these nodes out would cost 1.4 %.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact.unilateral import INDEFINITE_MESSAGE
+from ..contact.unilateral import INDEFINITE_COMPLIANCE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thread
 
@@ -104,17 +104,20 @@ class ShearModes:
         )
 
 
-def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
+def make_jenkins_set(
+    tangential: np.ndarray, yield_force: np.ndarray, local_length: float = 0.0
+) -> JenkinsSet:
     """Return Jenkins elements that are equivalent to elastically coupled nodes with given yield forces.
 
     Parameters
     ----------
     tangential : (m, m) ndarray
         Compliance [m/N].
-    limit : (m,) ndarray
+    yield_force : (m,) ndarray
         Yield forces [N] of the nodes.
     local_length : float
-        Length [m] of the elastic-plastic law (eq. 3.12), a spring limit/length in series at each node; 0 for Coulomb's law.
+        Length [m] of the elastic-plastic law (eq. 3.12), a spring yield_force/local_length in series at each node; 0 for
+        Coulomb's law.
 
     Returns
     -------
@@ -125,11 +128,11 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     PatchfemError
         If no node carries load.
     """
-    limit = np.asarray(limit, float)
-    if not (limit > 0).any():
+    yield_force = np.asarray(yield_force, float)
+    if not (yield_force > 0).any():
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
-    points = np.flatnonzero(limit > 0)
-    force = limit[points]
+    points = np.flatnonzero(yield_force > 0)
+    force = yield_force[points]
     if local_length == 0 and np.ptp(tangential) == 0:
         return _make_single_element(1 / tangential[0, 0], points, force)
 
@@ -190,10 +193,7 @@ class _YieldSequence(NamedTuple):
 
     @property
     def is_sorted(self) -> bool:
-        """Return whether the yield displacements increase from the last node to the first.
-
-        The order is then right.
-        """
+        """Whether the yield displacements increase from the last node to the first, so that the order is right."""
         return bool(
             (self.displacements[1:] <= self.displacements[:-1] * (1 + EQUAL_YIELD_TOL)).all()
         )
@@ -210,26 +210,26 @@ class _YieldOrder(NamedTuple):
     displacements: np.ndarray
 
 
-def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
-    """Find the order in which nodes with compliance c (n, n) [m/N] yield at given forces (n,) [N].
+def _find_order(compliance: np.ndarray, force: np.ndarray) -> _YieldOrder:
+    """Find the order in which nodes with a `compliance` C (n, n) [m/N] yield at given forces `force` (n,) [N].
 
-    While the first m nodes of an order stick, the rates of their forces solve the leading block of c = L L'. The force
+    While the first m nodes of an order stick, the rates of their forces solve the leading block of C = L L'. The force
     rates that all nodes lose by the yield of the m-th node are thus the m-th row of L^-1 times (L^-1 1)_m, and the yield
     displacements are (L' force)/(L^-1 1). An order is right if these increase, because the force rate of a node only
     grows until it yields. The first order is that of the force rates without yields, the next orders are those of the
     displacements. If none of them is right, the nodes are eliminated one by one.
     """
-    rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
+    rate = dpotrs(_factorise(compliance), np.ones(force.size), lower=1)[0]
     order = np.arange(force.size)
     displacements = _divide_or_inf(force, rate)
     for _ in range(MAX_SORTING_PASSES + 1):
         order = order[np.argsort(-displacements, kind="stable")]
-        sequence = _yield_sequence(c, force, order)
+        sequence = _yield_sequence(compliance, force, order)
         displacements = sequence.displacements
         if sequence.is_sorted:
             break
     else:
-        sequence = _yield_sequence(c, force, _eliminate_points(c, force))
+        sequence = _yield_sequence(compliance, force, _find_order_by_elimination(compliance, force))
     increasing = np.maximum.accumulate(sequence.displacements[::-1])
     return _YieldOrder(sequence, increasing)
 
@@ -240,19 +240,19 @@ def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
 
-def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _YieldSequence:
+def _yield_sequence(compliance: np.ndarray, force: np.ndarray, order: np.ndarray) -> _YieldSequence:
     """Return the yield displacements of nodes for an assumed order of yielding.
 
     Parameters
     ----------
-    c : (n, n) array
+    compliance : (n, n) array
         Compliance [m/N].
     force : (n,) array
         Yield forces of the nodes [N].
     order : (n,) array of int
         Nodes in the assumed order of yielding.
     """
-    cholesky_factor = _factorise(c[np.ix_(order, order)])
+    cholesky_factor = _factorise(compliance[np.ix_(order, order)])
     inverse_ones = dtrsm(1.0, cholesky_factor, np.ones((force.size, 1)), lower=1)[:, 0]
     factored_force = force[order] @ cholesky_factor
     return _YieldSequence(
@@ -264,25 +264,26 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Yie
     )
 
 
-def _factorise(c: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of c (n, n).
+def _factorise(compliance: np.ndarray) -> np.ndarray:
+    """Return the lower Cholesky factor of a compliance (n, n).
 
-    PatchfemError is raised if c is not positive definite.
+    PatchfemError is raised if it is not positive definite.
     """
-    factor, fault = dpotrf(c.T, lower=1)
+    factor, fault = dpotrf(compliance.T, lower=1)
     if fault:
-        raise PatchfemError(INDEFINITE_MESSAGE)
+        raise PatchfemError(INDEFINITE_COMPLIANCE_MESSAGE)
     return factor
 
 
-def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Find the reverse order (a,) of yielding: eliminate each node from the inverse of c when it yields.
+def _find_order_by_elimination(compliance: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return the indices (a,) of nodes in reverse order of yielding.
 
-    This takes n^3 products in all.
+    The stiffness C^-1 of the sticking nodes gives the rates of their forces per displacement. The node that reaches its
+    yield force first is eliminated from it (Schur complement), as often as there are nodes: a^3 products in all.
 
-    c (a, a) [m/N] is the shear compliance of the nodes, and `force` (a,) [N] their yield forces.
+    `compliance` (a, a) [m/N] is the shear compliance C of the nodes, and `force` (a,) [N] their yield forces.
     """
-    inverse = np.linalg.inv(c)
+    inverse = np.linalg.inv(compliance)
     remaining = force.copy()
     yielded = []
     rate = inverse.sum(axis=0)
@@ -301,7 +302,7 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 def shear_modes(
     tangential: np.ndarray,
-    limit: np.ndarray,
+    friction_limit: np.ndarray,
     bond_length: float,
     count: int,
     weakening: float = 1.0,
@@ -312,8 +313,8 @@ def shear_modes(
     ----------
     tangential : (m, m) ndarray
         Compliance C [m/N].
-    limit : (m,) ndarray
-        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
+    friction_limit : (m,) ndarray
+        Friction limits D [N]; the bonds of a node have the stiffness friction_limit/bond_length.
     bond_length : float
         Bond length [m].
     count : int
@@ -326,10 +327,12 @@ def shear_modes(
     PatchfemError
         If a weakening contact could jump without a change of the displacement: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
-    return _compute_all_modes(tangential, limit, bond_length, weakening).select(count)
+    return _compute_all_modes(tangential, friction_limit, bond_length, weakening).select(count)
 
 
-def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) -> ShearModes:
+def _compute_all_modes(
+    tangential, friction_limit, bond_length: float, weakening: float
+) -> ShearModes:
     """Return all modes of the nodes that carry load.
 
     `shear_modes` selects from them.
@@ -338,7 +341,7 @@ def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) 
     ----------
     tangential : (m, m) ndarray
         Shear compliance [m/N] of the interface nodes.
-    limit : (m,) ndarray
+    friction_limit : (m,) ndarray
         Friction limits [N], 0 outside the contact.
     bond_length : float
         Bond length [m].
@@ -350,14 +353,14 @@ def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) 
     PatchfemError
         If the contact could slip suddenly.
     """
-    points = frozen_array(np.flatnonzero(limit > 0), np.int64)
-    limit = limit[points]
+    points = frozen_array(np.flatnonzero(friction_limit > 0), np.int64)
+    friction_limit = friction_limit[points]
     # Rigid pieces in series with one spring have only one mode.
     if np.ptp(tangential) == 0:
         shape = np.ones((points.size, 1))
         compliance = tangential[:1, 0]
     else:
-        root = np.sqrt(limit)[:, None]
+        root = np.sqrt(friction_limit)[:, None]
         with use_one_blas_thread():
             values, vectors = np.linalg.eigh(root * tangential[np.ix_(points, points)] * root.T)
         shape = vectors[:, ::-1] / root
@@ -370,7 +373,7 @@ def _compute_all_modes(tangential, limit, bond_length: float, weakening: float) 
             f"change of the force on it (the stability number is {stability:.3g}, but must be below 1); "
             "raise friction.bond_length or friction.kinetic"
         )
-    return ShearModes(points, limit, shape, 1 / compliance)
+    return ShearModes(points, friction_limit, shape, 1 / compliance)
 
 
 def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:
@@ -410,7 +413,7 @@ def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:
 
 def find_sufficient_modes(
     tangential: np.ndarray,
-    limit: np.ndarray,
+    friction_limit: np.ndarray,
     bond_length: float,
     count: int,
     tolerance: float,
@@ -427,8 +430,8 @@ def find_sufficient_modes(
     ----------
     tangential : (m, m) ndarray
         Compliance C [m/N].
-    limit : (m,) ndarray
-        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
+    friction_limit : (m,) ndarray
+        Friction limits D [N]; the bonds of a node have the stiffness friction_limit/bond_length.
     bond_length : float
         Bond length [m].
     weakening : float
@@ -442,7 +445,7 @@ def find_sufficient_modes(
     -------
     ShearModes
     """
-    modes = _compute_all_modes(tangential, limit, bond_length, weakening)
+    modes = _compute_all_modes(tangential, friction_limit, bond_length, weakening)
     errors = estimate_force_errors(modes, bond_length)
     while count < min(max_modes, modes.stiffness.size) and errors[count] > tolerance:
         count = min(2 * count, max_modes)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import issparse
 
 from ..core import ModalBasis, PatchfemError
-from ..effects import MAX_COORDINATES
+from ..effects import MAX_RIG_COORDINATES
 from ..inputs.damage import refuse_damage
 from ..inputs.matlab import read_variables
 from ..inputs.packed import open_arrays
@@ -55,9 +55,9 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     arrays = {}
     for name in filter(variables.__contains__, ARRAY_NAMES):
         values = variables[name]
-        if prod(values.shape) > MAX_COORDINATES**2:
+        if prod(values.shape) > MAX_RIG_COORDINATES**2:
             raise PatchfemError(
-                f"{name} of shape {'x'.join(map(str, values.shape))} is larger than {MAX_COORDINATES} coordinates "
+                f"{name} of shape {'x'.join(map(str, values.shape))} is larger than {MAX_RIG_COORDINATES} coordinates "
                 f"squared; {TOO_LARGE_REMEDY}"
             )
         full = values.toarray() if issparse(values) else values

@@ -15,7 +15,7 @@ MIN_SAMPLES_PER_CYCLE = 20
 # Largest number of samples of a whole run; more samples make results files large
 MAX_STORED_SAMPLES = 20_000
 # Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
-TIME_TOL = 1e-6
+PERIOD_TIME_TOL = 1e-6
 
 
 class DriveKeys(NamedTuple):
@@ -152,7 +152,7 @@ def count_repeat_cycles(drive) -> float | None:
 
 def has_full_cycle(span: float, drive) -> bool:
     """Return whether a time span [s] contains a full drive cycle, which a friction loop requires."""
-    return span > drive.period * (1 - TIME_TOL)
+    return span > drive.period * (1 - PERIOD_TIME_TOL)
 
 
 def is_release(drive) -> bool:

@@ -48,8 +48,8 @@ class PiecewiseDrive:
     """Drive signal that consists of successive constant and sinusoidal segments.
 
     - period: duration [s] of a cycle.
-    - is_periodic: whether the segments repeat after each period until the run ends. A drive that ends as a sine need not
-      state it.
+    - is_periodic: whether the segments repeat after each period until the run ends. It is False for a drive whose last
+      segment is a sine, which lasts until the run ends.
 
     `segments` are the pieces in the order of time. `moving` tells whether the base moves, as for a drive by its
     acceleration.

@@ -19,7 +19,7 @@ from .modes import make_basis
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
 # Largest entry of a projected damping matrix that is set to zero as round-off, relative to its
 # scale
-ENTRY_TOL = 1e-12
+ZERO_DAMPING_ENTRY_TOL = 1e-12
 # Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
 # relative to the largest eigenvalue
 MIN_DAMPING_EIGENVALUE = -1e-9
@@ -169,7 +169,7 @@ def decouple_modes(rows) -> tuple[np.ndarray, np.ndarray]:
     return omega[::-1], shapes[::-1].T
 
 
-def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
+def trim_round_off(matrix, scale, round_off: float = ZERO_DAMPING_ENTRY_TOL) -> np.ndarray:
     """Make a matrix symmetric, and set entries to zero that are as small as round-off.
 
     Parameters

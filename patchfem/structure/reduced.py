@@ -19,7 +19,7 @@ from scipy.linalg import cholesky, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
-from ..effects import MAX_COORDINATES
+from ..effects import MAX_RIG_COORDINATES
 from ..elasticity.lapack import use_one_blas_thread
 from ..elasticity.sparse_factor import SparseFactor, ZeroEnergyMotion
 from . import masses, matrices
@@ -33,15 +33,15 @@ N_EXTRA_MODES = 4
 PROJECTION_TOL = 64 * np.finfo(float).eps
 # Shift of the stiffness of an unconstrained structure, relative to the largest ratio of stiffness
 # to mass; without it K is singular
-SHIFT_FRACTION = 1e-9
+STIFFNESS_SHIFT_FRACTION = 1e-9
 # Smallest pivot of a stiffness matrix relative to its diagonal entry; a smaller one belongs to a
 # rigid motion
-MIN_PIVOT = 1e-12
+MIN_PIVOT_RATIO = 1e-12
 # Smallest ratio of mass to stiffness of a motion that has mass, relative to the largest ratio
-MIN_INERTIA = 1e-14
+MIN_MASS_TO_STIFFNESS_FRACTION = 1e-14
 # Smallest squared frequency of an elastic mode, relative to the largest one and per coordinate; a
 # smaller one belongs to a rigid motion
-MIN_STRAIN = 1e-12
+MIN_ELASTIC_FREQUENCY_FRACTION = 1e-12
 # Smallest reciprocal condition number of the residual flexibility at the boundary that is not
 # round-off
 MIN_RESIDUAL_FLEXIBILITY = 1e-8
@@ -160,7 +160,7 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
         stiffness = _project(K, shapes, PROJECTION_TOL)
         mass = _project(M, shapes, PROJECTION_TOL)
-        damping = None if C is None else _project(C, shapes, matrices.ENTRY_TOL)
+        damping = None if C is None else _project(C, shapes, matrices.ZERO_DAMPING_ENTRY_TOL)
         # The static shapes are orthogonal to the modes with respect to K, and the modes to each other with unit modal
         # mass. So their part of the stiffness is diag(omega^2); round-off of the projection is overwritten.
         n_modes = computed.omega.size
@@ -214,7 +214,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
 def _factorize(K) -> SparseFactor | None:
     """Factorize a stiffness matrix K, or return None if it has rigid-body modes."""
     try:
-        return SparseFactor(K, MIN_PIVOT)
+        return SparseFactor(K, MIN_PIVOT_RATIO)
     except ZeroEnergyMotion:
         return None
     except NotConverged:
@@ -245,7 +245,7 @@ def _compute_lowest_modes(
         squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
         order = np.argsort(squares)
         return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]
-    if n > MAX_COORDINATES:
+    if n > MAX_RIG_COORDINATES:
         raise PatchfemError(
             f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer modes",
             "structure.reduced.modes",
@@ -255,7 +255,7 @@ def _compute_lowest_modes(
     # The second matrix of eigh must be positive definite; M may be singular, so M v = mu K v is
     # solved.
     inverse_squares, shapes = eigh(M.toarray(), (shifted + shifted.T) / 2)
-    has_mass = inverse_squares > MIN_INERTIA * inverse_squares.max(initial=0.0)
+    has_mass = inverse_squares > MIN_MASS_TO_STIFFNESS_FRACTION * inverse_squares.max(initial=0.0)
     lowest = np.flatnonzero(has_mass)[::-1][:count]
     inverse_squares = inverse_squares[lowest]
     shapes = shapes[:, lowest] / np.sqrt(inverse_squares)
@@ -327,7 +327,7 @@ def _compute_free_interface_shapes(
         mass = M.diagonal()
         has_mass = mass > 0
         largest = (K.diagonal()[has_mass] / mass[has_mass]).max(initial=0.0)
-        shift = SHIFT_FRACTION * float(largest)
+        shift = STIFFNESS_SHIFT_FRACTION * float(largest)
         factor = _factorize((K + shift * M).tocsc()) if shift else None
     if factor is None:
         raise PatchfemError(
@@ -455,7 +455,7 @@ def _factor_stiffness(stiffness, mass) -> np.ndarray:
             triangle = cholesky(stiffness / np.outer(diagonal, diagonal))
         except np.linalg.LinAlgError:
             triangle = np.zeros((1, 1))
-        if np.diag(triangle).min() ** 2 > MIN_STRAIN * diagonal.size:
+        if np.diag(triangle).min() ** 2 > MIN_ELASTIC_FREQUENCY_FRACTION * diagonal.size:
             return triangle * diagonal
     return (np.sqrt(squares)[:, None] * shapes.T) @ mass
 
@@ -478,7 +478,7 @@ def _compute_elastic_modes(stiffness, mass) -> tuple[np.ndarray, np.ndarray]:
             "every boundary coordinate a mass",
             "structure.reduced.mass",
         ) from None
-    min_square = MIN_STRAIN * squares[-1] * len(squares)
+    min_square = MIN_ELASTIC_FREQUENCY_FRACTION * squares[-1] * len(squares)
     if squares[0] < -min_square:
         raise PatchfemError(
             "the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "

@@ -16,7 +16,7 @@ from .drives import RecordedDrive
 
 TONE_ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
 # Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
-MAX_DENOMINATOR = 10**6
+MAX_FREQUENCY_DENOMINATOR = 10**6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,7 +24,7 @@ class TonesRecord(RecordedDrive):
     """Record of a sum of tones, whose cycle is that of the first tone.
 
     - beat: number of cycles after which all tones repeat.
-    - max_frequency: highest frequency [Hz].
+    - max_frequency: frequency [Hz] of the highest tone.
     - tones (q, 3): amplitude [m s-2], circular frequency [rad/s] and phase [rad] of each tone.
     """
 
@@ -79,10 +79,11 @@ def count_beat_cycles(frequencies) -> float:
     It is f_1 over the greatest common divisor of the `frequencies` [Hz], which are taken as fractions with a limited
     denominator.
     """
-    fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
+    exact = [Fraction(f) for f in frequencies]
+    fractions = [f.limit_denominator(MAX_FREQUENCY_DENOMINATOR) or f for f in exact]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]
-    return float(fractions[0] * denominator / gcd(*numerators))
+    return numerators[0] / gcd(*numerators)
 
 
 def _build_tones(drive: DriveKeys) -> TonesRecord:

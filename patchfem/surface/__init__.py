@@ -23,14 +23,14 @@ PUBLIC = {
         "resample_evenly",
     ),
     "quantity": (
-        "LEVEL",
+        "CONFIDENCE_LEVEL",
         "Quantity",
     ),
     "roughness.filter": ("mean_line",),
     "roughness.form": ("parse_form_option",),
     "roughness.peaks": (
         "Moments",
-        "PERSSON",
+        "DECAY_LENGTH_OVER_RMS_HEIGHT",
         "gaussian_peaks",
         "trace_moments",
     ),
@@ -39,8 +39,8 @@ PUBLIC = {
         "make_report",
     ),
     "spectrum": (
-        "BAND",
-        "ELEMENTS_PER_WAVE",
+        "WAVE_BAND",
+        "MIN_ELEMENTS_PER_WAVE",
         "describe_lost_waves",
     ),
 }

@@ -8,18 +8,18 @@ from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 from .profile import Profile
 
-MEANS_OVER_WAVES = "means over the waves of the trace"
+MEANS_OVER_WAVES_NOTE = "means over the waves of the trace"
 # Parts of the notes that cast no doubt on a result.
-NOTES = ("the trace is centred on the patch", MEANS_OVER_WAVES, "is rounded to")
-N_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
+HARMLESS_NOTE_PARTS = ("the trace is centred on the patch", MEANS_OVER_WAVES_NOTE, "is rounded to")
+N_POSITION_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
 # Largest number of elements that a trace may lack at either end, with round-off.
-MAX_MISSING_ELEMENTS = 0.5000001
+MAX_MISSING_END_ELEMENTS = 0.5000001
 MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
 
 
 def is_note(text: str) -> bool:
     """Return whether the text of a sentence on a trace is a note rather than a warning."""
-    return any(words in text for words in NOTES)
+    return any(words in text for words in HARMLESS_NOTE_PARTS)
 
 
 def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
@@ -46,11 +46,11 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     notes = profile.notes
     if not _covers(known, x):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
-        rounded = np.round([known[0], known[-1], shift], N_DIGITS)
+        rounded = np.round([known[0], known[-1], shift], N_POSITION_DIGITS)
         first, last, added = map(format_length, rounded.tolist())
         notes += (
             f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "
-            f"{format_length(x[0])} to {format_length(x[-1])}; {NOTES[0]}, which adds {added} to x",
+            f"{format_length(x[0])} to {format_length(x[-1])}; {HARMLESS_NOTE_PARTS[0]}, which adds {added} to x",
         )
     known = known + shift
     _require_cover(profile.source, known, x)
@@ -118,8 +118,8 @@ def _covers(places, x) -> bool:
 
     `places` [m] are the samples of the trace, and x (m,) [m] the nodes of the patch.
     """
-    first = x[0] + MAX_MISSING_ELEMENTS * (x[1] - x[0])
-    last = x[-1] - MAX_MISSING_ELEMENTS * (x[-1] - x[-2])
+    first = x[0] + MAX_MISSING_END_ELEMENTS * (x[1] - x[0])
+    last = x[-1] - MAX_MISSING_END_ELEMENTS * (x[-1] - x[-2])
     return bool(places[0] <= first and places[-1] >= last)
 
 

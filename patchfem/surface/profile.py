@@ -7,24 +7,22 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 
-MEDIAN_WINDOW = (
-    7  # number of samples in the running median; groups of up to three samples can be spikes
-)
-SPECK_WINDOWS = (15, 31)  # numbers of samples in the running medians that find wider specks of dust
+# Number of samples in the running median; groups of up to three samples can be spikes
+MEDIAN_WINDOW_SAMPLES = 7
+# Numbers of samples in the running medians that find wider specks of dust
+SPECK_WINDOWS_SAMPLES = (15, 31)
 # Smallest height of a spike in robust standard deviations; heights of rough surfaces stay within 6.
-SPIKE_DEVIATIONS = 8.0
+MIN_SPIKE_DEVIATIONS = 8.0
 # Height in robust standard deviations down to which a speck is removed,
 # so that its foot goes with it.
-FOOT_DEVIATIONS = 3.0
+SPECK_FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
-MEDIANS_PER_CHUNK = (
-    131_072  # number of medians that are computed at a time, which limits the memory
-)
-MAX_TRACE_SAMPLES = (
-    2_097_152  # largest number of samples in a resampled trace, which limits the memory
-)
-EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
+# Number of medians that are computed at a time, which limits the memory
+MEDIANS_PER_CHUNK = 131_072
+# Largest number of samples in a resampled trace, which limits the memory
+MAX_TRACE_SAMPLES = 2_097_152
+EVEN_STEPS_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -71,7 +69,7 @@ def resample_evenly(profile: Profile) -> Profile:
     """
     profile = _bridge(profile, ~profile.missing)
     steps = np.diff(profile.x)
-    if np.ptp(steps) <= EVEN_TOL * steps.mean():
+    if np.ptp(steps) <= EVEN_STEPS_TOL * steps.mean():
         return profile
     length = profile.length
     step = max(float(np.percentile(steps, 10)), length / MAX_TRACE_SAMPLES)
@@ -144,7 +142,7 @@ def clean(profile: Profile, max_gap: float) -> Profile:
         note = (
             f"{profile.source}: {is_spike.sum()} of {profile.x.size} heights are spikes (the first "
             f"at x = {format_length(profile.x[np.argmax(is_spike)])}), which lie more than "
-            f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {MEDIAN_WINDOW} samples; "
+            f"{MIN_SPIKE_DEVIATIONS:g} robust standard deviations from the median of {MEDIAN_WINDOW_SAMPLES} samples; "
             "straight lines replace these heights"
         )
         profile = replace(profile, notes=(*profile.notes, note))
@@ -190,12 +188,12 @@ def find_spikes(profile: Profile) -> np.ndarray:
     """
     is_spike = np.zeros(profile.x.size, bool)
     known = np.flatnonzero(~profile.missing)
-    if known.size < MEDIAN_WINDOW:
+    if known.size < MEDIAN_WINDOW_SAMPLES:
         return is_spike
     z = profile.z[known]
     digit = np.diff(np.unique(z)).min(initial=np.ptp(z))
-    distance, deviation = _compare_with_neighbours(z, MEDIAN_WINDOW, digit)
-    is_spike[known] = np.abs(distance) > SPIKE_DEVIATIONS * deviation
+    distance, deviation = _compare_with_neighbours(z, MEDIAN_WINDOW_SAMPLES, digit)
+    is_spike[known] = np.abs(distance) > MIN_SPIKE_DEVIATIONS * deviation
     return is_spike
 
 
@@ -207,21 +205,21 @@ def remove_spikes(profile: Profile) -> Profile:
     hollow as wide stays, as it may be a scratch.
     """
     known = np.flatnonzero(~profile.missing)
-    if known.size < max(SPECK_WINDOWS):
+    if known.size < max(SPECK_WINDOWS_SAMPLES):
         return profile
     z = profile.z[known]
     is_spike = find_spikes(profile)[known]
-    min_wall = SPIKE_DEVIATIONS * robust_deviation(z[2:] - z[:-2]) / 2
+    min_wall = MIN_SPIKE_DEVIATIONS * robust_deviation(z[2:] - z[:-2]) / 2
 
     # A group goes with one sample on each side, which its flank may touch.
     removed = is_spike.copy()
-    for window in (MEDIAN_WINDOW, *SPECK_WINDOWS):
+    for window in (MEDIAN_WINDOW_SAMPLES, *SPECK_WINDOWS_SAMPLES):
         distance, deviation = _compare_with_neighbours(z, window)
-        for first, last in find_runs(np.abs(distance) > FOOT_DEVIATIONS * deviation):
+        for first, last in find_runs(np.abs(distance) > SPECK_FOOT_DEVIATIONS * deviation):
             group = slice(first, last + 1)
             walls = np.diff(z[max(first - 2, 0) : last + 3])
             has_walls = min(walls.max(initial=0.0), -walls.min(initial=0.0)) > min_wall
-            is_high = distance[group].max() > SPIKE_DEVIATIONS * deviation[group].max()
+            is_high = distance[group].max() > MIN_SPIKE_DEVIATIONS * deviation[group].max()
             is_speck = is_high and has_walls and last - first < window // 2
             if is_speck or is_spike[group].any():
                 removed[max(first - 1, 0) : last + 2] = True

@@ -9,15 +9,16 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-LEVEL = 0.95  # probability that the interval of a comparison contains the true value
-SIDE = 1.959964  # half-width of a normal interval of LEVEL, in standard deviations
+CONFIDENCE_LEVEL = 0.95  # probability that the interval of a comparison contains the true value
+# Half-width of a normal interval of CONFIDENCE_LEVEL, in standard deviations
+HALF_WIDTH_95 = 1.959964
 
 
 class Quantity(NamedTuple):
     """Value of a measured quantity with interval, unit and definition.
 
     - value: value, or None if it is not known.
-    - low, high: ends of the interval of probability LEVEL, or None if it is not known.
+    - low, high: ends of the interval of probability CONFIDENCE_LEVEL, or None if it is not known.
     - unit: SI unit, such as "m".
     - text: definition.
     - reason: code of the reason why there is no value, or no interval.

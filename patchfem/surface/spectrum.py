@@ -9,16 +9,17 @@ from ..formatting import format_length
 from .areal import level
 from .profile import Profile, resample_evenly
 
-BAND = (60e-6, 110e-6)  # wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
-N_SMOOTHED = 9  # number of neighbouring waves whose mean is the density at their middle
-ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
+# Wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
+WAVE_BAND = (60e-6, 110e-6)
+N_SMOOTHED_WAVES = 9  # number of neighbouring waves whose mean is the density at their middle
+MIN_ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
 # Fraction of the rms height in waves that are too short for the elements,
 # above which a warning is given.
-MAX_LOST = 0.1
-NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction, below which the elements represent a trace
-ELEMENTS_PER_CURVE = (
-    4  # number of elements on a wave that a smooth curve through the nodes represents
-)
+MAX_LOST_FRACTION = 0.1
+# Same fraction, below which the elements represent a trace
+NEGLIGIBLE_LOST_FRACTION = MAX_LOST_FRACTION / 10
+# Number of elements on a wave that a smooth curve through the nodes represents
+ELEMENTS_PER_CURVED_WAVE = 4
 
 
 class WaveSpectrum(NamedTuple):
@@ -36,11 +37,11 @@ class WaveSpectrum(NamedTuple):
         """One-sided power spectral density (n,) [m3], smoothed."""
         from scipy.ndimage import uniform_filter1d
 
-        return uniform_filter1d(self.power, N_SMOOTHED, mode="nearest") * self.waves[0]
+        return uniform_filter1d(self.power, N_SMOOTHED_WAVES, mode="nearest") * self.waves[0]
 
     def measure_band(self) -> float:
-        """Return the amplitude [m] of the sine that has the mean square of the waves of `BAND`."""
-        inside = (self.waves >= BAND[0]) & (self.waves <= BAND[1])
+        """Return the amplitude [m] of the sine that has the mean square of the waves of `WAVE_BAND`."""
+        inside = (self.waves >= WAVE_BAND[0]) & (self.waves <= WAVE_BAND[1])
         return float(np.sqrt(2 * self.power[inside].sum()))
 
     def lost_fraction(self, length: float) -> float:
@@ -55,7 +56,7 @@ class WaveSpectrum(NamedTuple):
             np.cumsum(self.power[::-1])[::-1] / self.power.sum()
         )  # in this wave and all shorter ones
         needed = np.flatnonzero(lost > (1 - kept) ** 2)
-        return float(self.waves[needed[-1]]) / ELEMENTS_PER_WAVE
+        return float(self.waves[needed[-1]]) / MIN_ELEMENTS_PER_WAVE
 
     def shortest_resolved_wave(self, element: float, strain: float) -> float:
         """Return the shortest wave [m] on which the contact is at least one element long.
@@ -80,7 +81,7 @@ class WaveSpectrum(NamedTuple):
         ratio = np.divide(np.sqrt(2) * strain, slope, out=np.ones(slope.size), where=slope > 0)
         touching = 2 / np.pi * np.arcsin(np.sqrt(np.minimum(ratio, 1.0)))
         is_resolved = (self.waves * touching >= element) & (
-            self.waves >= ELEMENTS_PER_WAVE * element
+            self.waves >= MIN_ELEMENTS_PER_WAVE * element
         )
         return float(self.waves[is_resolved].min(initial=np.inf))
 
@@ -112,15 +113,15 @@ def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum
 def describe_lost_waves(profile: Profile, element: float) -> str | None:
     """Return a warning that elements [m] are too long to resolve a profile, or None if they are not."""
     spectrum = wave_spectrum(profile)
-    length = ELEMENTS_PER_WAVE * element
+    length = MIN_ELEMENTS_PER_WAVE * element
     lost = spectrum.lost_fraction(length)
-    if lost <= MAX_LOST:
+    if lost <= MAX_LOST_FRACTION:
         return None
     # A length that is rounded up would not suffice.
-    sufficient = 0.99 * spectrum.element_length(1 - MAX_LOST)
+    sufficient = 0.99 * spectrum.element_length(1 - MAX_LOST_FRACTION)
     return (
         f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
-        f"{ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
+        f"{MIN_ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
         "[contact.asperities], or set element_size = "
-        f'"{format_length(sufficient, 3)}", which keeps {100 - 100 * MAX_LOST:g} % of the height'
+        f'"{format_length(sufficient, 3)}", which keeps {100 - 100 * MAX_LOST_FRACTION:g} % of the height'
     )

@@ -9,8 +9,8 @@ from .depth import Press, solve_jump, wear_rates
 
 MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
 # Smallest ratio of the length of a repeated jump to that of the rejected jump
-MIN_RETRY_RATIO = 0.2
-JUMP_SAFETY = 0.9  # safety factor on the length of a jump that would just meet the tolerance
+MIN_REPEATED_JUMP_RATIO = 0.2
+JUMP_SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
 FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
 JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
@@ -155,11 +155,13 @@ def take_jump(
             after, error = _correct_path(problem, state, after, error, length, tolerance)
             if is_forced or error <= 1:
                 break
-        length *= max(MIN_RETRY_RATIO, JUMP_SAFETY * error ** (-1 / (JUMP_ORDER + 1)))
+        length *= max(
+            MIN_REPEATED_JUMP_RATIO, JUMP_SAFETY_FACTOR * error ** (-1 / (JUMP_ORDER + 1))
+        )
 
     # The error of a method of order p falls with the power p + 1 of the length
     growth = min(
-        MAX_JUMP_GROWTH, JUMP_SAFETY * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
+        MAX_JUMP_GROWTH, JUMP_SAFETY_FACTOR * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
     )
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)

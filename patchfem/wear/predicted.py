@@ -15,24 +15,29 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..formatting import format_length
-from ..surface.quantity import LEVEL, SIDE, Quantity
+from ..surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
 
-N_BINS = 100  # number of bins along the patch, in which the noise of single heights averages out
-N_RATIOS = 90  # number of trial coefficients in the search
-MAX_PLACES = 24  # largest number of positions that are refined in addition to the best one
+# Number of bins along the patch, in which the noise of single heights averages out
+N_PATCH_BINS = 100
+N_TRIAL_COEFFICIENTS = 90  # number of trial coefficients in the search
+# Largest number of positions that are refined in addition to the best one
+MAX_REFINED_POSITIONS = 24
 # Smallest fraction of the patch on the traces for which its position is known
 MIN_PATCH_OVERLAP = 0.25
 # Part of half the patch beyond its ends, whose unworn depths show where the wear ends
-END_MARGIN = 0.1
+END_MARGIN_OVER_HALF_PATCH = 0.1
 # Largest coefficient relative to that of the run for which the shape is known
 MAX_COEFFICIENT_RATIO = 2.0
 # Largest relative coefficient of the search, so that a message can propose one
-SEARCHED_RATIO = 1e4
+MAX_SEARCHED_COEFFICIENT_RATIO = 1e4
 MAX_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
-WORN_FRACTION = 0.05  # depth at the ends of the computed wear relative to its largest depth
-ACCEPTED_DEVIANCE = 4.0  # increase of the sum of squares, in variances, of an equally good position
-MIN_FREE_BLOCKS = 3.0  # smallest number of degrees of freedom of Student's t
-WRONG_UNITS = 20.0  # ratio of two lengths or depths from which on the units are likely to be wrong
+# Depth at the ends of the computed wear relative to its largest depth
+WORN_END_DEPTH_FRACTION = 0.05
+# Increase of the sum of squares, in variances, of an equally good position
+MAX_ACCEPTED_DEVIANCE = 4.0
+MIN_DEGREES_OF_FREEDOM = 3.0  # smallest number of degrees of freedom of Student's t
+# Ratio of two lengths or depths from which on the units are likely to be wrong
+WRONG_UNIT_RATIO = 20.0
 
 
 class MeasuredDepth(NamedTuple):
@@ -224,7 +229,7 @@ def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
     start, others = _search(bins, history)
 
     # depths far from the patch tell nothing about its wear
-    near = np.abs(bins.middles - start.centre) <= (1 + END_MARGIN) * history.half
+    near = np.abs(bins.middles - start.centre) <= (1 + END_MARGIN_OVER_HALF_PATCH) * history.half
     first, last = np.flatnonzero(near)[[0, -1]]
     bins = bins._replace(
         edges=bins.edges[first : last + 2],
@@ -240,7 +245,7 @@ def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
 
 def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
     """Average the measured depth over bins, and draw random errors of the means."""
-    width = 2 * history.half / N_BINS
+    width = 2 * history.half / N_PATCH_BINS
     length = float(np.ptp(measured.x))
     if length < MIN_PATCH_OVERLAP * 2 * history.half:
         raise PatchfemError(
@@ -267,7 +272,7 @@ def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
 
 def _suspect_units(ratio: float, axis: str) -> str:
     """Return the end of a message on two numbers whose ratio lets suspect wrong units."""
-    if 1 / WRONG_UNITS < ratio < WRONG_UNITS:
+    if 1 / WRONG_UNIT_RATIO < ratio < WRONG_UNIT_RATIO:
         return ""
     return f"; check the units of {axis} with --units"
 
@@ -285,7 +290,7 @@ def _require_similar(width: float | None, bins: Bins, history: WearHistory, best
             f'"{1.3 * best.ratio * history.coefficient:.2g} m^2/N" and compare again{_suspect_units(best.ratio, "z")}'
         )
     computed = history.average(bins.edges, best)
-    worn = bins.width * float((computed > WORN_FRACTION * computed.max()).sum())
+    worn = bins.width * float((computed > WORN_END_DEPTH_FRACTION * computed.max()).sum())
     if width is not None and not worn / MAX_WIDTH_RATIO <= width <= MAX_WIDTH_RATIO * worn:
         raise PatchfemError(
             f"compare --predicted: the measured track is {format_length(width, 3)} wide, and the computed wear of "
@@ -300,12 +305,14 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     For each trial coefficient and both directions, the sums of squares at all shifts by a bin follow from two
     correlations.
     """
-    n_shown = int(MIN_PATCH_OVERLAP * N_BINS)
-    edges = np.linspace(-history.half, history.half, N_BINS + 1)
+    n_shown = int(MIN_PATCH_OVERLAP * N_PATCH_BINS)
+    edges = np.linspace(-history.half, history.half, N_PATCH_BINS + 1)
     size = bins.depth.size
-    squares = np.full((2, size + N_BINS - 1), np.inf)
+    squares = np.full((2, size + N_PATCH_BINS - 1), np.inf)
     ratios = np.ones(squares.shape)
-    for ratio in np.geomspace(history.work[1], SEARCHED_RATIO, N_RATIOS):
+    for ratio in np.geomspace(
+        history.work[1], MAX_SEARCHED_COEFFICIENT_RATIO, N_TRIAL_COEFFICIENTS
+    ):
         for side in (0, 1):
             template = history.average(edges, Place(ratio, 0.0, bool(side)))
             total = np.correlate(np.ones(size), template**2, "full")
@@ -314,10 +321,10 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
             squares[side] = np.minimum(total, squares[side])
 
     # enough of the patch must lie within the trace
-    shifts = np.arange(squares.shape[1]) - (N_BINS - 1)
-    squares[:, (shifts < n_shown - N_BINS) | (shifts > size - n_shown)] = np.inf
+    shifts = np.arange(squares.shape[1]) - (N_PATCH_BINS - 1)
+    squares[:, (shifts < n_shown - N_PATCH_BINS) | (shifts > size - n_shown)] = np.inf
     places = []
-    for number in np.argsort(squares, axis=None)[: 4 * MAX_PLACES]:
+    for number in np.argsort(squares, axis=None)[: 4 * MAX_REFINED_POSITIONS]:
         side, shift = np.unravel_index(int(number), squares.shape)
         centre = float(bins.edges[0] + bins.width * shifts[shift] + history.half)
         places.append(Place(float(ratios[side, shift]), centre, bool(side)))
@@ -328,7 +335,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
         is_far = abs(place.centre - best.centre) > 1.5 * bins.width
         return is_far or place.is_mirrored != best.is_mirrored
 
-    return best, list(filter(is_apart, places))[:MAX_PLACES]
+    return best, list(filter(is_apart, places))[:MAX_REFINED_POSITIONS]
 
 
 def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = False) -> Place:
@@ -388,14 +395,14 @@ def _make_result(
     if best.ratio <= 1:
         other = _refine(bins, replace(history, is_linear=True), best)
     half = np.sqrt(
-        (SIDE * spread[0]) ** 2
+        (HALF_WIDTH_95 * spread[0]) ** 2
         + (history.error * best.ratio) ** 2
         + (other.ratio - best.ratio) ** 2
     )
-    half_centre = np.hypot(SIDE * spread[1], other.centre - best.centre)
+    half_centre = np.hypot(HALF_WIDTH_95 * spread[1], other.centre - best.centre)
 
     # places whose sum of squares is larger by less than some variances of an independent block
-    limit = best.squares * (1 + ACCEPTED_DEVIANCE / n_blocks)
+    limit = best.squares * (1 + MAX_ACCEPTED_DEVIANCE / n_blocks)
     accepted = [best, *(place for place in others if place.squares <= limit)]
     ratios = [place.ratio for place in accepted]
     centres = [place.centre for place in accepted]
@@ -451,7 +458,7 @@ def _measure_spread(
     """
     from scipy.special import stdtrit
 
-    worn = computed > WORN_FRACTION * computed.max()
+    worn = computed > WORN_END_DEPTH_FRACTION * computed.max()
     terms = residual[worn]
     count = terms.size
 
@@ -460,12 +467,12 @@ def _measure_spread(
     correlation = correlation / correlation[0] if correlation[0] > 0 else np.zeros(count)
     positive = int(np.argmax(correlation <= 0)) if (correlation <= 0).any() else count
     length = 1 + 2 * float(correlation[1:positive].sum())
-    n_blocks = max(count / length, MIN_FREE_BLOCKS + 2)
+    n_blocks = max(count / length, MIN_DEGREES_OF_FREEDOM + 2)
     freedom = n_blocks - 2
 
     gain = np.linalg.pinv(jacobian)
     scatter = residual @ residual / residual.size * n_blocks / freedom * length
-    student = float(stdtrit(freedom, (1 + LEVEL) / 2)) / SIDE
+    student = float(stdtrit(freedom, (1 + CONFIDENCE_LEVEL) / 2)) / HALF_WIDTH_95
     from_scatter = student * np.sqrt(scatter * (gain**2).sum(axis=1))
     variance = gain**2 @ bins.noise**2 + (bins.datum_error * gain.sum(axis=1)) ** 2
     return np.sqrt(from_scatter**2 + variance).tolist(), n_blocks

@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem.export.charts.axes import STYLE
+from patchfem.export.charts.axes import MATPLOTLIB_STYLE
 
 # colours of two curves that are compared, and of what is beside them
 BLUE = "#1f5f99"
@@ -34,7 +34,7 @@ def drawing(
     **how
         Arguments of `Figure.subplots`.
     """
-    with rc_context(STYLE):
+    with rc_context(MATPLOTLIB_STYLE):
         figure = Figure(figsize=size)
         FigureCanvasSVG(figure)
         yield figure, figure.subplots(rows, columns, **how)

@@ -12,11 +12,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
 
 from patchfem.core import InitialState, ModalBasis
-from patchfem.friction import Coulomb
 from patchfem.hybrid.cases import EXACT_RTOL
 from patchfem.hybrid.laws import masing
 from patchfem.model import build
-from patchfem.points import contacts, time_march
+from patchfem.points import contacts, laws, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.joints import make_single_law
 from patchfem.scene import scene
@@ -161,10 +160,10 @@ def hybrid(one: Problem, rtol: float) -> np.ndarray:
 def march(one: Problem, steps: int) -> np.ndarray:
     """Integrate by time stepping with `steps` per cycle."""
     if one.elements is None:
-        element = Coulomb(one.limit, one.limit).element(1.0)
-        contact = contacts.make_contact([element], one.modes.interfaces)
+        law = laws.make_coulomb(one.limit, one.limit)
     else:
-        contact = contacts.make_parallel_contact(*one.elements, one.modes.slide)
+        law = laws.make_elements(*one.elements)
+    contact = contacts.make_contact([law], one.modes.interfaces)
     found = time_march.march(
         one.modes, one.drive, contact, one.cycles, steps, window=one.last, start=one.start
     )

@@ -35,7 +35,7 @@ from study_text import read_answer
 from patchfem.campaigns.fits.problem import FitOptions
 from patchfem.campaigns.rows.fit import fit_rows
 from patchfem.inputs import read_table
-from patchfem.scene import BOUNDS, loads, read_assignments
+from patchfem.scene import BOUNDS_FORM, loads, read_assignments
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
@@ -137,7 +137,7 @@ def steps(frequency: float, seen) -> list:
 def fit_gauge(gauge: bool):
     """Fit spring and yaw to 143 Hz, with or without a free gauge factor."""
     scene = loads(text(), SCENE, READING)
-    wanted, wrong = read_assignments((*FREE, *((GAUGE,) if gauge else ())), BOUNDS)
+    wanted, wrong = read_assignments((*FREE, *((GAUGE,) if gauge else ())), BOUNDS_FORM)
     assert not wrong
     return fit_rows(scene, TABLE, wanted, FitOptions((HOLD,), starts=STARTS), seed=SEED)
 

@@ -20,7 +20,7 @@ import numpy as np
 import patchfem as pf
 from patchfem.runs import run as runner
 from patchfem.scene import scene
-from patchfem.slip import jenkins_set
+from patchfem.slip import make_jenkins_set
 
 FOLDER = Path(__file__).parent
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)
@@ -43,7 +43,7 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
         )
         patch = found.patch
         per_node = 0.30 * patch.pressure.sigma_n * patch.pieces.interface.weight
-        group = jenkins_set(patch.pieces.tangential, per_node)
+        group = make_jenkins_set(patch.pieces.tangential, per_node)
         share = np.cumsum(group.stiffness * group.yield_displacement) / per_node.sum()
         row = {
             "tilt": angle,

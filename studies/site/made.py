@@ -26,8 +26,8 @@ import patchfem as pf
 from patchfem.commands.sources import read_sources
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
-from patchfem.response.rows import ROWS as MOTION
-from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.response.rows import MOTION_MEASURE_ROWS as MOTION
+from patchfem.runs.results.patch_rows import PATCH_MEASURE_ROWS as STATIC
 from patchfem.scene.keys.types import list_keys
 
 ROOT = Path(__file__).parents[2]

@@ -23,9 +23,9 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
-from patchfem.export.charts.axes import STYLE  # noqa: E402
+from patchfem.export.charts.axes import MATPLOTLIB_STYLE  # noqa: E402
 from patchfem.export.fields.film import contact_window, last_frames  # noqa: E402
-from patchfem.export.fields.vtkhdf import NAME, Frames, read_frames  # noqa: E402
+from patchfem.export.fields.vtkhdf import VTKHDF_FILE, Frames, read_frames  # noqa: E402
 from patchfem.export.pieces import draw_cells, magnify_pieces  # noqa: E402
 
 FOLDER = Path(__file__).parent / "pictures"
@@ -39,7 +39,7 @@ SAMPLES = 25  # values kept of each curve and of each field of stresses
 CURVE_TOL = 2e-3  # difference over largest value; a smaller one cannot be seen in a picture
 # Fraction of the largest value of all curves of a picture; a curve below it is round-off.
 ROUND_OFF = 1e-9
-LOOK = STYLE | {
+LOOK = MATPLOTLIB_STYLE | {
     "font.size": 11,
     "axes.titlesize": 11,
     "axes.labelsize": 11,
@@ -205,7 +205,7 @@ def figures() -> Iterator[tuple[str, Figure]]:
         yield "interface", draw_interface(result)
         yield "loop", draw_loop(result)
         result.save(place)
-        frames = read_frames(Path(place) / NAME)
+        frames = read_frames(Path(place) / VTKHDF_FILE)
         yield "pieces", draw_pieces(frames)
         yield "film", draw_film(frames)
         os.chdir(place)  # a sweep writes its folder into the current directory

@@ -7,7 +7,7 @@ Readings flagged U are used without correction, which can only favour these mode
 
 import numpy as np
 
-from patchfem.campaigns.rows.cells import MIN_DISPLACEMENT, Readings
+from patchfem.campaigns.rows.cells import MIN_COMPARED_DISPLACEMENT, Readings
 
 NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 
@@ -43,7 +43,7 @@ def fit_null_model(readings: Readings, name: str, training) -> tuple:
         fitted = is_of_kind & training
         if not fitted.any():
             continue
-        minimum = 1e-300 if kind == "acceleration" else MIN_DISPLACEMENT
+        minimum = 1e-300 if kind == "acceleration" else MIN_COMPARED_DISPLACEMENT
         measured = np.log(np.maximum(readings.measured, minimum))
         y = measured - inputs[:, 1]
         columns = [np.ones(len(inputs))]

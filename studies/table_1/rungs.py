@@ -27,7 +27,7 @@ from pathlib import Path
 
 from derived import Derived, FitRequest, Number, rods
 
-from patchfem.scene import BOUNDS, Scene, load, loads, read_assignments
+from patchfem.scene import BOUNDS_FORM, Scene, load, loads, read_assignments
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER.parent / "rig" / "table1.csv"
@@ -123,7 +123,7 @@ class Rung:
         Grooves of another wavelength are searched between the amplitudes that bend alike, as far as they do not lock.
         """
         scene = self.text(reading, *more)
-        wanted = list(read_assignments((*self.free, *READINGS[reading][1]), BOUNDS)[0])
+        wanted = list(read_assignments((*self.free, *READINGS[reading][1]), BOUNDS_FORM)[0])
         grooves = scene.normal.grooves if scene.normal is not None else None
         if grooves is not None:
             bends = (grooves.wavelength / 80e-6) ** 2

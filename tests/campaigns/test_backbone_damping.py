@@ -41,8 +41,8 @@ cycles = 20
 def write_page(backbone, law: str, damping: float, folder) -> str:
     """Return the page of a backbone after writing its files into a folder."""
     source = make_rig(law, damping).source
-    store.write(backbones.make_answer(backbone, source), folder)
-    return page.write_page(folder).read_text("utf-8")
+    store.write_answer(backbones.make_answer(backbone, source), folder)
+    return page.write_report(folder).read_text("utf-8")
 
 
 @cache

@@ -55,7 +55,7 @@ def forget_errors(run_cost, *names):
 )
 def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch):
     """Values and errors at the setting of the scene agree with those of its run within 1e-9."""
-    monkeypatch.setattr(numerical_settings, "CELL_FACTORS", (0.25, 1.0))
+    monkeypatch.setattr(numerical_settings, "CELL_COUNT_FACTORS", (0.25, 1.0))
     patch = build_model(keys, 0.03)
     # The label of a row lists all settings with equal runs.
     row = next(one for one in compute_setting_costs(patch, "element_size") if own in one.label)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import read_json, read_page, run_successfully
 
-from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
+from patchfem.scene import NEXT_VERB_BY_KIND, TEMPLATE_DESCRIPTIONS, read_template
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
@@ -64,7 +64,7 @@ def run_and_list_warnings(path: Path, out: Path, *words) -> list:
 @pytest.mark.parametrize(
     "kind",
     [
-        pytest.param(one, marks=pytest.mark.slow) if one in (*NEXT_VERBS, *DEAR) else one
+        pytest.param(one, marks=pytest.mark.slow) if one in (*NEXT_VERB_BY_KIND, *DEAR) else one
         for one in TEMPLATE_DESCRIPTIONS
     ],
 )
@@ -72,8 +72,8 @@ def test_always_templates_run_without_warnings(kind, tmp_path):
     """Every template runs without a warning and ends with the expected outcome."""
     path = tmp_path / f"{kind}.toml"
     path.write_text(read_template(kind), "utf-8")
-    assert run_and_list_warnings(path, tmp_path / "out", NEXT_VERBS.get(kind, "run")) == []
-    if kind not in NEXT_VERBS:
+    assert run_and_list_warnings(path, tmp_path / "out", NEXT_VERB_BY_KIND.get(kind, "run")) == []
+    if kind not in NEXT_VERB_BY_KIND:
         summary = read_json(tmp_path / "out/summary.json")
         assert summary["outcome"] == ("steady" if kind in STEADY else "done")
 

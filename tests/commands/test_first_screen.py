@@ -34,7 +34,7 @@ def test_exact_printed_numbers_equal_summary(tmp_path):
     count = len(summary["verdict"])
     assert lines[1 : count + 1] == summary["verdict"] and len(lines[1].split()) <= 30
     shown = read_numbers(answer.out)
-    assert 3 <= len(shown) <= quantities.MAX_TILES
+    assert 3 <= len(shown) <= quantities.MAX_KEY_QUANTITIES
     assert find_wrong_numbers(shown, summary["measures"]) == []
     assert lines[-1] == f"results: {tmp_path / 'out'} (without report.html: --no-page)"
     # the headline has the amplitude with its error

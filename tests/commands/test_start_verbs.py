@@ -15,7 +15,7 @@ from patchfem.__main__ import app, register_verbs
 from patchfem.commands import examine
 from patchfem.commands.sources import bibtex, read_sources
 from patchfem.effects import EFFECTS
-from patchfem.scene import NEXT_VERBS, read_template
+from patchfem.scene import NEXT_VERB_BY_KIND, read_template
 
 register_verbs([])  # all verbs
 
@@ -27,7 +27,7 @@ def test_exact_new_writes_template(tmp_path):
     answer = run_successfully("new", "joint", "-o", path)
     assert path.read_text("utf-8") == read_template("joint")
     assert f"patchfem run {path}" in answer.out
-    for kind, verb in NEXT_VERBS.items():
+    for kind, verb in NEXT_VERB_BY_KIND.items():
         assert f"patchfem {verb} " in run_cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
         assert f"patchfem {verb} FILE" in " ".join(read_template(kind).replace("\n#", " ").split())
     path.write_text("mine", "utf-8")

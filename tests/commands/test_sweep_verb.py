@@ -154,7 +154,7 @@ def test_exact_command_and_table_repeat_random_cases(tmp_path, monkeypatch):
     over = ("--over", "friction.static=0.24..0.36", "--random", "5", "--seed", "3", "--no-page")
     given = ["sweep", "bench.toml", *over]
     run_successfully(*given, "-o", "first")
-    assert store.read(tmp_path / "first").origin["command"].startswith("patchfem")
+    assert store.read_answer(tmp_path / "first").origin["command"].startswith("patchfem")
     run_successfully(*given, "-o", "again")
     listed = sweep_into(tmp_path / "listed", scene, "--cases", tmp_path / "first/sweep.csv")
     assert listed.code == 0

@@ -8,7 +8,7 @@ from pressed import press
 
 from patchfem.contact import edges
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity import Piece, interface_compliance
+from patchfem.elasticity import Piece, compute_interface_compliance
 
 WIDTH = 12.7e-3
 HALF_WIDTH = 0.1e-3
@@ -54,7 +54,7 @@ def hertz_block():
 
 def compute_block(grid) -> tuple:
     """Return the compliance of two titanium pieces on a grid and the height [m] of its first row."""
-    nn, tt, _ = interface_compliance(Piece(grid, make_bare_layers(TITANIUM)))
+    nn, tt, _ = compute_interface_compliance(Piece(grid, make_bare_layers(TITANIUM)))
     interface = Interface(grid.x, frozen_array(grid.tributary_lengths() * WIDTH), WIDTH)
     return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
         grid.depth[1]

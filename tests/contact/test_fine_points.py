@@ -10,7 +10,7 @@ from patchfem.contact import (
     PointCompliance,
     end_compliance,
     layer_compliance,
-    patch_problem,
+    make_patch_problem,
     smooth_modes,
     solve_by_gradients,
 )
@@ -90,7 +90,7 @@ def test_exact_point_compliance_is_symmetric_and_invertible():
 def press_points(points, gap, load: float) -> tuple:
     """Return the positions of the contact edges of equally spaced points, and the stiffness."""
     force, _ = solve_by_gradients(
-        points, patch_problem(points.x, gap - gap.min(), load), 1e-10, 3000
+        points, make_patch_problem(points.x, gap - gap.min(), load), 1e-10, 3000
     )
     in_contact = force > 0
     ones = np.ones(points.x.size)

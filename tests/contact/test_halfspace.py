@@ -11,7 +11,7 @@ from study_module import load_study
 
 from patchfem.contact.gaps import crown
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.grid import graded_rows
+from patchfem.mesh.grid import compute_row_heights
 
 halfspace = load_study("common/halfspace.py")
 MODULUS = exact.combined_modulus(*CARBIDE)
@@ -30,10 +30,12 @@ def make_points(n_points, length):
 
 def make_crown_grid(half_width, spacing, growth):
     """Return a coated grid with uniform columns in the contact that grow outwards, and at least 8 rows of coating."""
-    outer = half_width + np.cumsum(graded_rows(spacing * growth, LENGTH / 2 - half_width, growth))
+    outer = half_width + np.cumsum(
+        compute_row_heights(spacing * growth, LENGTH / 2 - half_width, growth)
+    )
     right = np.concatenate([np.arange(1, round(half_width / spacing) + 1) * spacing, outer])
-    rows = graded_rows(min(spacing, COATING / 8), COATING, growth, 8)
-    substrate_rows = graded_rows(rows[-1] * growth, HEIGHT - COATING, growth)
+    rows = compute_row_heights(min(spacing, COATING / 8), COATING, growth, 8)
+    substrate_rows = compute_row_heights(rows[-1] * growth, HEIGHT - COATING, growth)
     depth = np.concatenate(
         [[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(substrate_rows)[:-1], [HEIGHT]]
     )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press, press_to_approach
 
-from patchfem.contact import StripCompliance, active_set, patch_problem, solve_by_gradients
+from patchfem.contact import StripCompliance, active_set, make_patch_problem, solve_by_gradients
 from patchfem.contact.conjugate_gradients import project_forces
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
@@ -183,7 +183,7 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     """A problem whose active sets cycle is solved by conjugate gradients and agrees with enumeration."""
     gap = np.array([2e-9, -8e-9, 8e-9])
     x = np.array([-1e-3, 0, 1e-3])
-    problem = patch_problem(x, gap)
+    problem = make_patch_problem(x, gap)
     for start in (gap < 0, np.ones(3, bool)):
         assert active_set.solve_primal_dual(StripCompliance(CYCLE), problem, start)[0] is None
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
@@ -211,7 +211,7 @@ def test_exact_gradients_agree_with_enumeration(moment, spring):
     x = np.linspace(-1e-3, 1e-3, 7)
     c = 1e-9 * (np.exp(-np.abs(x[:, None] - x) / 1e-3) + 0.2 * np.eye(7))
     gap = 1e-9 * np.array([3.0, 0.4, 2.1, 0.0, 3.5, 1.2, 2.8])
-    problem = patch_problem(x, gap, 5.0, moment, spring)
+    problem = make_patch_problem(x, gap, 5.0, moment, spring)
     force, n_iterations = solve_by_gradients(StripCompliance(c), problem)
     expected = solve_by_enumeration(c, x, gap, 5.0, moment, spring)[0]
     assert force == pytest.approx(expected, abs=5e-5)
@@ -228,7 +228,7 @@ def test_exact_primal_sets_agree_with_enumeration(seed):
     x = np.linspace(-1, 1, n_nodes)
     gap = 100 * rng.normal(size=n_nodes)
     moment = [None, 30.0][seed % 2]
-    problem = patch_problem(x, gap, 100.0, moment)
+    problem = make_patch_problem(x, gap, 100.0, moment)
 
     # the nodes of the largest gaps carry the start
     start = project_forces(gap, problem.motions[:, : problem.target.size], problem.target)

@@ -21,8 +21,8 @@ from patchfem.contact import (
     HertzAsperities,
     LinearAsperities,
     StripCompliance,
+    compute_strip_offsets,
     split_into_strips,
-    strip_offsets,
 )
 from patchfem.contact.press import STRIP_RESIDUAL_TOL
 
@@ -45,13 +45,13 @@ def pair_strips(n_strips, n_elements=60):
     """Return (normal, x, weight, offsets) of strips of the coated pair."""
     pair = make_coated_pair(n_elements)
     c, _, weight = split_into_strips(pair, n_strips)
-    return c, pair.interface.x, weight, strip_offsets(WIDTH, n_strips)
+    return c, pair.interface.x, weight, compute_strip_offsets(WIDTH, n_strips)
 
 
 def rigid_strips(n_strips):
     """Return (normal, x, weight, offsets) of strips of rigid bodies, with a single node in the middle."""
     weight = np.full(1, LENGTH * WIDTH / n_strips)
-    return np.zeros((1, 1)), np.zeros(1), weight, strip_offsets(WIDTH, n_strips)
+    return np.zeros((1, 1)), np.zeros(1), weight, compute_strip_offsets(WIDTH, n_strips)
 
 
 def random_gaps(rng, x, n_strips, amplitude):

@@ -13,7 +13,7 @@ from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
 from patchfem.disk import is_partial_name, open_lossy, write_atomically, write_text
-from patchfem.disk.atomic_write import PLACED_PATHS
+from patchfem.disk.atomic_write import COMPLETED_PATHS
 
 SIZES = [1 << 10, 1 << 16]
 
@@ -115,7 +115,7 @@ def test_exact_interrupted_write_preserves_older_file(tmp_path, raised):
     assert path.read_bytes() == "größer".encode() and [
         other_path.name for other_path in tmp_path.iterdir()
     ] == ["a.txt"]
-    assert PLACED_PATHS[-1] == path
+    assert COMPLETED_PATHS[-1] == path
 
 
 def test_refuses_unwritable_path(tmp_path):

@@ -43,7 +43,7 @@ def test_exact_slow_pipe_is_read_completely(named_pipe):
 
 def test_refuses_pipe_without_writer(named_pipe, monkeypatch):
     """A pipe without a writer is refused after a timeout."""
-    monkeypatch.setattr(open_with_timeout, "PIPE_TIMEOUT", 0.1)
+    monkeypatch.setattr(open_with_timeout, "PIPE_WAIT_SECONDS", 0.1)
     with pytest.raises(
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):

@@ -25,15 +25,15 @@ from patchfem.elasticity import (
     Layers,
     Piece,
     compute_displacement,
+    compute_interface_compliance,
     get_cells,
-    interface_compliance,
     make_points,
 )
-from patchfem.elasticity.elasticity import hooke
-from patchfem.mesh import graded_grid
+from patchfem.elasticity.elasticity import compute_stress
+from patchfem.mesh import make_graded_grid
 from patchfem.mesh.pieces import PieceMesh, raise_order
 
-GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
+GRID = make_graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
 FORMS = {
     "triangle": (MeshTri, ElementTriP1),
     "quad": (MeshQuad, ElementQuad1),
@@ -74,7 +74,7 @@ def solve_by_skfem(mesh, kind: str, layers, shear, normal):
         np.ascontiguousarray(mesh.points[nodes].T), np.ascontiguousarray(corners.reshape(-1, n).T)
     )
     basis = Basis(skfem_mesh, ElementVector(element()), intorder=2 if n == 3 else 5)
-    lam, mu = layers.lame(mesh.is_coating)[..., None] * np.ones(basis.dx.shape)
+    lam, mu = layers.lame_constants(mesh.is_coating)[..., None] * np.ones(basis.dx.shape)
     stiffness = elasticity.assemble(basis, lam=lam, mu=mu).tocsc()
     # Unknowns of both are matched by their positions.
     places = basis.doflocs.T[::2]
@@ -119,8 +119,8 @@ def test_exact_patch_test(kind, plane):
     cells = get_cells(piece)
     for points, nodes in zip(make_points(cells, "gauss"), cells.groups.values()):
         strain = points.strain(u[nodes])
-        stress = hooke(strain, np.zeros(strain.shape[1:], bool), layers)
+        stress = compute_stress(strain, np.zeros(strain.shape[1:], bool), layers)
         assert np.abs(stress - [0, -1e7, 0, 0]).max() <= 1e-10 * 1e7 * 1e3
         assert np.abs(stress[..., 1] / -1e7 - 1).max() <= 1e-10
-    nn = interface_compliance(piece).nn
+    nn = compute_interface_compliance(piece).nn
     assert nn @ pressure == pytest.approx(1e7 / 200e9 * 1e-3, rel=1e-10)

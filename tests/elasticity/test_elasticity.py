@@ -13,11 +13,11 @@ from patchfem.core import NotConverged
 from patchfem.elasticity import (
     Layers,
     Piece,
-    centre_stress,
+    compute_centre_stress,
     compute_displacement,
     get_cells,
 )
-from patchfem.mesh import TensorGrid, graded_grid
+from patchfem.mesh import TensorGrid, make_graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])
@@ -46,7 +46,7 @@ def test_exact_linear_field_satisfies_hooke_law(coating, substrate, plane, slope
     x, y = np.meshgrid(NONUNIFORM_GRID.x, NONUNIFORM_GRID.depth, indexing="ij")
     field = np.stack([ux * x + uy * y, vx * x + vy * y], axis=-1).reshape(1, -1, 2)
     cells = get_cells(piece)
-    stress = centre_stress(cells, field)
+    stress = compute_centre_stress(cells, field)
     for is_coating, (young, nu) in ((True, coating), (False, substrate)):
         sxx, syy, szz, sxy = stress[0, cells.is_coating == is_coating].T
         scale = 1e-11 * (np.abs(slopes).max() * 1e-3 + 1e-300) / (1 - 2 * nu)
@@ -61,7 +61,7 @@ def test_exact_linear_field_satisfies_hooke_law(coating, substrate, plane, slope
 
 def half_wave_compliance(n_elements, wavelength):
     """Return the compliance of half a wave on the coated piece between symmetry lines, from the energy."""
-    base = graded_grid(wavelength / 2, 2 * wavelength, wavelength / 16, COATING)
+    base = make_graded_grid(wavelength / 2, 2 * wavelength, wavelength / 16, COATING)
     depth = base.depth
     rows = base.coating_rows
     for _ in range(int(np.log2(n_elements // 8))):
@@ -94,7 +94,7 @@ def test_order_of_harmonic_layer_compliance_is_two(wavelength):
 def test_refuses_moduli_of_coating_and_substrate_too_far_apart():
     """A stiffness that is singular to working precision is refused with the ratio of the moduli and the remedies; the
     round-off error of moduli that are less far apart is estimated."""
-    grid = graded_grid(2e-3, 1e-3, 2e-4, COATING)
+    grid = make_graded_grid(2e-3, 1e-3, 2e-4, COATING)
     pieces = [
         make_grid_piece(grid, Layers((e, 0.24), (1e12, 0.32), "strain")) for e in (1e30, 1e22)
     ]

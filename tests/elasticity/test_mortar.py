@@ -15,7 +15,7 @@ from patchfem.contact.gaps import crown
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery
 from patchfem.mesh import TensorGrid, tributary_lengths
-from patchfem.mesh.grid import graded_rows
+from patchfem.mesh.grid import compute_row_heights
 
 HALF_WIDTH = 0.1e-3  # half-width of the Hertz contact [m]
 LOAD = 9107.0  # per metre of width [N/m]
@@ -62,8 +62,8 @@ def quadrature_rule(x, mesh_nodes):
 
 def block_compliance(x, young):
     """Return (nn, tt, nt) of a block of uniform material on these columns, with rows that grow downwards."""
-    depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), 6e-3, 1.1))])
-    return elasticity.interface_compliance(
+    depth = np.concatenate([[0.0], np.cumsum(compute_row_heights(np.diff(x).min(), 6e-3, 1.1))])
+    return elasticity.compute_interface_compliance(
         elasticity.Piece(TensorGrid(x, depth, 0), make_bare_layers((young, TITANIUM[1]), "strain"))
     )
 
@@ -94,7 +94,7 @@ def distorted_pair(poisson=0.0, stiff=100.0):
         )
         for count, young in ((12, YOUNG), (9, stiff * YOUNG))
     ]
-    return pair, [elasticity.interface_compliance(piece) for piece in pair]
+    return pair, [elasticity.compute_interface_compliance(piece) for piece in pair]
 
 
 @pytest.mark.parametrize("stiff", [0.01, 1.0, 100.0])
@@ -110,7 +110,7 @@ def test_exact_patch_test_with_distorted_blocks(stiff):
     ):
         assert force == pytest.approx(piece.mesh.tributary_lengths() * LOAD / LENGTH, rel=1e-12)
         u = elasticity.compute_displacement(piece, 0 * force, force)
-        stress = recovery.centre_stress(recovery.get_cells(piece), u)
+        stress = recovery.compute_centre_stress(recovery.get_cells(piece), u)
         assert np.abs(stress - [0, -LOAD / LENGTH, 0, 0]).max() <= 1e-11 * LOAD / LENGTH
 
 
@@ -154,7 +154,7 @@ def test_exact_joined_compliance_equals_weighted_displacements():
 def _compute_hertz_block(per_half_width):
     """Return (x, compliance) of a Hertz block of titanium."""
     grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, LENGTH, 6e-3, 1.1)
-    return grid.x, elasticity.interface_compliance(
+    return grid.x, elasticity.compute_interface_compliance(
         elasticity.Piece(grid, make_bare_layers(TITANIUM))
     )
 

@@ -14,7 +14,7 @@ from pieces import CARBIDE, COATED, COATING, TITANIUM, make_bare_layers, make_re
 from patchfem.elasticity import (
     Cells,
     Layers,
-    centre_stress,
+    compute_centre_stress,
     compute_coating_traction,
     elasticity,
     estimate_error,
@@ -22,13 +22,13 @@ from patchfem.elasticity import (
     get_cells,
     make_points,
 )
-from patchfem.mesh import TensorGrid, graded_grid
-from patchfem.mesh.grid import graded_rows
+from patchfem.mesh import TensorGrid, make_graded_grid
+from patchfem.mesh.grid import compute_row_heights
 
 HALF_WIDTH, LOAD = 0.1e-3, 9107.0
 P0 = 2 * LOAD / (np.pi * HALF_WIDTH)
 TOUGH = (121e9, 0.3)
-SMALL = graded_grid(2e-3, 1e-3, 2e-4, COATING)
+SMALL = make_graded_grid(2e-3, 1e-3, 2e-4, COATING)
 
 
 def mesh_cells(mesh) -> Cells:
@@ -92,7 +92,7 @@ def recover_with_error(piece, u) -> tuple:
     """Return the integration points of a piece, and its recovered stress under displacements with the estimated error."""
     cells = get_cells(piece)
     rules = make_points(cells, "gauss")
-    return rules, estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
+    return rules, estimate_error(fit_recovery(cells), u, compute_centre_stress(cells, u), rules)
 
 
 @pytest.mark.parametrize("split", [None, 0.5])
@@ -138,7 +138,9 @@ def solve_hertz_block(per_half_width):
         [
             uniform_depth,
             2 * HALF_WIDTH
-            + np.cumsum(graded_rows(1.1 * HALF_WIDTH / per_half_width, 70e-3 - 2 * HALF_WIDTH)),
+            + np.cumsum(
+                compute_row_heights(1.1 * HALF_WIDTH / per_half_width, 70e-3 - 2 * HALF_WIDTH)
+            ),
         ]
     )
     piece = grid_piece(TensorGrid(grid.x, depth, 0), make_bare_layers(TOUGH))
@@ -150,7 +152,7 @@ def solve_hertz_block(per_half_width):
         element + 1, p * fraction, grid.x.size
     )
     u = elasticity.compute_displacement(piece, 0 * force[None], force[None])
-    return piece, force, u, centre_stress(get_cells(piece), u)
+    return piece, force, u, compute_centre_stress(get_cells(piece), u)
 
 
 def test_exact_hertz_subsurface_stress_peaks():
@@ -221,7 +223,7 @@ def test_exact_error_estimate_agrees_with_refined_energy(split):
     (Galerkin orthogonality).
     """
     mesh = (
-        mesh_of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
+        mesh_of_grid(make_graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
         if split is not None
         else triangle_mesh()
     )

@@ -49,7 +49,7 @@ def write_small_series(folder, frames: int = 3, times=None):
     pieces = Pieces(times, lower, upper, X, np.ones(4), interface, width=5e-3)
     blocks = make_blocks(pieces)
     folder.mkdir(exist_ok=True)
-    vtkhdf.write_blocks(folder / vtkhdf.NAME, blocks, times)
+    vtkhdf.write_blocks(folder / vtkhdf.VTKHDF_FILE, blocks, times)
     return SimpleNamespace(pieces=pieces, blocks=blocks, times=times)
 
 

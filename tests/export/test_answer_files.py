@@ -58,8 +58,8 @@ def make_answer() -> Answer:
 def test_exact_answer_is_read_back(tmp_path):
     """An answer that is read from its folder has the same sentences, quantities, arrays, details and origin."""
     answer = make_answer()
-    store.write(answer, tmp_path)
-    read = store.read(tmp_path)
+    store.write_answer(answer, tmp_path)
+    read = store.read_answer(tmp_path)
     for name in ("kind", "title", "verdict", "quantities", "remarks", "details", "origin"):
         assert getattr(read, name) == getattr(answer, name), name
     assert list(read.data) == list(answer.data)
@@ -174,7 +174,7 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
     harm, reason = DAMAGES[damage]
     harm(folder)
     with pytest.raises(PatchfemError, match=reason):
-        store.read(folder)
+        store.read_answer(folder)
     for command in (("report", folder), ("export", folder, "-o", tmp_path / "h.csv")):
         answer = run_cli(*command)
         assert answer.code == 2, (command, answer)
@@ -186,11 +186,11 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
 def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
     """Texts that are stored as codes are read back, also more of them than a byte can number."""
     texts = [f"{number} Hz" for number in range(count)]
-    drive = answers.encode("row", texts)
+    drive = answers.encode_texts("row", texts)
     assert drive.values.dtype == kind
     answer = replace(make_answer(), data={"drive": drive})
-    store.write(answer, tmp_path)
-    read = store.read(tmp_path).data["drive"]
+    store.write_answer(answer, tmp_path)
+    read = store.read_answer(tmp_path).data["drive"]
     assert columns.list_cells(read) == texts
     with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
         if count:  # CF conventions: the flags have the type of their variable

@@ -35,7 +35,7 @@ def test_exact_csv_of_fit_has_units_of_its_headings():
         "input": ([2 * G_N, G_N], "m s-2"),
         "computed_displacement": ([25.4e-6, None], "m"),
     }
-    data = answer.make_columns("row", arrays) | {"flag": answer.encode("row", ["U", ""])}
+    data = answer.make_columns("row", arrays) | {"flag": answer.encode_texts("row", ["U", ""])}
     text = columns.format_curves(answer.Answer("fit", "", (), data=data))["fit.csv"]
     lines = list(csv.reader(text.splitlines()))
     assert lines[0] == ["frequency [Hz]", "input [g]", "flag", "computed displacement [mil]"]

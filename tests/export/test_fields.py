@@ -15,8 +15,8 @@ from vtk_frames import read_with_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray
 
 import patchfem as pf
-from patchfem.export.fields.blocks import FIELDS
-from patchfem.export.fields.vtkhdf import NAME, read_frames
+from patchfem.export.fields.blocks import VTK_FIELDS
+from patchfem.export.fields.vtkhdf import VTKHDF_FILE, read_frames
 
 PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file
@@ -42,7 +42,7 @@ def assert_block_equal(grid, block, number: int) -> None:
 def test_exact_vtk_reads_pieces(tmp_path, capfd):
     """VTK reads named blocks with the meshes, times and numbers of the pieces, and prints no error."""
     small = write_small_series(tmp_path / "out", 4)
-    frames = read_with_vtk(tmp_path / "out" / NAME)
+    frames = read_with_vtk(tmp_path / "out" / VTKHDF_FILE)
     assert [time for time, _ in frames] == list(small.times) and not capfd.readouterr().err
     for number, (_, grids) in enumerate(frames):
         assert grids.keys() == PARTS
@@ -63,7 +63,7 @@ def test_exact_vtk_reads_pieces(tmp_path, capfd):
 
 def test_exact_coating_carries_load_and_friction(bench_folder):
     """In every frame the stress below each coating carries the load and the friction force within 2e-6 of the load."""
-    line = read_frames(bench_folder / NAME).blocks["interface"]
+    line = read_frames(bench_folder / VTKHDF_FILE).blocks["interface"]
     weight = line.point_data["weight"][0]
     load = weight @ line.point_data["normal_stress"].T
     for side in ("lower", "upper"):
@@ -78,7 +78,7 @@ def test_exact_file_states_units_and_codes(tmp_path):
     """Every array of the file has its unit, and those with codes the meanings of the codes."""
     write_small_series(tmp_path / "out")
     units = {"normal_stress": "Pa", "gap": "m", "stress_error": "1", "weight": "m2", "stress": "Pa"}
-    with h5py.File(tmp_path / "out" / NAME) as file:
+    with h5py.File(tmp_path / "out" / VTKHDF_FILE) as file:
         for part in PARTS:
             group = file["VTKHDF"][part]
             arrays = {**group["PointData"], **group["CellData"]}
@@ -133,7 +133,7 @@ def test_exact_csv_has_interface_values(tmp_path):
     with open(tmp_path / "a.csv", newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     columns = dict(zip(header, np.array(rows, float).T))
-    line = read_frames(tmp_path / "out" / NAME).blocks["interface"]
+    line = read_frames(tmp_path / "out" / VTKHDF_FILE).blocks["interface"]
     assert np.array_equal(columns.pop("x [m]"), line.points[:, 0])
     for k, axis in enumerate("xy"):
         moved = columns.pop(f"displacement_{axis} [m]").astype(np.float32)
@@ -141,7 +141,9 @@ def test_exact_csv_has_interface_values(tmp_path):
     for label, values in columns.items():
         name, unit = label.rstrip("]").split(" [")
         written = frame_values(line.point_data[name], 1)
-        assert np.array_equal(values.astype(written.dtype), written) and FIELDS[name].unit == unit
+        assert (
+            np.array_equal(values.astype(written.dtype), written) and VTK_FIELDS[name].unit == unit
+        )
 
 
 @pytest.mark.parametrize(
@@ -152,7 +154,7 @@ def test_exact_csv_has_interface_values(tmp_path):
         (["-o", "a.vtu", "--frame", "-4"], 2, "frames 0 to 2"),
         (["-o", "a.pvd", "--frame", "1"], 2, "contains all frames"),
         ([], 2, "-o"),
-        (["-o", f"out/{NAME}/x/a.vtu"], 4, f"{NAME} is a file"),
+        (["-o", f"out/{VTKHDF_FILE}/x/a.vtu"], 4, f"{VTKHDF_FILE} is a file"),
     ],
 )
 def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code, message):
@@ -169,7 +171,7 @@ def test_exact_grids_of_result_agree_with_patch_and_file(tmp_path):
     crowned_run = pf.run(CROWNED_BENCH)
     all_frames = crowned_run.to_pyvista(frame=None)
     crowned_run.save(tmp_path / "run")
-    for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / NAME)):
+    for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / VTKHDF_FILE)):
         grids = all_frames[number]
         assert grids.keys() == written.keys() == PARTS
         assert grids["upper"].field_data["TimeValue"][0] == time
@@ -204,11 +206,11 @@ def test_exact_grids_of_result_agree_with_patch_and_file(tmp_path):
 def test_refuses_impossible_mesh_of_a_page(bench_folder, tmp_path, name, value, is_refused):
     """A page names the file whose cells have nodes that do not exist; pressures that are all below 0 are drawn."""
     folder = shutil.copytree(bench_folder, tmp_path / "out")
-    with h5py.File(folder / NAME, "r+") as file:
+    with h5py.File(folder / VTKHDF_FILE, "r+") as file:
         file[f"VTKHDF/{name}"][...] = value
     answer = run_cli("report", folder, "-o", tmp_path / "page.html")
     if is_refused:
-        assert answer.code == 2 and f"{folder / NAME}: not the fields" in answer.err
+        assert answer.code == 2 and f"{folder / VTKHDF_FILE}: not the fields" in answer.err
         assert "a cell has a node that does not exist" in answer.err
     else:
         assert answer.code == 0

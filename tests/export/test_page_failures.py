@@ -48,7 +48,7 @@ def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, f
         """Fail in place of writing a page."""
         raise fault
 
-    monkeypatch.setattr(page, "write_page", fail)
+    monkeypatch.setattr(page, "write_report", fail)
     out = tmp_path / "out"
     answer = run_cli("run", scene_file, "-o", out)
     assert answer.code == code and words in answer.err

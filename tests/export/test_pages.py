@@ -96,7 +96,7 @@ def test_exact_numbers_of_page_equal_files(folders, name):
     )
     assert texts.keys() | zeros == measures.keys()
     tiles = {label.replace(" ", "_"): text for label, text in read_tiles(page).items()}
-    assert len(tiles) <= quantities.MAX_TILES and find_wrong_numbers(tiles, measures) == []
+    assert len(tiles) <= quantities.MAX_KEY_QUANTITIES and find_wrong_numbers(tiles, measures) == []
 
     if (folder / "result.nc").is_file():
         assert find_strange_curves(page, folder / "result.nc") == []

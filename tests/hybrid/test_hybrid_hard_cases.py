@@ -92,15 +92,20 @@ def test_more_events_than_there_is_room_for_are_kept(monkeypatch, load, repeats)
     assert np.array_equal(motion.rows, expected.rows)
 
 
-def test_interfaces_with_the_same_slide_share_their_force():
-    """Two Coulomb interfaces on one slide move as one of their sum."""
-    two = runs.run_case(
-        make_rig_case(
-            [coulomb(), coulomb()], [0.3, 0.5], np.ones((2, 1)), [1.0], zeta=0.003, cycles=200
-        )
+@pytest.mark.parametrize("kinetic", [1.0, 0.6])
+def test_interfaces_with_the_same_slide_share_their_force(kinetic):
+    """Two Coulomb interfaces on one slide move, stick and slip as one of their sum; the weaker one does not slip first."""
+    law = coulomb(1.0, kinetic)
+    two, one = (
+        runs.run_case(
+            make_rig_case([law] * len(loads), loads, np.ones((len(loads), 1)), [1.7])
+        ).values
+        for loads in ([0.3, 0.5], [0.8])
     )
-    assert two.values[AMPLITUDE] == pytest.approx(COULOMB_AMPLITUDE, rel=1e-6)
-    assert two.values["loop_area_2"] == pytest.approx(two.values["loop_area"] * 5 / 3, rel=1e-6)
+    for name in (AMPLITUDE, "stick_fraction", "slip_start_phase"):
+        assert two[name] == pytest.approx(one[name], rel=1e-6)
+    assert two["stick_fraction_2"] == pytest.approx(one["stick_fraction"], rel=1e-6)
+    assert two["loop_area_2"] == pytest.approx(two["loop_area"] * 5 / 3, rel=1e-6)
 
 
 def test_chatter_of_many_interfaces_on_many_modes():

@@ -91,4 +91,4 @@ def test_refuses_huge_files_quickly(tmp_path, name, reader, expected):
     with open(path, "wb") as file:
         file.truncate(3 << 30)  # a sparse file, which takes no disk space
     error_message, peak = measure_peak_memory(lambda: reader(path))
-    assert expected in error_message and peak < 4.5 * tables.MAX_BYTES
+    assert expected in error_message and peak < 4.5 * tables.MAX_TABLE_BYTES

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import Layout, divide_into_columns, divide_into_rows, graded_grid
+from patchfem.mesh import Layout, divide_into_columns, divide_into_rows, make_graded_grid
 
 
 @given(
@@ -52,7 +52,7 @@ def test_exact_row_boundary_at_coating(coating):
 @pytest.mark.parametrize("coating", [0.0, 152.4e-6])
 def test_exact_coarsening_reverses_refinement(coating):
     """Coarsening a refined grid twice gives the original grid exactly."""
-    grid = graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
+    grid = make_graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
     refined = grid.refine().refine()
     coarsened = refined.coarsen().coarsen()
     assert (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.mesh import graded_grid, read_pieces, write_mesh
+from patchfem.mesh import make_graded_grid, read_pieces, write_mesh
 
-SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
+SMALL = make_graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
 
 
 def test_refuses_missing_mesh_file_and_unknown_suffix(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.elasticity.elasticity import evaluate_cells
-from patchfem.mesh import ELEMENTS, SHARP_END, End, graded_grid
+from patchfem.mesh import ELEMENTS, SHARP_END, End, make_graded_grid
 from patchfem.mesh.ends import MAX_INTERFACE_SLOPE
 
 LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
@@ -18,7 +18,7 @@ ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("ra
 def make_shaped_piece(end, overhang=0.0, element_size=0.31e-3):
     """Return a piece of the given length whose grid is `overhang` than its contact face at either end."""
     half_length = end.half_contact_length(LENGTH) - overhang
-    return graded_grid(2 * half_length, HEIGHT, element_size, COATING).extend(LENGTH, end)
+    return make_graded_grid(2 * half_length, HEIGHT, element_size, COATING).extend(LENGTH, end)
 
 
 def compute_areas(body):
@@ -107,7 +107,7 @@ def test_always_elements_are_convex_and_columns_grow_slowly(size, shorter, cell,
     end = End(kind, size * min(LENGTH / 2, HEIGHT - COATING))
     half = end.half_contact_length(LENGTH) * (1 - shorter)
     size = max(2 * half * cell, LENGTH / 60) if half > LENGTH / 120 else half
-    body = graded_grid(2 * half, HEIGHT, size, COATING).extend(LENGTH, end)
+    body = make_graded_grid(2 * half, HEIGHT, size, COATING).extend(LENGTH, end)
     corner = body.points[body.blocks["quad"]]
     side = np.roll(corner, -1, axis=1) - corner
     cross_products = (

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
+from patchfem.mesh import ROW_HEIGHT_GROWTH, compute_row_scale, make_graded_grid
 from patchfem.mesh.grid import MIN_PIECE_ROWS
 
 
@@ -24,7 +24,7 @@ def piece_dimensions(draw):
 def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     """The grid has the given dimensions, at least two rows in the coating, and bounded growth of rows."""
     length, height, size, coating = piece
-    grid = graded_grid(*piece)
+    grid = make_graded_grid(*piece)
     assert grid.length == pytest.approx(length, rel=1e-14)
     assert grid.x[0] == pytest.approx(-grid.x[-1], rel=1e-14)
     assert grid.height == height and grid.depth[0] == 0
@@ -36,8 +36,8 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     assert rows.min() > 0 and rows.max() <= height / MIN_PIECE_ROWS * (1 + 1e-5)
     columns = grid.x.size - 1
     for face_row in (rows[0], rows[-1]):
-        assert face_row <= length / columns * (1 + ROW_SLOPE)
-    growth = 1.1 + ROW_SLOPE * row_scale(columns)
+        assert face_row <= length / columns * (1 + ROW_HEIGHT_GROWTH)
+    growth = 1.1 + ROW_HEIGHT_GROWTH * compute_row_scale(columns)
     for layer in (rows[: grid.coating_rows], rows[grid.coating_rows :]):
         ratio = layer[1:] / layer[:-1]
         assert np.all(ratio <= growth) and np.all(ratio >= 1 / growth)

@@ -14,7 +14,7 @@ from any_mesh_cases import (
 )
 
 from patchfem.core import PatchfemError
-from patchfem.mesh import TensorGrid, graded_grid
+from patchfem.mesh import TensorGrid, make_graded_grid
 
 
 def combine_pieces(lower, upper):
@@ -42,7 +42,7 @@ def combine_pieces(lower, upper):
     return combined
 
 
-FINE_GRID = graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
+FINE_GRID = make_graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
 
 
 @pytest.mark.parametrize("form", FORMATS)

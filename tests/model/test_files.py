@@ -10,7 +10,7 @@ from command_line import run_cli, run_successfully
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
 from patchfem import SceneError, load, run
-from patchfem.mesh import graded_grid, write_mesh
+from patchfem.mesh import make_graded_grid, write_mesh
 from patchfem.scene import loads
 
 PROFILE = COATED + '[contact.profile]\nfile = "{}"\n'
@@ -91,7 +91,7 @@ def test_refuses_faulty_file_at_its_scene_line(tmp_path, text, name, content, ke
 
 def write_meshes(folder) -> None:
     """Write meshes of the pieces of COATED: one in m, one in mm."""
-    write_mesh(graded_grid(12.7e-3, 6.35e-3, 1e-3, 152.4e-6), folder / "m.vtu")
+    write_mesh(make_graded_grid(12.7e-3, 6.35e-3, 1e-3, 152.4e-6), folder / "m.vtu")
     mesh = meshio.read(folder / "m.vtu")
     mesh.points *= 1e3
     mesh.write(folder / "mm.vtu")

@@ -9,15 +9,14 @@ from modal_bases import make_modal_basis
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.friction import Bonds, Coulomb, points_element
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.points.contacts import (
+from patchfem.friction import Bonds
+from patchfem.points import (
+    laws,
     make_contact,
     make_cubic_spring,
     make_interlocking_spring,
+    march,
 )
-from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.structure import make_release
 
@@ -94,18 +93,18 @@ def march_random_chain(seed):
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
     kinetic = limit * rng.choice([0.3, 1.0], n)
     makers = {
-        "coulomb": lambda p: Coulomb(kinetic[p], limit[p]).element(1.0),
-        "ep": lambda p: ElasticPlastic(limit[p], length[p]).element(1.0),
-        "bonds": lambda p: points_element(Bonds(0.5, length[p]), 2 * limit[p]),
-        "tanh": lambda p: TanhLaw(limit[p], length[p]).element(1.0),
+        "coulomb": lambda p: laws.make_coulomb(limit[p], kinetic[p]),
+        "ep": lambda p: laws.make_jenkins(limit[p], length[p]),
+        "bonds": lambda p: laws.make_bonds(Bonds(0.5, length[p]), 2 * limit[p]),
+        "tanh": lambda p: laws.make_tanh(limit[p], length[p]),
     }
-    elements = [makers[kind](p) for p, kind in enumerate(kinds)]
+    point_laws = [makers[kind](p) for p, kind in enumerate(kinds)]
     springs = [
         make_cubic_spring(rng.uniform(0, 3), modes.interfaces[0]),
         make_interlocking_spring(rng.uniform(0, 3), rng.uniform(0.5, 5), modes.interfaces[-1]),
     ]
     drive = SineDrive(1.0, rng.uniform(0.3, 3.0))
-    contact = make_contact(elements, modes.interfaces, springs)
+    contact = make_contact(point_laws, modes.interfaces, springs)
     return march(modes, drive, contact, 5, int(rng.integers(20, 120))), limit
 
 
@@ -138,8 +137,8 @@ def find_errors(modes, drive, static, kinetic, cycles):
     reference = problems.run_motion(
         modes, drive, [problems.make_coulomb(*pair) for pair in pairs], cycles, window=cycles
     )
-    elements = [Coulomb(slides, sticks).element(1.0) for sticks, slides in pairs]
-    contact = make_contact(elements, modes.interfaces)
+    point_laws = [laws.make_coulomb(sticks, slides) for sticks, slides in pairs]
+    contact = make_contact(point_laws, modes.interfaces)
     errors = []
     for count in (400, 1600, 6400):
         result = march(modes, drive, contact, cycles, count, window=cycles)

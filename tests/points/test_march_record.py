@@ -7,17 +7,17 @@ from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
-from patchfem.friction import Bonds, Coulomb
-from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.points import checkpoint
-from patchfem.points import time_march as engine
-from patchfem.points.contacts import (
+from patchfem.friction import Bonds
+from patchfem.points import (
+    March,
+    checkpoint,
+    laws,
     make_bond_contact,
     make_contact,
-    make_parallel_contact,
     make_pressed_contact,
+    march,
 )
-from patchfem.points.time_march import March, march
+from patchfem.points import time_march as engine
 from patchfem.slip.shear_modes import shear_modes
 
 from .test_march_loads import reduce_to_shear_modes
@@ -32,7 +32,7 @@ STEPS = 80
 
 def make_tanh_contact(rows=ROW[None]):
     """Return the contact of 20 N tanh(v/(5 mm/s))."""
-    return make_contact([TanhLaw(20.0, 5e-3).element(1.0)], rows)
+    return make_contact([laws.make_tanh(20.0, 5e-3)], rows)
 
 
 def make_compliance(count, scale=1.0):
@@ -66,10 +66,10 @@ def make_pitching_contact(basis):
 
 CASES = {
     "tanh": lambda: (BASIS, make_tanh_contact()),
-    "coulomb": lambda: (BASIS, make_contact([Coulomb(16.0, 20.0).element(1.0)], ROW[None])),
+    "coulomb": lambda: (BASIS, make_contact([laws.make_coulomb(20.0, 16.0)], ROW[None])),
     "elements": lambda: (
         BASIS,
-        make_parallel_contact([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6], ROW),
+        make_contact([laws.make_elements([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6])], [ROW]),
     ),
     "bonds": lambda: (BASIS, make_bond_contact(Bonds(0.4, 1e-6), 50.0, ROW)),
     "bonds behind shear modes": lambda: (BASIS, make_compliant_contact()),
@@ -126,7 +126,7 @@ def test_exact_beats_and_slow_growth_are_not_repeated(monkeypatch):
 @pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (40, 0.8)])
 def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     """A march that keeps no early samples has the same last cycles, amplitudes and energies, also if it ends early."""
-    contact = make_parallel_contact([2e5, 1e5], [1e-6, 2e-6], ROW)
+    contact = make_contact([laws.make_elements([2e5, 1e5], [1e-6, 2e-6])], [ROW])
     basis = make_modal_basis(OMEGA, 0.003)
     if np.isfinite(travel):
         travel *= march(basis, DRIVE, contact, cycles, 40, window=2).extremes.max()

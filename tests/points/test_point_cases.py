@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.friction import make_law
 from patchfem.points import cases, laws
 from patchfem.points.case_rows import Cases
 
@@ -79,13 +80,15 @@ def test_always_acceleration_peak_of_steep_tanh_is_that_of_coulomb(ratio, speed)
 def make_laws() -> dict:
     """Return one law of each kind with a limit of LIMIT."""
     keys = {
-        "static": 0.5, "kinetic": 0.4, "bond_length": None, "stiffness": 2e7, "exponent": 1.5, "shape": 0.6, "chi": -0.3,
-        "beta": 0.5, "stribeck_speed": 0.01, "micro_damping": 200.0, "viscous": 1.0, "reference_speed": 2e-3,
+        "static": 0.5, "kinetic": 0.4, "bond_length": LIMIT / 2e7, "stiffness": 2e7, "exponent": 1.5, "shape": 0.6,
+        "chi": -0.3, "beta": 0.5, "stribeck_speed": 0.01, "micro_damping": 200.0, "viscous": 1.0, "reference_speed": 2e-3,
     }  # fmt: skip
     names = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh")
-    return {
-        name: laws.make_point_law(SimpleNamespace(law=name, **keys), 2 * LIMIT) for name in names
-    }
+    made = {}
+    for name in names:
+        law = make_law(SimpleNamespace(law=name, **keys), 2 * LIMIT)
+        made[name] = laws.make_point_law(name, law, 2 * LIMIT)
+    return made
 
 
 @pytest.mark.parametrize("name", make_laws())

@@ -26,7 +26,7 @@ from scene_texts import (
 
 from patchfem import new
 from patchfem.export import run_folder
-from patchfem.export.folder import is_state
+from patchfem.export.folder import is_state_file
 from patchfem.points import checkpoint, time_march
 from patchfem.runs import refine
 
@@ -110,13 +110,13 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
         assert answer.code == 130 and "out.partial, add --resume to the command" in answer.err, (
             answer.err
         )
-        assert partial.is_dir() and all(is_state(path.name) for path in partial.iterdir())
+        assert partial.is_dir() and all(is_state_file(path.name) for path in partial.iterdir())
     save_counter.saved.clear()
     save_counter.stop = 0
     assert run_cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
     assert_same_results(out, tmp_path / "whole")
     assert list_names(tmp_path) == {"out", "scene.toml", "whole"}
-    assert not any(is_state(path.name) for path in out.iterdir())
+    assert not any(is_state_file(path.name) for path in out.iterdir())
 
 
 def test_exact_run_is_resumed_in_its_second_pass(tmp_path, save_counter, monkeypatch):
@@ -133,7 +133,7 @@ def test_exact_run_is_resumed_in_its_second_pass(tmp_path, save_counter, monkeyp
     save_counter.stop = "march_2_1"
     assert run_cli(*command, tmp_path / "out").code == 130
     states = [path.name for path in (tmp_path / "out.partial").iterdir()]
-    assert "march_2_1.npz" in states and all(is_state(name) for name in states)
+    assert "march_2_1.npz" in states and all(is_state_file(name) for name in states)
     save_counter.stop = 0
     run_successfully(*command, tmp_path / "out", "--resume")
     assert_same_results(tmp_path / "out", tmp_path / "whole")

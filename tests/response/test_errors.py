@@ -6,7 +6,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
 import patchfem as pf
 from patchfem.response import convergence_errors
-from patchfem.response.errors import SAFETY_FACTOR
+from patchfem.response.errors import ERROR_SAFETY_FACTOR
 
 NAME = "relative_displacement_amplitude"
 
@@ -20,9 +20,11 @@ def make_sequence(*steps, order, size=1e-3):
 @pytest.mark.parametrize("size", [1e-3, -1e-3])
 @pytest.mark.parametrize("count", [3, 5])
 def test_exact_error_of_sequence_of_known_order(order, size, count):
-    """For three or more runs of a known order, the stated error is SAFETY_FACTOR times the true error."""
+    """For three or more runs of a known order, the stated error is ERROR_SAFETY_FACTOR times the true error."""
     runs = make_sequence(*2.0 ** np.arange(count), order=order, size=size)
-    assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY_FACTOR * abs(size), rel=1e-9)
+    assert convergence_errors(*runs)[NAME] == pytest.approx(
+        ERROR_SAFETY_FACTOR * abs(size), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("order", [0.5, 4.0])
@@ -36,7 +38,7 @@ def test_exact_two_runs_use_given_order(ratio, order):
     """For two runs the given order determines the error; a measure absent from the coarser run gets none."""
     fine, coarse = make_sequence(1.0, ratio, order=order)
     found = convergence_errors(fine | {"loop_area": 1.0}, coarse, ratio=ratio, order=order)
-    assert found == {NAME: pytest.approx(SAFETY_FACTOR * 1e-3)}
+    assert found == {NAME: pytest.approx(ERROR_SAFETY_FACTOR * 1e-3)}
 
 
 def test_exact_time_fractions_have_sampling_error():

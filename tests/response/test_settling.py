@@ -46,7 +46,7 @@ def test_always_error_covers_two_decays():
 def test_exact_amplitudes_of_windows_are_classified(amplitudes, outcome):
     """Amplitudes grow from a twentieth of the tolerance per window; short runs are classified by their last change."""
     found = settling.classify_motions(np.array([amplitudes]), 1e-3)
-    assert settling.CLASSES[found[0]] == outcome
+    assert settling.MOTION_CLASSES[found[0]] == outcome
 
 
 def test_exact_windows_end_at_last_cycle():

@@ -109,7 +109,7 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     """
     cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
-    assert sum(one["engine"] == lumped.ENGINE for one in results.numerics.values()) >= 4
+    assert sum(one["engine"] == lumped.BATCH_ENGINE for one in results.numerics.values()) >= 4
     singles = one_by_one.solve(cases)
     assert (results.outcome == singles.outcome).all() and results.notes == singles.notes
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]

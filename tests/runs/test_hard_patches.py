@@ -77,8 +77,11 @@ def assert_errors_cover_hertz(result, load) -> tuple:
 
 @pytest.fixture
 def coarse_meshes(monkeypatch):
-    """Limit automatic meshes to a hundredth of the usual cost."""
-    monkeypatch.setattr(mesh_levels, "MAX_CONDENSING_SECONDS", {True: 0.1, False: 0.1})
+    """Limit automatic meshes to 1/36 of the usual cost."""
+    predict = mesh_levels.predict_condensing_seconds
+    monkeypatch.setattr(
+        mesh_levels, "predict_condensing_seconds", lambda meshes: 36 * predict(meshes)
+    )
 
 
 @pytest.mark.share(0)

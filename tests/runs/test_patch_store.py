@@ -23,6 +23,6 @@ def find_recomputed(names: str) -> list[str]:
 
 def test_least_recently_used_result_beyond_the_number_is_discarded(monkeypatch):
     """A result that was asked for again stays; the one that was not used for longest is computed again."""
-    monkeypatch.setattr(store, "MAX_ENTRIES", 3)
+    monkeypatch.setattr(store, "MAX_STORED_RESULTS", 3)
     assert find_recomputed("abcad") == ["a", "b", "c", "d"]
     assert find_recomputed("adcb") == ["b"]

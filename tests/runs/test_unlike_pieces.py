@@ -11,7 +11,7 @@ from wedges import singularity_exponent
 from patchfem import build
 from patchfem.core import frozen_array
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.grid import graded_rows
+from patchfem.mesh.grid import compute_row_heights
 from patchfem.model import extend_grid, make_piece_meshes
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import solve_patch_contact
@@ -40,9 +40,9 @@ def build_patch_model(text: str):
 
 def graded_columns(place: float, half: float, smallest: float, growth: float = 1.2) -> np.ndarray:
     """Return symmetric columns over |x| <= half that grow from cells of `smallest` at |x| = place."""
-    right = [place - np.append(0.0, np.cumsum(graded_rows(smallest, place, growth)))[::-1]]
+    right = [place - np.append(0.0, np.cumsum(compute_row_heights(smallest, place, growth)))[::-1]]
     if half > place:
-        right.append(place + np.cumsum(graded_rows(smallest, half - place, growth)))
+        right.append(place + np.cumsum(compute_row_heights(smallest, half - place, growth)))
     x = np.concatenate(right)
     x[0] = 0.0
     x[-1] = half

@@ -10,8 +10,8 @@ import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model import build
 from patchfem.scene import (
-    LISTS,
-    RANDOM,
+    LIST_FORM,
+    RANDOM_FORM,
     Range,
     loads,
     read_assignments,
@@ -20,7 +20,7 @@ from patchfem.scene import (
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
-def read_axis(text, form=LISTS):
+def read_axis(text, form=LIST_FORM):
     """Return the axis of a text that has no mistakes."""
     (found,), wrong = read_assignments([text], form)
     assert wrong == []
@@ -101,20 +101,20 @@ def test_refuses_invalid_axis(text, says):
 
 def test_exact_sampled_values_lie_within_range():
     """Sampled values lie between the ends of a range, on a logarithmic or a linear scale."""
-    log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", RANDOM)
+    log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", RANDOM_FORM)
     assert isinstance(log_range, Range) and log_range.is_log
     np.testing.assert_allclose(
         log_range.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
     )
-    linear_range = read_axis("friction.static=0.2..0.6:lin", RANDOM)
+    linear_range = read_axis("friction.static=0.2..0.6:lin", RANDOM_FORM)
     np.testing.assert_allclose(
         linear_range.make_axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14
     )
     assert (
         "takes whole numbers takes no range"
-        in read_assignments(["contact.pairs=1..4"], RANDOM)[1][0]
+        in read_assignments(["contact.pairs=1..4"], RANDOM_FORM)[1][0]
     )
-    assert "leave out :9" in read_assignments(["friction.static=0.2..0.6:9"], RANDOM)[1][0]
+    assert "leave out :9" in read_assignments(["friction.static=0.2..0.6:9"], RANDOM_FORM)[1][0]
 
 
 def test_exact_sweep_table_equals_options():

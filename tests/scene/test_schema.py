@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from patchfem.scene import (
-    BOUNDS,
+    BOUNDS_FORM,
     UNIT_FACTORS,
     loads,
     make_schema,
@@ -72,7 +72,7 @@ def test_exact_percentage_is_accepted_by_schema_and_program(schema_validator, te
         (value, 0.01, 0.02)
     ]
     assert [
-        (free.low, free.high) for free in read_assignments([f"{key}={text}..50 %"], BOUNDS)[0]
+        (free.low, free.high) for free in read_assignments([f"{key}={text}..50 %"], BOUNDS_FORM)[0]
     ] == [(value, 0.5)]
     assert [mode[:3] for mode in parse_modes(f"212 Hz:{text}:1 %")] == [(212.0, value, 0.01)]
 

@@ -158,7 +158,11 @@ def list_refusals(names: str) -> list[str]:
     return []
 
 
-@pytest.mark.parametrize("names, instead", support.SUPPORT, ids=[row[0] for row in support.SUPPORT])
+@pytest.mark.parametrize(
+    "names, instead",
+    support.UNSUPPORTED_COMBINATIONS,
+    ids=[row[0] for row in support.UNSUPPORTED_COMBINATIONS],
+)
 def test_refuses_each_row_of_support(names, instead):
     """A scene with the features of a row is refused for this row alone, with its advice.
 

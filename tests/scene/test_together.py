@@ -10,7 +10,12 @@ from patchfem.scene.rules import together
 from patchfem.scene.rules.check import find_kind
 from patchfem.scene.rules.scene_draft import SceneDraft
 
-ROWS = together.MISTAKES | together.REMARKS | together.MISSING | together.MISSING_TABLES
+ROWS = (
+    together.MISTAKE_RULES
+    | together.REMARK_RULES
+    | together.MISSING_KEY_RULES
+    | together.MISSING_TABLE_RULES
+)
 
 
 def write_plain_values(condition: str) -> dict:

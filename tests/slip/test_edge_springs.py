@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.slip import add_edge_springs, jenkins_set
+from patchfem.slip import add_edge_springs, make_jenkins_set
 
 COUNT = 41
 
@@ -42,7 +42,7 @@ def test_exact_force_is_unchanged_once_the_edges_slip():
     compliance, limit = make_patch()
     target = 0.99 * stick_stiffness(compliance, limit > 0)
     changed = add_edge_springs(compliance, limit > 0, target)
-    before, after = (jenkins_set(matrix, limit) for matrix in (compliance, changed))
+    before, after = (make_jenkins_set(matrix, limit) for matrix in (compliance, changed))
 
     def force(elements, displacement):
         return (elements.stiffness * np.minimum(elements.yield_displacement, displacement)).sum()

@@ -14,7 +14,7 @@ from yielding_points import jenkins_forces, solve_all_points
 from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
-from patchfem.slip import find_sufficient_modes, jenkins_set
+from patchfem.slip import find_sufficient_modes, make_jenkins_set
 from patchfem.slip.shear_modes import shear_modes
 
 MU = 0.3
@@ -31,8 +31,8 @@ def test_exact_yield_displacements_are_in_proportion_to_limits():
     stiffnesses unchanged, within 1e-11."""
     pair = make_coated_pair(20)
     limit = friction_limit(20, 1e-4)
-    elements = jenkins_set(pair.tangential, limit)
-    scaled = jenkins_set(pair.tangential, 0.37 * limit)
+    elements = make_jenkins_set(pair.tangential, limit)
+    scaled = make_jenkins_set(pair.tangential, 0.37 * limit)
     assert np.array_equal(scaled.points, elements.points)
     for name in ("yield_displacement", "limit"):
         assert getattr(scaled, name) == pytest.approx(0.37 * getattr(elements, name), rel=1e-11)
@@ -51,7 +51,7 @@ def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
     pair = make_coated_pair(40)
     gap = draw_gap(rng, pair.interface.x, 10 ** rng.uniform(-8, -5))
     limit = MU * press(pair, gap, LOAD).sigma_n * pair.interface.weight
-    group = jenkins_set(pair.tangential, limit, bond_length)
+    group = make_jenkins_set(pair.tangential, limit, bond_length)
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-11)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)] + np.diag(bond_length / limit[touching])
@@ -72,7 +72,7 @@ def test_exact_initial_stroke_satisfies_ciavarella_jaeger_theorem(shape):
     x = pair.interface.x
     gap = crown(x, 2.0) if shape == "crown" else tilt(x, 1e-4)
     full = press(pair, gap, LOAD)
-    group = jenkins_set(pair.normal, MU * full.sigma_n * pair.interface.weight)
+    group = make_jenkins_set(pair.normal, MU * full.sigma_n * pair.interface.weight)
     for load_fraction in (0.999, 0.9, 0.6, 0.3, 0.1, 0.01):
         partial = press(pair, gap, load_fraction * LOAD)
         q = MU * (full.approach - partial.approach)
@@ -197,4 +197,4 @@ def test_refuses_unstable_slip_weakening():
 def test_refuses_patch_without_friction():
     """A patch whose friction limit is zero at every point is refused."""
     with pytest.raises(PatchfemError, match="the friction limit is 0 at every point"):
-        jenkins_set(make_coated_pair(40).tangential, np.zeros(41))
+        make_jenkins_set(make_coated_pair(40).tangential, np.zeros(41))

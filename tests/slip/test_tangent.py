@@ -8,19 +8,19 @@ from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, make_bare_layers
 
 from patchfem.contact import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import Piece, interface_compliance
-from patchfem.mesh import graded_grid
+from patchfem.elasticity import Piece, compute_interface_compliance
+from patchfem.mesh import make_graded_grid
 
 
 def dissimilar_bodies() -> tuple:
     """Return the compliance of a coated body on a soft one, and the coupling of normal and
     tangential forces (m, m) [m/N]."""
     grids = (
-        graded_grid(LENGTH, HEIGHT, LENGTH / 60, COATING),
-        graded_grid(LENGTH, 4e-3, LENGTH / 60),
+        make_graded_grid(LENGTH, HEIGHT, LENGTH / 60, COATING),
+        make_graded_grid(LENGTH, 4e-3, LENGTH / 60),
     )
     low, high = (
-        interface_compliance(Piece(grid, layers))
+        compute_interface_compliance(Piece(grid, layers))
         for grid, layers in zip(grids, (COATED, make_bare_layers((70e9, 0.3))))
     )
     x = grids[0].x

@@ -6,7 +6,7 @@ import pytest
 from yielding_points import solve_after_each_yield
 
 from patchfem.core import PatchfemError
-from patchfem.slip import jenkins_set, shear_modes
+from patchfem.slip import make_jenkins_set, shear_modes
 
 
 def half_plane_compliance(count: int):
@@ -27,7 +27,7 @@ def test_exact_yield_order_agrees_with_repeated_solution(count, max_passes, monk
     rng = np.random.default_rng(count)
     limit = rng.uniform(0.5, 2, count)
     c = half_plane_compliance(count)
-    group = jenkins_set(c, limit, 0.05)
+    group = make_jenkins_set(c, limit, 0.05)
     yield_slides, rates = solve_after_each_yield(c + np.diag(0.05 / limit), limit)
     assert group.yield_displacement == pytest.approx(yield_slides, rel=1e-11)
     force_matrix = -np.diff(rates, axis=0, append=np.zeros((1, count))).T
@@ -42,4 +42,4 @@ def test_exact_yield_order_agrees_with_repeated_solution(count, max_passes, monk
 def test_refuses_indefinite_compliance():
     """A compliance matrix that is not positive definite is refused."""
     with pytest.raises(PatchfemError, match="not positive definite"):
-        jenkins_set(np.array([[1.0, 2.0], [2.0, 1.0]]), np.ones(2))
+        make_jenkins_set(np.array([[1.0, 2.0], [2.0, 1.0]]), np.ones(2))

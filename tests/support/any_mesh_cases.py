@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 from scipy.spatial import Delaunay
 
-from patchfem.mesh import PieceMesh, graded_grid, read_pieces
+from patchfem.mesh import PieceMesh, make_graded_grid, read_pieces
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, join_meshes
 
 
@@ -86,7 +86,7 @@ def triangulate_graded_rows(half_length, height, size, coating=0.0):
     )
 
 
-GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
+GRID = make_graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
 NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
 
 

@@ -13,7 +13,10 @@ from typing import NamedTuple
 
 PACKAGE = "patchfem"
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-LOADERS = ("load", "import_module")  # Functions whose first argument is the name of a module.
+LOADERS = (
+    "load_compiled_module",
+    "import_module",
+)  # Functions whose first argument is the name of a module.
 
 
 class Import(NamedTuple):
@@ -23,7 +26,7 @@ class Import(NamedTuple):
     target: str
     name: str  # Name imported from the target, "" for the module itself.
     is_own: bool  # The target belongs to the package.
-    # The module is named by a string, as in `compiled.load("dynamics.loop_kernels")`.
+    # The module is named by a string, as in `compiled.load_compiled_module("dynamics.loop_kernels")`.
     is_text: bool
 
 
@@ -113,7 +116,8 @@ def _imported_names(node, package: list):
     elif isinstance(node, ast.Call) and node.args:
         called = getattr(node.func, "attr", getattr(node.func, "id", ""))
         text = _literal_text(node.args[0]) if called in LOADERS else ""
-        if text and called == "load":  # `compiled.load` takes a name inside the package
+        # `compiled.load_compiled_module` takes a name inside the package
+        if text and called == "load_compiled_module":
             yield f"{PACKAGE}.{text.removeprefix(PACKAGE + '.')}", ""
         elif text:
             yield text, ""

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import Layers, Piece, interface_compliance
-from patchfem.mesh import TensorGrid, graded_grid
-from patchfem.mesh.grid import graded_rows
+from patchfem.elasticity import Layers, Piece, compute_interface_compliance
+from patchfem.mesh import TensorGrid, make_graded_grid
+from patchfem.mesh.grid import compute_row_heights
 
 TITANIUM = (121e9, 0.32)
 CARBIDE = (250e9, 0.24)  # Sprayed WC-Co; this is the value that the project assumes.
@@ -29,7 +29,7 @@ def make_bare_layers(material, plane="strain") -> Layers:
 def make_compliance(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
     """Return the compliance of two mirrored bodies: normal and tangential parts double, the coupling cancels."""
     piece = Piece(grid, layers)
-    nn, tt, _ = interface_compliance(piece)
+    nn, tt, _ = compute_interface_compliance(piece)
     return Compliance(
         Interface(grid.x, grid.tributary_lengths() * width, width), 2 * nn / width, 2 * tt / width
     )
@@ -42,10 +42,12 @@ def grow_depth(height: float, first: float, coating: float, growth: float, coati
     """
     rows = np.empty(0)
     if coating:
-        rows = graded_rows(min(first, coating / coating_rows), coating, growth, coating_rows)
+        rows = compute_row_heights(
+            min(first, coating / coating_rows), coating, growth, coating_rows
+        )
         first = rows[-1] * growth
     depth = np.cumsum(
-        np.concatenate([[0.0], rows, graded_rows(first, height - coating, growth, 3)])
+        np.concatenate([[0.0], rows, compute_row_heights(first, height - coating, growth, 3)])
     )
     return depth, rows.size
 
@@ -65,7 +67,7 @@ def make_coated_pair(cells: int) -> Compliance:
 def make_bare_pair() -> Compliance:
     """Return the compliance of uncoated blocks of the size of the test specimen, with 32 columns."""
     return make_compliance(
-        graded_grid(LENGTH, HEIGHT, LENGTH / 32), make_bare_layers(TITANIUM, "strain")
+        make_graded_grid(LENGTH, HEIGHT, LENGTH / 32), make_bare_layers(TITANIUM, "strain")
     )
 
 
@@ -74,10 +76,12 @@ def make_refined_grid(
 ) -> TensorGrid:
     """Return a grid with columns of width `fine` in |x| <= half that grow outwards; rows begin with `fine`."""
     count = round(half / fine)
-    outer = half + np.cumsum(graded_rows(fine * growth, length / 2 - half, growth))
+    outer = half + np.cumsum(compute_row_heights(fine * growth, length / 2 - half, growth))
     right = np.concatenate([np.arange(1, count + 1) * fine, outer])
     x = np.concatenate([-right[::-1], [0.0], right])
-    return TensorGrid(x, np.concatenate([[0.0], np.cumsum(graded_rows(fine, height, growth))]), 0)
+    return TensorGrid(
+        x, np.concatenate([[0.0], np.cumsum(compute_row_heights(fine, height, growth))]), 0
+    )
 
 
 def draw_gap(rng, x, size: float, terms: int = 12):

@@ -6,8 +6,8 @@ from scene_texts import MODE
 
 import patchfem as pf
 from patchfem.api import get_base_scene
-from patchfem.response import TABLE as MOTION
-from patchfem.runs import TABLE as STATIC
+from patchfem.response import MOTION_TABLE as MOTION
+from patchfem.runs import PATCH_TABLE as STATIC
 from patchfem.scene import format_assignments
 
 MANY = 64  # number of cases of a study of which points are marched together

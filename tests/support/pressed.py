@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.contact import Holder, StripCompliance, StripLayout, StripModel, press_strips
-from patchfem.contact.active_set import patch_problem
+from patchfem.contact.active_set import make_patch_problem
 from patchfem.contact.unilateral import solve
 from patchfem.core import Compliance, Outcome
 
@@ -77,7 +77,7 @@ def solve_forces(c, x, gap, target) -> PlainSolution:
     PlainSolution
     """
     touch_approach = gap.min() if target.size else 0.0
-    problem = patch_problem(x, gap - touch_approach, *map(float, target))
+    problem = make_patch_problem(x, gap - touch_approach, *map(float, target))
     solution = solve(StripCompliance(c), problem)
     solution.motion[:1] += touch_approach
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)

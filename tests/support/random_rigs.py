@@ -14,9 +14,11 @@ from types import SimpleNamespace
 import numpy as np
 
 from patchfem.core import ModalBasis
+from patchfem.friction import make_law as make_friction_law
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import make_law, masing
 from patchfem.hybrid.records import LawNumbers
+from patchfem.model import make_bond_parameters
 
 # Names of the rigs are the seeds by which they were drawn.
 RIGS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
@@ -30,7 +32,12 @@ def make_interface_law(face: dict) -> LawNumbers:
     if keys["law"] == "jenkins":
         return masing.from_elements(*map(np.array, keys["elements"]))
     varies = face["amplitude"] != 0 or face["stiffness"] != 0
-    return make_law(SimpleNamespace(**keys), face["load"], 1.0, varies=varies)
+    table = SimpleNamespace(**keys)
+    if table.law == "elastic-plastic" and table.bond_length is None:
+        table.bond_length = table.static * face["load"] / table.stiffness
+    has_bonds = table.law == "nonlocal"
+    law = make_bond_parameters(table, 1.0) if has_bonds else make_friction_law(table, face["load"])
+    return make_law(table.law, law, face["load"], varies=varies)
 
 
 def make_case(spec: dict, rtol: float = cases.DEFAULT_RTOL, n_steps: float = cases.MIN_STEPS):

@@ -11,7 +11,7 @@ from pressed import solve_forces
 from scipy.linalg import expm
 from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fraction
 
-from patchfem.elasticity import Piece, interface_compliance
+from patchfem.elasticity import Piece, compute_interface_compliance
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump, wear_rates
 from patchfem.wear.depth import solve_jump
 
@@ -166,7 +166,7 @@ def test_exact_worn_hertz_contact_agrees_with_half_space_program():
     mesh = make_refined_grid(
         5 * hertz_width, hertz_width / 10, 40 * hertz_width, 20 * hertz_width, 1.2
     )
-    nn, _, _ = interface_compliance(Piece(mesh, make_bare_layers((young, 0.32))))
+    nn, _, _ = compute_interface_compliance(Piece(mesh, make_bare_layers((young, 0.32))))
     x = mesh.x
     area = mesh.tributary_lengths() * width
     press = make_contact_solver(2 * nn / width, x, x**2 / 2 / radius, line_load * width)

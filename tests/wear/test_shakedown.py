@@ -8,8 +8,8 @@ from pressed import solve_forces
 from scipy.optimize import brentq
 
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import Piece, interface_compliance
-from patchfem.slip import jenkins_set
+from patchfem.elasticity import Piece, compute_interface_compliance
+from patchfem.slip import make_jenkins_set
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump
 
 
@@ -32,7 +32,7 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
     peak = hertz_peak(line, radius, young / (1 - 0.32**2) / 2)
     stick = half * np.sqrt(0.4)
     grid = make_refined_grid(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
-    nn, _, _ = interface_compliance(Piece(grid, make_bare_layers((young, 0.32))))
+    nn, _, _ = compute_interface_compliance(Piece(grid, make_bare_layers((young, 0.32))))
     x = grid.x
     area = grid.tributary_lengths() * width
     gap = grid.x**2 / 2 / radius
@@ -44,7 +44,7 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
 
     def path(worn):
         limit = mu * solve_forces(pair.normal, x, gap + worn, np.array([load]))[0]
-        group = jenkins_set(pair.tangential, limit)
+        group = make_jenkins_set(pair.tangential, limit)
         slide = brentq(
             lambda q: group.stiffness @ np.minimum(q, group.yield_displacement) - 0.6 * mu * load,
             0.0,

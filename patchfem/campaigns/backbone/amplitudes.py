@@ -5,29 +5,29 @@ import numpy as np
 from ...core import NotConverged, PatchfemError
 from ...formatting import format_length, format_quantity
 from .balance import compute_balance_curve
-from .joint import MIN_AMPLITUDE_FACTOR, JointMode
+from .joint import MIN_AMPLITUDE_OVER_GROSS_SLIP, JointMode
 from .quasi_static import compute_static_curve
 from .records import Curve
 
 AMPLITUDES_PER_DECADE = 6  # Number of default amplitudes per decade before points are added.
 # Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
-MAX_AMPLITUDE_FACTOR = 15.0
+MAX_AMPLITUDE_OVER_GROSS_SLIP = 15.0
 # Ratio of the smallest default amplitude under rigid friction to the static deflection by friction.
-MIN_RIGID_FACTOR = 2.0
+MIN_AMPLITUDE_OVER_DEFLECTION = 2.0
 # Ratio of the largest amplitude to that at which a softening spring no longer returns the block.
-SOFTENING_END = 0.7
+MAX_AMPLITUDE_OVER_SOFTENING_LIMIT = 0.7
 # Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
-HARDENING_END = 3.0
+MAX_AMPLITUDE_OVER_HARDENING_LIMIT = 3.0
 # Ratio of the travel to the largest default amplitude, so that a release can start above it.
-TRAVEL_FACTOR = 1.15
+TRAVEL_OVER_MAX_AMPLITUDE = 1.15
 MAX_LINEAR_AMPLITUDE = 1e-3  # largest amplitude of a linear rig [m]
-N_LINEAR = 4  # number of amplitudes of a linear rig, whose values are constant
+N_LINEAR_AMPLITUDES = 4  # number of amplitudes of a linear rig, whose values are constant
 # Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
 MAX_CURVE_CHANGE = 0.08
-MIN_SPACING = 1.02  # ratio of neighbouring amplitudes below which no point is added
-MAX_REFINEMENTS = 3  # each one may halve the spacing
-N_EXTENSIONS = 8  # number of decades by which the default range is extended to reach a force
-MAX_FORCE_STEPS = 8  # largest number of interpolations towards the amplitude of a force
+MIN_AMPLITUDE_SPACING_RATIO = 1.02  # ratio of neighbouring amplitudes below which no point is added
+MAX_CURVE_REFINEMENTS = 3  # each one may halve the spacing
+N_EXTENSION_DECADES = 8  # number of decades by which the default range is extended to reach a force
+MAX_FORCE_INTERPOLATIONS = 8  # largest number of interpolations towards the amplitude of a force
 
 
 def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
@@ -39,7 +39,7 @@ def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
     low, high = ends[:, 0].min(), ends[:, 1].max()
     high = min(high, *(joint.model.rig.springs.travel for joint in joints))
     if joints[0].is_linear:
-        return np.geomspace(low, high, N_LINEAR)
+        return np.geomspace(low, high, N_LINEAR_AMPLITUDES)
     count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
     amplitudes = np.geomspace(low, high, count)
     for joint in joints:
@@ -55,7 +55,7 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
         return 1e-3 * high, high
     low, high = joint.output_amplitude(np.array(_default_slides(joint)))
     high = min(high, _max_amplitude(joint))
-    return min(low, MIN_AMPLITUDE_FACTOR * high), high
+    return min(low, MIN_AMPLITUDE_OVER_GROSS_SLIP * high), high
 
 
 def _default_slides(joint: JointMode) -> tuple[float, float]:
@@ -64,20 +64,26 @@ def _default_slides(joint: JointMode) -> tuple[float, float]:
     deflection = joint.deflection if joint.friction_limit else 0.0
     if 0 < stiffness < np.inf or not deflection:
         slip = joint.slip_displacement
-        return MIN_AMPLITUDE_FACTOR * slip, MAX_AMPLITUDE_FACTOR * max(slip, deflection)
-    return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
+        high = MAX_AMPLITUDE_OVER_GROSS_SLIP * max(slip, deflection)
+        return MIN_AMPLITUDE_OVER_GROSS_SLIP * slip, high
+    # Rigid friction has no slip amplitude, so that the range begins above the static deflection by friction.
+    return MIN_AMPLITUDE_OVER_DEFLECTION * deflection, MAX_AMPLITUDE_OVER_GROSS_SLIP**2 * deflection
 
 
 def _max_amplitude(joint: JointMode) -> float:
     """Return the largest default amplitude [m] of a joint, limited by the stop and by a cubic spring."""
     springs = joint.model.rig.springs
-    travel = springs.travel / TRAVEL_FACTOR
+    travel = springs.travel / TRAVEL_OVER_MAX_AMPLITUDE
     if not springs.cubic:
         return travel
+    # The cubic spring at the output u = o q resists the mode q as much as its stiffness, |k3| u^3 o = k q, at
+    # u = sqrt(k/|k3|)/o.
     output = abs(joint.modes.output[joint.mode]) or joint.reach
-    doubling = np.sqrt(joint.spring / abs(springs.cubic)) / output
-    end = SOFTENING_END if springs.cubic < 0 else HARDENING_END
-    return min(travel, doubling * end)
+    limit = np.sqrt(joint.spring / abs(springs.cubic)) / output
+    factor = MAX_AMPLITUDE_OVER_HARDENING_LIMIT
+    if springs.cubic < 0:
+        factor = MAX_AMPLITUDE_OVER_SOFTENING_LIMIT
+    return min(travel, factor * limit)
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
@@ -117,15 +123,15 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     known = estimate_curve(joint, amplitudes)
 
     # A step that is too wide is divided at the geometric mean of its ends.
-    for _ in range(MAX_REFINEMENTS):
+    for _ in range(MAX_CURVE_REFINEMENTS):
         if known is None or known.amplitude.size < 2:
             break
         is_wide = np.zeros(known.amplitude.size - 1, bool)
         for values in (known.frequency, known.damping):
             step = np.abs(np.diff(values))
             is_wide |= step > MAX_CURVE_CHANGE * (np.nanmax(values) - np.nanmin(values))
-        # Halves of a step would be closer than MIN_SPACING where its ends are within MIN_SPACING^2.
-        is_wide &= known.amplitude[1:] > MIN_SPACING**2 * known.amplitude[:-1]
+        # The halves of a step have the square root of its ratio, which must not fall below MIN_AMPLITUDE_SPACING_RATIO.
+        is_wide &= known.amplitude[1:] > MIN_AMPLITUDE_SPACING_RATIO**2 * known.amplitude[:-1]
         if not is_wide.any():
             break
 
@@ -166,7 +172,7 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     known = _estimate_forces(joint, np.geomspace(low, high, count))
 
     # a wider range, decade by decade, until all forces lie inside
-    for _ in range(N_EXTENSIONS):
+    for _ in range(N_EXTENSION_DECADES):
         added = []
         if known.force.min() > forces.min() and not joint.is_rigid:
             added.append(known.amplitude[0] / 10)
@@ -186,7 +192,7 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
 
     # interpolation in logarithms; each step adds the points that it found
     tolerance = 1e-2 * joint.model.accuracy.tolerance
-    for _ in range(MAX_FORCE_STEPS):
+    for _ in range(MAX_FORCE_INTERPOLATIONS):
         # The largest force up to an amplitude leaves the first place at which a force is reached.
         largest = np.log(np.maximum.accumulate(known.force))
         amplitudes_of_forces = np.exp(np.interp(np.log(forces), largest, np.log(known.amplitude)))

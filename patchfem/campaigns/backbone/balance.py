@@ -17,12 +17,12 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 
 # Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
 # the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1 or changes without end.
-N_LINEAR_STEPS = 200
-# A force holds the mode if the shape of the free motion has at least MIN_MODE_ENERGY of the kinetic energy of the motion
-# under the force, else it holds another mode; and if this shape moves the output by what it moves in all, within
-# MAX_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
-MIN_MODE_ENERGY = 0.5
-MAX_DEVIATION = 0.6
+N_DAMPING_ITERATIONS = 200
+# A force holds the mode if the shape of the free motion has at least MIN_MODE_ENERGY_FRACTION of the kinetic energy of the
+# motion under the force, else it holds another mode; and if this shape moves the output by what it moves in all, within
+# MAX_OUTPUT_MOTION_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
+MIN_MODE_ENERGY_FRACTION = 0.5
+MAX_OUTPUT_MOTION_DEVIATION = 0.6
 # Reason why a mode has no curve
 NO_FREE_MOTION = "no free motion of these amplitudes was found"
 # Reason why a mode under rigid friction has no curve
@@ -175,10 +175,12 @@ def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> boo
     output : (n,) array
         Displacement of the output per modal coordinate.
     """
+    # The part of the motion under the force that has the shape of the free motion (projection on it)
     part = free * np.vdot(free, forced) / np.vdot(free, free)
     energy = np.vdot(part, part).real / np.vdot(forced, forced).real
     whole = output @ forced
-    return energy >= MIN_MODE_ENERGY and abs(output @ part - whole) <= MAX_DEVIATION * abs(whole)
+    max_deviation = MAX_OUTPUT_MOTION_DEVIATION * abs(whole)
+    return energy >= MIN_MODE_ENERGY_FRACTION and abs(output @ part - whole) <= max_deviation
 
 
 def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:
@@ -213,7 +215,7 @@ def _sustain_linear_motion(
     damping matrix and the natural frequencies.
     """
     rate = 0.0
-    for _ in range(N_LINEAR_STEPS):
+    for _ in range(N_DAMPING_ITERATIONS):
         rate -= 2 * _find_mode_eigenvalue(joint, rate * excitation).real
     sustained = _find_mode_eigenvalue(joint, rate * excitation)
     omega = abs(sustained)

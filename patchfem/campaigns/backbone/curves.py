@@ -20,10 +20,10 @@ from .balance import compute_balance_curve
 from .joint import JointMode, build_joint
 from .quasi_static import compute_static_curve
 from .records import (
+    CURVE_METHODS,
+    CURVE_QUANTITIES,
     EQUAL_AMPLITUDE_TOL,
-    METHODS,
     ROUND_OFF_ERROR,
-    VALUES,
     Backbone,
     Curve,
     LossExponents,
@@ -33,17 +33,17 @@ from .records import (
 
 CURVE_FUNCTIONS = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
-MIN_LOSS_RATIO = 4.0
+MIN_LOSS_TO_ERROR_RATIO = 4.0
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
-MAX_MICRO_SLIP_RATIO = 0.3
+MAX_MICRO_SLIP_AMPLITUDE_RATIO = 0.3
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
-MIN_GROSS_SLIP_RATIO = 3.0
+MIN_GROSS_SLIP_AMPLITUDE_RATIO = 3.0
 # Relative error of the flutter amplitude, smaller than the digits that are printed.
-FLUTTER_TOL = 1e-8
+FLUTTER_AMPLITUDE_TOL = 1e-8
 
 
-class Levels(NamedTuple):
+class AmplitudesOrForces(NamedTuple):
     """Amplitudes of a backbone, or the forces that hold the phase resonance; () for a range around the onset of slip.
 
     - amplitudes: amplitudes at the output [m].
@@ -54,8 +54,8 @@ class Levels(NamedTuple):
     forces: Sequence[float] = ()
 
 
-# Levels of a backbone for which the user gives neither amplitudes nor forces
-DEFAULT_LEVELS = Levels()
+# For a backbone of which the user gives neither amplitudes nor forces
+RANGE_AROUND_SLIP = AmplitudesOrForces()
 
 
 def choose_methods(method: str | None) -> tuple[str, ...]:
@@ -67,11 +67,13 @@ def choose_methods(method: str | None) -> tuple[str, ...]:
         If no method has this name.
     """
     if not method:
-        return METHODS
-    if method not in METHODS:
+        return CURVE_METHODS
+    if method not in CURVE_METHODS:
         shown = f"backbone: method {method!r}"
         removed = describe_removed(f"backbone --method {method}", shown)
-        raise PatchfemError(removed or f"{shown} does not exist; use one of {', '.join(METHODS)}")
+        raise PatchfemError(
+            removed or f"{shown} does not exist; use one of {', '.join(CURVE_METHODS)}"
+        )
     return (method,)
 
 
@@ -79,7 +81,7 @@ def compute_backbone(
     model: Model,
     mode: str = "",
     amplitudes=None,
-    methods=METHODS,
+    methods=CURVE_METHODS,
     progress: Callable | None = None,
     *,
     errors: bool = True,
@@ -95,7 +97,7 @@ def compute_backbone(
     amplitudes : (k,) array, optional
         At the output [m]. By default a range around the onset of slip.
     methods : sequence of str
-        From METHODS.
+        From CURVE_METHODS.
     progress : callable, optional
         Takes the name of a method that begins.
     errors : bool
@@ -111,15 +113,15 @@ def compute_backbone(
     PatchfemError
         If the scene has no rig, or the rig does not have this mode.
     """
-    levels = Levels(() if amplitudes is None else amplitudes)
-    return compute_backbones([model], mode, levels, methods, progress, errors=errors)[0]
+    given = AmplitudesOrForces(() if amplitudes is None else amplitudes)
+    return compute_backbones([model], mode, given, methods, progress, errors=errors)[0]
 
 
 def compute_backbones(
     models: Sequence[Model],
     mode: str = "",
-    levels: Levels = DEFAULT_LEVELS,
-    methods=METHODS,
+    given: AmplitudesOrForces = RANGE_AROUND_SLIP,
+    methods=CURVE_METHODS,
     progress: Callable | None = None,
     *,
     errors: bool = True,
@@ -135,14 +137,14 @@ def compute_backbones(
         Models of rigs, such as those of one scene with several values of a key.
     mode : str
         Name of the mode; "" for the first.
+    given : AmplitudesOrForces
+        Amplitudes [m] of the points, or forces [N] at the output, each of which gives an amplitude for each model.
     methods : sequence of str
-        From METHODS.
+        From CURVE_METHODS.
     progress : callable, optional
         Takes the name of a method that begins.
     errors : bool
         Whether the force and the errors are computed.
-    levels : Levels
-        Amplitudes, or forces at the output, of the points.
 
     Returns
     -------
@@ -154,16 +156,17 @@ def compute_backbones(
     PatchfemError
         If a scene has no rig, a rig does not have this mode, or no amplitude has one of the forces.
     """
+    # All models have the same amplitudes: those that hold a given force in any of them, so that curves can be compared.
     joints = []
-    wanted = [np.asarray(levels.amplitudes, float)]
+    wanted = [np.asarray(given.amplitudes, float)]
     for model in models:
         with locate_errors(model.source):
             joint = build_joint(model, mode)._replace(has_errors=errors, has_force=errors)
             joints.append(joint)
-            if len(levels.forces):
+            if len(given.forces):
                 forced = joint._replace(has_force=True)
-                wanted.append(find_amplitudes_of_forces(forced, levels.forces))
-    if not len(levels.forces) and not len(levels.amplitudes):
+                wanted.append(find_amplitudes_of_forces(forced, given.forces))
+    if not len(given.forces) and not len(given.amplitudes):
         wanted.append(default_amplitudes(joints))
     amplitudes = _merge(np.concatenate(wanted))
 
@@ -263,10 +266,10 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
         )
     values = curve.interpolate(curve.amplitude)
     added = finer_errors(values, richer.interpolate(curve.amplitude))
-    names = [f"{name}_error" for name in VALUES]
-    return curve._replace(
-        **{error: getattr(curve, error) + added[name] for error, name in zip(names, VALUES)}
-    )
+    errors = {}
+    for name in CURVE_QUANTITIES:
+        errors[f"{name}_error"] = getattr(curve, f"{name}_error") + added[name]
+    return curve._replace(**errors)
 
 
 def _main_mode_name(joint: JointMode) -> str:
@@ -325,7 +328,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     """Fit the exponents of energy loss over amplitude of a curve in micro-slip and in gross slip.
 
     In micro-slip it is the slope from the first to the last point, in gross slip that of the last
-    two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
+    two points. A loss counts if it exceeds MIN_LOSS_TO_ERROR_RATIO times its error and the round-off of the
     energy.
 
     `joint` gives the amplitude at which the whole contact slips.
@@ -338,11 +341,11 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     # Energy m v^2 of the mode with its largest speed v; a loss below the errors has no slope.
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
-    relative_error = MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
+    relative_error = MIN_LOSS_TO_ERROR_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    micro_slip = np.flatnonzero(known & (amplitude < MAX_MICRO_SLIP_RATIO * slip))
-    gross_slip = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_RATIO * slip))
+    micro_slip = np.flatnonzero(known & (amplitude < MAX_MICRO_SLIP_AMPLITUDE_RATIO * slip))
+    gross_slip = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_AMPLITUDE_RATIO * slip))
 
     # The error of a slope is the sum of the relative errors of the losses at its ends over the width.
     loss_error = (2 * np.pi * curve.damping_error + ROUND_OFF_ERROR) * energy
@@ -386,7 +389,7 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
         return point.damping[0] * point.amplitude[0]
 
     try:
-        return np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_TOL))
+        return np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_AMPLITUDE_TOL))
     except (NotConverged, PatchfemError, ValueError):
         # No further point is known, so the root of the chord between the two points is used.
         fraction = losses[0] / (losses[0] - losses[1])

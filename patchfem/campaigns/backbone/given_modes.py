@@ -14,9 +14,9 @@ from ...runs import joint
 from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, parse_modes
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
-ASSUMED_JOINT_FRACTION = 0.1
+ASSUMED_JOINT_STIFFNESS_FRACTION = 0.1
 # Largest sum, over all modes, of the fractions of stiffness that a joint is assumed to contribute
-MAX_JOINT_FRACTION = 0.5
+MAX_JOINT_STIFFNESS_FRACTION = 0.5
 # Note on a table of the scene that a backbone ignores
 IGNORED_TABLE_NOTE = (
     "[{table}] is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
@@ -41,7 +41,7 @@ def prepare_model(
 ) -> PreparedModel:
     """Build the model of a backbone from a scene, with its own modes or modes given beside it.
 
-    Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
+    Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_STIFFNESS_FRACTION of
     their stiffness. The frequencies of modes given beside the scene are those of the bolted joint.
 
     Parameters
@@ -144,7 +144,7 @@ def _assume_slides(
 
 def _assumed_fraction(n_modes: int) -> float:
     """Return the fraction of the stiffness of each mode that is assumed to be due to the joint."""
-    return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
+    return min(ASSUMED_JOINT_STIFFNESS_FRACTION, MAX_JOINT_STIFFNESS_FRACTION / n_modes)
 
 
 def _note_modes(

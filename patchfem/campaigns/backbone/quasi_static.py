@@ -18,9 +18,9 @@ ROUGH_RTOL = (
     1e-8  # step tolerance of the friction loops whose differences from the fine ones are the errors
 )
 # Largest number of corrections of the displacement until the amplitude is the requested one.
-MAX_AMPLITUDE_STEPS = 60
+MAX_AMPLITUDE_CORRECTIONS = 60
 # Relative error that is added to the estimated errors of a computed friction loop.
-MIN_FLOOR = 1e-10
+MIN_RELATIVE_LOOP_ERROR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
@@ -100,7 +100,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     # damping ratio, loss and force.
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
-    for _ in range(MAX_AMPLITUDE_STEPS):
+    for _ in range(MAX_AMPLITUDE_CORRECTIONS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
@@ -147,7 +147,9 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     for slide in slides:
         steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
         changes = estimate_bench_errors(steady.model, patches, steady.run, steady.steps)
-        measures = add_errors(steady.run.values, changes.errors, min_relative_error=MIN_FLOOR)
+        measures = add_errors(
+            steady.run.values, changes.errors, min_relative_error=MIN_RELATIVE_LOOP_ERROR
+        )
         stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, steady.change)

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-METHODS = ("balance", "quasi-static")  # methods, the recommended one first
+CURVE_METHODS = ("balance", "quasi-static")  # methods, the recommended one first
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 EQUAL_AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
-VALUES = ("frequency", "damping", "force")  # values of a curve that have an error
+CURVE_QUANTITIES = ("frequency", "damping", "force")  # values of a curve that have an error
 
 
 class Curve(NamedTuple):
@@ -46,7 +46,10 @@ class Curve(NamedTuple):
 
     def interpolate(self, amplitudes) -> dict[str, np.ndarray]:
         """Interpolate the values linearly at amplitudes (k,) [m]; return a dict by name."""
-        return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in VALUES}
+        values = {}
+        for name in CURVE_QUANTITIES:
+            values[name] = np.interp(amplitudes, self.amplitude, getattr(self, name))
+        return values
 
 
 def make_curve(amplitude, values, errors) -> Curve:
@@ -89,7 +92,7 @@ def make_band(curves: dict[str, Curve]) -> Band | None:
 
     The band contains every curve, by method, with its numerical errors.
     """
-    method = next((name for name in METHODS if name in curves), None)
+    method = next((name for name in CURVE_METHODS if name in curves), None)
     if method is None:
         return None
     curve = curves[method]
@@ -177,4 +180,4 @@ class Backbone(NamedTuple):
     @property
     def best(self) -> Curve | None:
         """Curve of the recommended method; None without a curve."""
-        return next((self.curves[name] for name in METHODS if name in self.curves), None)
+        return next((self.curves[name] for name in CURVE_METHODS if name in self.curves), None)

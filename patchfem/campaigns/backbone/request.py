@@ -9,12 +9,12 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_quantity
 from ...model.model import Model
-from ...model.rig import JOINT_SCENES, JOINT_TABLES
+from ...model.rig import JOINT_TABLES, SCENES_OF_SUBTRACTED_JOINT
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
 from ...scene.backbone_scene import BackboneTables, parse_modes
 from ...scene.scene import SceneError
-from .curves import Levels, choose_methods, compute_backbones
+from .curves import AmplitudesOrForces, choose_methods, compute_backbones
 from .given_modes import prepare_model
 from .records import Backbone
 
@@ -90,7 +90,7 @@ def compute_cases(
     methods = choose_methods(request.method)
     if request.amplitudes and request.forces:
         raise PatchfemError("--amplitudes and --forces: give only one of them")
-    levels = Levels(
+    given = AmplitudesOrForces(
         read_positive_values(request.amplitudes, "--amplitudes") if request.amplitudes else (),
         read_positive_values(request.forces, "--forces", "force") if request.forces else (),
     )
@@ -122,7 +122,7 @@ def compute_cases(
 
     # All curves at common amplitudes
     models = [case.model for case in prepared]
-    backbones = compute_backbones(models, request.mode, levels, methods, progress)
+    backbones = compute_backbones(models, request.mode, given, methods, progress)
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
     base = models[0]
@@ -160,7 +160,7 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
         One for each value. If all have the same frequency with a sticking joint, the key does not change this joint.
     """
     bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
         return []
     stuck = [backbone.frequencies.stuck for backbone in backbones]
     if axis.key.startswith("structure.") or None in stuck or np.allclose(stuck, stuck[0], 1e-9, 0):
@@ -195,7 +195,7 @@ def _note_changed_joint(
     `compute_cases`.
     """
     bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == JOINT_SCENES["case"]:
+    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
         return []
     sets = base.source.sets
     if not any(text.startswith(JOINT_TABLES) for text in sets):

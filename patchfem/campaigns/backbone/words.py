@@ -7,11 +7,11 @@ from ...runs.patch import faces
 from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Backbone, Curve
 
-MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
+MIN_REPORTED_AMPLITUDE_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 # Smallest shift of the phase resonance by other modes that is reported, in half-widths of the resonance.
-MIN_REPORTED_RATIO = 0.05
+MIN_REPORTED_RESONANCE_SHIFT = 0.05
 # Beginning of a note on a curve without error of the mesh
-MISSING_ERRORS = (
+MISSING_MESH_ERROR_NOTE = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
 # Reason why a curve has no value at some amplitudes, by method
@@ -26,7 +26,7 @@ METHOD_PURPOSES = {
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
 }
 # Advice if no method has a curve
-NO_CURVE = (
+NO_CURVE_ADVICE = (
     "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
     'drive.kind = "free".'
 )
@@ -62,7 +62,9 @@ def _note_missing_mesh(joint: JointMode) -> list[str]:
     advice = "leave out contact.element_size"
     if model.patch is not None and model.patch.mesh.file is not None:
         advice = "split the elements of contact.mesh"
-    return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
+    return [
+        f"{MISSING_MESH_ERROR_NOTE}the interface has too few elements for a coarser mesh; {advice}"
+    ]
 
 
 def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[str]:
@@ -112,7 +114,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     for method, reason in backbone.missing.items():
         reasons.append(f"Method {method} has no curve here: {reason}.")
     if band is None:
-        return (NO_CURVE, *reasons)
+        return (NO_CURVE_ADVICE, *reasons)
     if joint.is_linear:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = backbone.best
@@ -126,7 +128,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     # A ring-down reads means over unequal cycles.
     lost_fraction = -np.expm1(-2 * np.pi * curve.damping)
     k = int(np.argmax(lost_fraction))
-    if lost_fraction[k] > MIN_REPORTED_LOSS:
+    if lost_fraction[k] > MIN_REPORTED_AMPLITUDE_LOSS:
         sentences.append(
             f"A ring-down reads other values where it decays fast: at {format_length(curve.amplitude[k], 3)} a cycle "
             f"takes {100 * lost_fraction[k]:.0f} % of the amplitude."
@@ -192,7 +194,7 @@ def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:
         return []
     ratio = shift / np.maximum(np.abs(curve.damping), ROUND_OFF_ERROR)
     k = int(np.nanargmax(ratio))
-    if ratio[k] < MIN_REPORTED_RATIO:
+    if ratio[k] < MIN_REPORTED_RESONANCE_SHIFT:
         return ["The coupling with the other modes is weak."]
     frequency = format_quantity(curve.force_frequency[k], "Hz", 5)
     return [

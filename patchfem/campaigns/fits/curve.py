@@ -24,7 +24,7 @@ from ...model.source import locate_errors
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
-from ..backbone.records import METHODS
+from ..backbone.records import CURVE_METHODS
 from ..backbone.words import describe_span
 from .options import FitOptions
 from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
@@ -39,19 +39,20 @@ CURVE_UNITS = {
 CURVE_HEADER = "amplitude [um],frequency [Hz],damping [%]"
 FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
 # First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
-FIRST_RELATIVE_ERROR = 5e-2
+FIRST_ASSUMED_RELATIVE_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
 # Relative change of an assumed error from one fit to the next below which it is known
 SAME_ERROR_TOL = 0.1
 # Smallest relative standard deviation of a value, which keeps its weight finite.
-MIN_SPREAD = 1e-6
+MIN_RELATIVE_DEVIATION = 1e-6
 DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 # Largest relative difference of a measured amplitude and that of its computed point.
 SAME_AMPLITUDE_TOL = 1e-6
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
-BAND_STEP = 0.1
-EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
+SLOPE_STEP_IN_HALF_WIDTHS = 0.1
+# Ratio by which the fitted curve goes beyond the measured amplitudes on both sides
+CURVE_EXTENSION_RATIO = 3.0
 
 
 class MeasuredCurve(NamedTuple):
@@ -87,7 +88,9 @@ class MeasuredCurve(NamedTuple):
         scatter = np.sqrt(square / max(count - n_values / 2, 1.0))
         factors = np.where(self.assumed, scatter, 1.0)
         return self._replace(
-            error=np.maximum(factors[:, None] * self.error, MIN_SPREAD * np.abs(self.value))
+            error=np.maximum(
+                factors[:, None] * self.error, MIN_RELATIVE_DEVIATION * np.abs(self.value)
+            )
         )
 
     def describe_assumed_errors(self) -> str:
@@ -189,7 +192,7 @@ def read_damping_curve(path) -> MeasuredCurve:
         if f"{name}_error" in columns:
             error[row] = columns[f"{name}_error"]
         else:
-            error[row] = FIRST_RELATIVE_ERROR * np.abs(value[row])
+            error[row] = FIRST_ASSUMED_RELATIVE_ERROR * np.abs(value[row])
             assumed[row] = True
     if (error < 0).any():
         raise PatchfemError(
@@ -202,7 +205,7 @@ def read_damping_curve(path) -> MeasuredCurve:
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(amplitude, kind="stable")
     # An error is half the width of a 95 % interval, which is two standard deviations.
-    deviation = np.maximum(error / 2, MIN_SPREAD * np.abs(value))
+    deviation = np.maximum(error / 2, MIN_RELATIVE_DEVIATION * np.abs(value))
     return MeasuredCurve(
         amplitude[order], value[:, order], deviation[:, order], assumed, methods[0]
     )
@@ -412,10 +415,10 @@ def fit_curve(
     curves = CurveModel(scene, ranges, measured.amplitude)
     curves.require_enough_rows(curve_file, measured.value.size, "values")
 
-    # METHODS are the reference method and the fast one, which gives the start of the search by the reference method, and the
-    # errors that the table does not give.
+    # CURVE_METHODS are the reference method and the fast one, which gives the start of the search by the reference method,
+    # and the errors that the table does not give.
     reasons = {}
-    for method in reversed(METHODS):
+    for method in reversed(CURVE_METHODS):
         try:
             first = curves.solve(measured, method, options.starts or DEFAULT_CURVE_STARTS)
             break
@@ -430,7 +433,7 @@ def fit_curve(
 
     # The search by the reference method begins at this result. The other method takes its place where it has no curve.
     measured, first = curves.weight_by_scatter(measured, method, first)
-    reference = METHODS[0]
+    reference = CURVE_METHODS[0]
     try:
         measured, fit = curves.refine(measured, reference, first)
     except NotConverged as reason:
@@ -477,7 +480,7 @@ def extrapolate_curve(
     fit : Fit
         Fitted values with their intervals.
     method : str
-        Method of the curve, one of METHODS.
+        Method of the curve, one of CURVE_METHODS.
 
     Returns
     -------
@@ -486,7 +489,7 @@ def extrapolate_curve(
     advice : str
         Sentence on a further measurement, or "".
     """
-    ends = curves.amplitude[[0, -1]] * [1 / EXTENT, EXTENT]
+    ends = curves.amplitude[[0, -1]] * [1 / CURVE_EXTENSION_RATIO, CURVE_EXTENSION_RATIO]
     amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
 
     def compute(values) -> np.ndarray:
@@ -501,7 +504,7 @@ def extrapolate_curve(
         # changes of the curve per half-width of each parameter; a step towards the middle stays within its range
         for k, bound in enumerate(curves.ranges if is_determined else ()):
             values = np.array(fit.values)
-            step = np.copysign(BAND_STEP, (bound.low + bound.high) / 2 - values[k])
+            step = np.copysign(SLOPE_STEP_IN_HALF_WIDTHS, (bound.low + bound.high) / 2 - values[k])
             values[k] += step * half_widths[k]
             slopes.append((compute(values) - curve) / step)
     except PatchfemError:

@@ -30,15 +30,15 @@ from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys, solve_contact
 # Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64
 # Largest ratio of a change of the force to the tolerance at which the change is negligible in a fit.
-STEP_FRACTION = 0.1
+MAX_STEP_CHANGE_OVER_TOLERANCE = 0.1
 # Ratio of the rest speed of growing bonds to the largest measured speed.
 REST_SPEED_FRACTION = 1e-3
 # Smallest fraction of independent rows for which no warning about correlation is issued.
-MIN_INDEPENDENT = 0.6
+MIN_INDEPENDENT_FRACTION = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
-MIN_RMS = 1e-6
+MIN_RMS_OVER_PEAK = 1e-6
 # Largest ratio of the force in the first row to the peak force for a record that begins at rest.
-MAX_FIRST_FORCE = 0.2
+MAX_FIRST_FORCE_OVER_PEAK_FORCE = 0.2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -205,15 +205,15 @@ class BenchModel:
     def refine_steps(self, values: np.ndarray) -> None:
         """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
 
-        The effect is negligible if halving the steps changes no reading by more than STEP_FRACTION times the tolerance
-        of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
+        The effect is negligible if halving the steps changes no reading by more than MAX_STEP_CHANGE_OVER_TOLERANCE times
+        the tolerance of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
 
         Parameters
         ----------
         values : (n,) array
             Values of the n free keys [SI].
         """
-        limit = STEP_FRACTION * self.keys.scene.accuracy.tolerance
+        limit = MAX_STEP_CHANGE_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
         while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
             if np.abs(self.measure_step_change(values)).max() <= limit * np.abs(self(values)).max():
                 return
@@ -377,7 +377,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     warnings = []
 
     # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
-    if fitted.rms > MIN_RMS * peak and n_independent < MIN_INDEPENDENT * n_used:
+    if fitted.rms > MIN_RMS_OVER_PEAK * peak and n_independent < MIN_INDEPENDENT_FRACTION * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
             f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
@@ -388,7 +388,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     # are held out are not fitted.
     first_force = abs(loop.reading[0])
     needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
-    if first_force > MAX_FIRST_FORCE * peak and not needs_no_start:
+    if first_force > MAX_FIRST_FORCE_OVER_PEAK_FORCE * peak and not needs_no_start:
         warnings.append(
             f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
             "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "

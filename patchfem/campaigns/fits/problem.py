@@ -17,7 +17,7 @@ from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...model.rig import JOINT_TABLES
 from ...runs.patch import mesh_levels
-from ...scene.assignments import BOUNDS, Range, read_assignments
+from ...scene.assignments import BOUNDS_FORM, Range, read_assignments
 from ...scene.lines import find_scene_value
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, add_sets
@@ -187,7 +187,7 @@ def parse_ranges(texts: Iterable[str]) -> list[Range]:
 
     Raises SceneError with all validation errors.
     """
-    ranges, mistakes = read_assignments(texts, BOUNDS)
+    ranges, mistakes = read_assignments(texts, BOUNDS_FORM)
     if mistakes:
         raise SceneError(mistakes)
     return ranges

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...core import PatchfemError
-from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
+from ...inputs.measured import RESPONSE_COLUMN_UNITS, RESPONSE_TABLE_FORMAT
 from ...inputs.tables import read_text
 from ...model.model import build
 from ...scene.files import UNIVERSAL_EXTENSIONS
@@ -16,18 +16,12 @@ from .options import FitOptions
 from .problem import Listener, parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
-# options of each kind of fit
-KINDS = {
-    "loop": ("hold",),
-    "rows": ("hold", "leave_out", "starts"),
-    "curve": ("starts",),
-    "wear": (),
+# Kinds of fit that have each option, and to what they fit keys, for the message
+FITS_WITH_OPTION = {
+    "hold": ("loop rows", "a loop under a prescribed slide or rows of a rig"),
+    "leave_out": ("rows", "rows of a rig"),
+    "starts": ("rows curve", "rows of a rig or frequency and damping of a rig against amplitude"),
 }
-TARGETS = {
-    "hold": "a loop under a prescribed slide or rows of a rig",
-    "leave_out": "rows of a rig",
-    "starts": "rows of a rig or frequency and damping of a rig against amplitude",
-}  # what is fitted with an option
 
 
 def fit_measurement(
@@ -75,7 +69,7 @@ def fit_measurement(
 
 
 def choose_kind(scene: Scene, to: str) -> str:
-    """Return the kind of fit, a key of KINDS, that the tables of a scene and the measured file ask for.
+    """Return the kind of fit, "wear", "loop", "rows" or "curve", that the scene and the measured file ask for.
 
     Raises PatchfemError for a table whose header belongs to no kind of fit.
     """
@@ -90,21 +84,21 @@ def choose_kind(scene: Scene, to: str) -> str:
     if path.suffix.lower() not in (".mat", *UNIVERSAL_EXTENSIONS):
         names = read_text(path, "a measured table").names
     columns = {name.lower().removeprefix("decay_") for name in names}
-    if columns & (CURVE_UNITS.keys() - COLUMN_UNITS.keys()):
+    if columns & (CURVE_UNITS.keys() - RESPONSE_COLUMN_UNITS.keys()):
         return "curve"
-    if columns.intersection(TABLE_FORMAT.required):
+    if columns.intersection(RESPONSE_TABLE_FORMAT.required):
         return "rows"
     raise PatchfemError(
-        f"{path}:1: a header like `{CURVE_HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
+        f"{path}:1: a header like `{CURVE_HEADER}` (of a mode, against its amplitude) or `{RESPONSE_TABLE_FORMAT.example}` "
         f"(response to a sine) is needed, not '{','.join(names)[:80]}'; a free decay in records over time "
         f"is fitted as the table that `patchfem import {path} --decay -o decay.csv` writes"
     )
 
 
 def check_options(kind: str, options: FitOptions) -> None:
-    """Raise PatchfemError if an option is invalid or does not belong to this kind of fit, a key of KINDS."""
-    for name, target in TARGETS.items():
-        if getattr(options, name) and name not in KINDS[kind]:
+    """Raise PatchfemError if an option is invalid or does not belong to `kind` of fit, such as "rows"."""
+    for name, (kinds, target) in FITS_WITH_OPTION.items():
+        if getattr(options, name) and kind not in kinds.split():
             raise PatchfemError(
                 f"--{name.replace('_', '-')} applies only to fits to {target}; leave this option out"
             )

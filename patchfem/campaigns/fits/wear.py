@@ -25,14 +25,14 @@ from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 
-MAX_DEPTH = "worn_depth_max"
+MAX_WORN_DEPTH_NAME = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
-QUANTITIES = ("worn_depth_mean", MAX_DEPTH)
+WORN_DEPTH_NAMES = ("worn_depth_mean", MAX_WORN_DEPTH_NAME)
 # Names in compare.json of the part that two measured surfaces of a piece have in common
-SURFACE_PARTS = {"common_length", "common_area"}
-MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
+COMMON_PART_NAMES = {"common_length", "common_area"}
+MAX_WEAR_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
-DEPTH_TOL = 0.1
+MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
@@ -41,7 +41,7 @@ COEFFICIENT_KEY = "wear.coefficient"
 class MeasuredDepth:
     """Measured wear depth with its interval.
 
-    - name: one of QUANTITIES.
+    - name: one of WORN_DEPTH_NAMES.
     - value: depth [m].
     - low, high: ends of its interval [m].
     - source: "--to" or a file.
@@ -117,9 +117,9 @@ def read_measured_depth(text: str) -> MeasuredDepth:
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         return _read_depth_file(Path(text))
-    if name not in QUANTITIES:
+    if name not in WORN_DEPTH_NAMES:
         raise PatchfemError(
-            f"--to {text}: {name} is not a possible quantity; use one of {', '.join(QUANTITIES)}, "
+            f"--to {text}: {name} is not a possible quantity; use one of {', '.join(WORN_DEPTH_NAMES)}, "
             'such as "worn_depth_max=2.5 um..3.5 um", or the JSON file that compare writes'
         )
     try:
@@ -150,15 +150,15 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
     measures = content if isinstance(content, dict) else {}
     if isinstance(measures.get("measures"), dict):
         measures = measures["measures"] | measures
-    if SURFACE_PARTS & measures.keys():
+    if COMMON_PART_NAMES & measures.keys():
         raise PatchfemError(
             f"{path}: the worn depth of two measured surfaces is that of one piece and of their common part, but the fit "
             "needs that of both pieces and of the whole patch; to fit the coefficient to two traces run `patchfem compare "
             'BEFORE AFTER --predicted RESULTS_FOLDER`, or give a depth such as "worn_depth_mean=2.5 um..3.5 um"'
         )
 
-    # Of several depths in the file the first in the order of QUANTITIES is fitted.
-    for name in QUANTITIES:
+    # Of several depths in the file the first in the order of WORN_DEPTH_NAMES is fitted.
+    for name in WORN_DEPTH_NAMES:
         try:
             numbers = [float(measures[name][part]) for part in ("value", "low", "high")]
         except (KeyError, TypeError, ValueError):
@@ -225,7 +225,9 @@ def fit_wear(
         """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
-    found = _search_coefficient(compute, target, bounds, DEPTH_TOL * model.accuracy.tolerance)
+    found = _search_coefficient(
+        compute, target, bounds, MAX_DEPTH_ERROR_OVER_TOLERANCE * model.accuracy.tolerance
+    )
     value = found.value
     area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
     error = _estimate_depth_error(model, value, target, area, progress)
@@ -269,7 +271,7 @@ def _search_coefficient(
     PatchfemError
         If no coefficient within the bounds gives the depth.
     NotConverged
-        If MAX_RUNS runs do not meet the tolerance.
+        If MAX_WEAR_RUNS runs do not meet the tolerance.
     """
     # One run with the largest coefficient gives the depth for all smaller ones.
     curve = compute(bounds.high)
@@ -288,7 +290,7 @@ def _search_coefficient(
     )
     value = float(bounds.high * inverse(target.value))
     n_runs = 1
-    while n_runs < MAX_RUNS:
+    while n_runs < MAX_WEAR_RUNS:
         n_runs += 1
         depth = float(compute(value).depth[-1])
         if abs(depth / target.value - 1) <= tolerance:
@@ -296,7 +298,7 @@ def _search_coefficient(
         value *= float(inverse(target.value) / inverse(depth))
     else:
         raise NotConverged(
-            f"fit {COEFFICIENT_KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
+            f"fit {COEFFICIENT_KEY}: after {MAX_WEAR_RUNS} runs the fit has reached only {target.name} = "
             f"{depth:.6g} in place of {target.value:.6g}"
         )
 
@@ -342,7 +344,7 @@ def _estimate_depth_error(
     # The mean depth is the worn volume over the area.
     name = target.name
     divisor = 1.0
-    if name != MAX_DEPTH:
+    if name != MAX_WORN_DEPTH_NAME:
         name = "worn_volume"
         divisor = area
     measure = result.measures.get(name)
@@ -354,7 +356,7 @@ def _estimate_depth_error(
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
     """Compute the wear depth of a model over the cycles for a wear coefficient [m2/N].
 
-    `patch` is the solved contact of the unworn pieces, `name` one of QUANTITIES, and `progress` is called with the
+    `patch` is the solved contact of the unworn pieces, `name` one of WORN_DEPTH_NAMES, and `progress` is called with the
     progress, or None.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
@@ -363,6 +365,6 @@ def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, prog
         raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
     area = nodal_areas(model.patch, patch.pieces.interface).ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
-    depth = depths.max(axis=1) if name == MAX_DEPTH else depths @ area / area.sum()
+    depth = depths.max(axis=1) if name == MAX_WORN_DEPTH_NAME else depths @ area / area.sum()
     fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles
     return WearCurve(fraction, depth)

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
-from ..held_out import EQUAL_TOL, find_cells, format_cell, select_held_out
+from ..held_out import EQUAL_NUMBERS_TOL, find_cells, format_cell, select_held_out
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
-MIN_DISPLACEMENT = 0.01 * 25.4e-6
+MIN_COMPARED_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
 
@@ -101,7 +101,7 @@ class Readings:
         """
         at_conditions = np.array([displacement, acceleration], float)
         computed = at_conditions[self.is_acceleration.astype(int), self.condition]
-        lower_limit = np.where(self.is_acceleration, 1e-300, MIN_DISPLACEMENT)
+        lower_limit = np.where(self.is_acceleration, 1e-300, MIN_COMPARED_DISPLACEMENT)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.log(np.maximum(computed, lower_limit))
             ratio -= np.log(np.maximum(self.measured, lower_limit))
@@ -109,9 +109,9 @@ class Readings:
 
 
 def _number_values(values) -> np.ndarray:
-    """Return the number (n,) of each value in rising order; values within EQUAL_TOL have the same number."""
+    """Return the number (n,) of each value in rising order; values within EQUAL_NUMBERS_TOL have the same number."""
     distinct, place = np.unique(values, return_inverse=True)
-    is_new = np.diff(distinct, prepend=-np.inf) > EQUAL_TOL * distinct
+    is_new = np.diff(distinct, prepend=-np.inf) > EQUAL_NUMBERS_TOL * distinct
     return np.cumsum(is_new)[place]
 
 

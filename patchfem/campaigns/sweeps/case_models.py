@@ -19,7 +19,7 @@ from ... import __version__
 from ...core import PatchfemError
 from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
-from ...model.rig import JOINT_SCENES
+from ...model.rig import SCENES_OF_SUBTRACTED_JOINT
 from ...model.similar_models import SimilarModels
 from ...scene.files import require_files
 from ...scene.lines import split_assignment
@@ -135,7 +135,7 @@ class SweepScene:
             return ""
         return (
             "the modes were measured with the joint bolted, so the stiffness of the joint of "
-            f"{JOINT_SCENES[structure.measured_joint]} is subtracted from them"
+            f"{SCENES_OF_SUBTRACTED_JOINT[structure.measured_joint]} is subtracted from them"
         )
 
     def read_axes(self) -> tuple[list, list[str]]:

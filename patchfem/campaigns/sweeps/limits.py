@@ -14,7 +14,7 @@ from .sweep_table import SweepTable, SweptKey
 
 NEGLIGIBLE_CHANGE = 0.05  # relative change that is commonly called negligible
 # Relative change of a measure at twice its value
-DOUBLING = 1.0
+DOUBLED_VALUE_CHANGE = 1.0
 # Measures of a motion whose change has a limit
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
@@ -31,7 +31,7 @@ CHANGE_AT_LIMIT = {
     "normal_stiffness": NEGLIGIBLE_CHANGE,
     "tangential_stiffness": NEGLIGIBLE_CHANGE,
     "contact_fraction": NEGLIGIBLE_CHANGE,
-    "pressure_peak": DOUBLING,
+    "pressure_peak": DOUBLED_VALUE_CHANGE,
 }
 # Beginnings of keys that drive the motion or change no result, so that they have no limit.
 KEYS_WITHOUT_LIMIT = ("drive.", "slide.", "accuracy.", "wear.cycles")
@@ -90,15 +90,16 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
         values = table.select_trusted(name)
         errors = np.nan_to_num(column.errors)
         blank = KeyLimit(name, key.key, key.unit, largest, np.nan, np.nan, np.nan, False)
-        on_lines = [
-            _find_limit_on_line(blank, key, along[order], values[line], errors[line])
-            for line in lines[:, order]
-        ]
+        on_lines = []
+        for line in lines[:, order]:
+            on_lines.append(
+                _find_limit_on_line(blank, key, along[order], values[line], errors[line])
+            )
 
-        # the smallest limit of all lines counts
+        # the smallest limit of all lines counts, and a limit that is never reached only if all of them are like that
         known = filter(None, on_lines)
         limits += sorted(
-            known, key=lambda one: (one.is_never_reached, np.fmax(one.low, one.value))
+            known, key=lambda limit: (limit.is_never_reached, np.fmax(limit.low, limit.value))
         )[:1]
     return limits
 
@@ -118,7 +119,7 @@ def _choose_axis(table: SweepTable) -> int | None:
 
 
 def _find_limit_on_line(
-    blank: KeyLimit, key: SweptKey, sizes: np.ndarray, values: np.ndarray, errors: np.ndarray
+    blank: KeyLimit, key: SweptKey, key_values: np.ndarray, values: np.ndarray, errors: np.ndarray
 ) -> KeyLimit | None:
     """Find the limit of a key along one line of cases, of which the first one is the reference.
 
@@ -130,7 +131,7 @@ def _find_limit_on_line(
         Names and relative change of the limit.
     key : SweptKey
         Key that changes along the line.
-    sizes : (m,) array
+    key_values : (m,) array
         Increasing values of the key [SI].
     values, errors : (m,) array
         The measure and its errors [SI]; NaN for a value that does not count.
@@ -143,15 +144,15 @@ def _find_limit_on_line(
     error = (errors[counts] + errors[0]) / abs(values[0])
     error[0] = 0.0  # the first case does not differ from itself
     # Only a pressure that increases can double.
-    size = np.abs(change) if largest < DOUBLING else change
+    change_size = np.abs(change) if largest < DOUBLED_VALUE_CHANGE else change
 
-    is_doubtful = size + error > largest
-    inside = int(np.argmax(is_doubtful)) - 1 if is_doubtful.any() else size.size - 1
+    is_doubtful = change_size + error > largest
+    inside = int(np.argmax(is_doubtful)) - 1 if is_doubtful.any() else change_size.size - 1
     limit = blank._replace(
-        low=sizes[counts][inside],
+        low=key_values[counts][inside],
         is_never_reached=bool(counts[-1] and not is_doubtful.any()),
     )
-    is_beyond = size - error > largest
+    is_beyond = change_size - error > largest
     if not is_beyond.any():
         return limit
 
@@ -159,12 +160,12 @@ def _find_limit_on_line(
     beyond = int(np.argmax(is_beyond))
     sign = np.sign(change[beyond])
     ends = [inside, beyond]
-    places = sizes[counts][ends]
+    places = key_values[counts][ends]
     changes = sign * change[ends]
     target = largest
     if key.is_logarithmic:
         places = np.log(places)
-        if largest >= DOUBLING:
+        if largest >= DOUBLED_VALUE_CHANGE:
             # A power law of the key is a straight line in logarithmic coordinates.
             changes = np.log1p(changes)
             target = np.log1p(target)
@@ -172,5 +173,5 @@ def _find_limit_on_line(
     return limit._replace(
         change=sign * largest,
         value=np.exp(value) if key.is_logarithmic else value,
-        high=sizes[counts][beyond],
+        high=key_values[counts][beyond],
     )

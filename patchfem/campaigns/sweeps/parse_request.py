@@ -1,6 +1,6 @@
 """Parser and validation of the request for a sweep, which reports all errors at once.
 
-In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
+In: a file, --set strings and a `CaseRequest`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
 
 import re
@@ -10,7 +10,7 @@ from itertools import chain
 from math import prod
 from pathlib import Path
 
-from ...scene.assignments import LISTS, RANDOM, Axis, read_assignments
+from ...scene.assignments import LIST_FORM, RANDOM_FORM, Axis, read_assignments
 from ...scene.keys.quantities import NUMBER_PATTERN
 from ...scene.lines import split_assignment, split_key
 from ...scene.scene import SceneError
@@ -20,14 +20,14 @@ from .case_models import SweepScene
 from .cases import Cases, combine_cases
 
 N_CHECKED_CASES = 32  # Largest number of cases that are validated before a sweep starts.
-MAX_PRINTED = 12  # Largest number of validation errors that are printed.
+MAX_PRINTED_MISTAKES = 12  # Largest number of validation errors that are printed.
 # Largest number of cases; the hashes and columns of more cases take gigabytes.
 MAX_SWEEP_CASES = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """Request for a sweep: swept keys, table of cases and random sampling.
+class CaseRequest:
+    """Cases that the user asks for in a sweep: swept keys, table of cases and random sampling.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Request:
         return words
 
 
-def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[SweepScene, Cases]:
+def read_sweep(path: Path, sets: Sequence[str], request: CaseRequest) -> tuple[SweepScene, Cases]:
     """Read the scene of a sweep and its cases.
 
     Parameters
@@ -69,7 +69,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
         File of the scene.
     sets : sequence of str
         ``table.key=value`` strings for all cases.
-    request : Request
+    request : CaseRequest
         Which cases are asked for.
 
     Returns
@@ -98,7 +98,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     return sweep_scene, cases
 
 
-def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
+def read_cases(sweep_scene: SweepScene, request: CaseRequest) -> Cases:
     """Return the cases of a request: all combinations of the requested values.
 
     If it names no values, those of the table [sweep] are used.
@@ -107,7 +107,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     ----------
     sweep_scene : SweepScene
         Scene of the sweep.
-    request : Request
+    request : CaseRequest
         Values, ranges and tables of cases that the user asks for.
 
     Returns
@@ -138,7 +138,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
             parts.append(listed)
             file_axes = listed.axes
 
-    axes, axis_errors = read_assignments(request.over, RANDOM if request.count else LISTS)
+    axes, axis_errors = read_assignments(request.over, RANDOM_FORM if request.count else LIST_FORM)
     errors += axis_errors
     if not request.over and request.file is None:
         axes, axis_errors = sweep_scene.read_axes()
@@ -235,8 +235,8 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
             kind = re.sub(NUMBER_PATTERN, "", message) if cases.is_random else message
             messages.setdefault(kind, message)
         lines = list(messages.values())
-        if len(lines) > MAX_PRINTED:
-            lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
+        if len(lines) > MAX_PRINTED_MISTAKES:
+            lines = [*lines[:MAX_PRINTED_MISTAKES], f"and {len(lines) - MAX_PRINTED_MISTAKES} more"]
         raise SceneError(lines)
 
     extent = f"{len(invalid)} of {len(numbers)} cases"

@@ -15,11 +15,11 @@ from .sweep_table import SweepTable
 FREQUENCY_KEY = "drive.frequency"
 # Measures in which a resonance peak is sought. The first one that a sweep has is used.
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
-MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
-DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating curves
+MIN_SWEPT_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
+ERROR_SAFETY_FACTOR = 3.0  # safety factor of the differences between interpolating curves
 SPLINE_DEGREES = (3, 2, 4)  # splines through all cases, the best one first
 # Numbers of cases below and above the largest one through which a polynomial goes; a kink changes it most.
-POLYNOMIAL_CASES = ((1, 1), (2, 1), (1, 2))
+CASE_COUNTS_AROUND_PEAK = ((1, 1), (2, 1), (1, 2))
 MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
@@ -107,7 +107,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
         None if the largest value is at an end, or if a neighbour of it does not count.
     """
     counts = np.isfinite(height)
-    if np.count_nonzero(counts) < MIN_FREQUENCIES:
+    if np.count_nonzero(counts) < MIN_SWEPT_FREQUENCIES:
         return None
     top = int(np.nanargmax(height))
     near = slice(top - 1, top + 2)
@@ -115,21 +115,25 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
         return None
     spacing = (frequency[top + 1] - frequency[top - 1]) / 2
 
-    # 1/y^2 over f^2, relative to the largest value
+    # 1/y^2 over f^2, relative to the largest value: for the displacement of a single linear mode it is a parabola, which
+    # every curve below reproduces. The differences between the curves show the error of interpolation.
     square = frequency**2 - frequency[top] ** 2
     inverse = (height[top] / height) ** 2
     curves = [make_interp_spline(square[counts], inverse[counts], k) for k in SPLINE_DEGREES]
-    for n_below, n_above in POLYNOMIAL_CASES:
+    for n_below, n_above in CASE_COUNTS_AROUND_PEAK:
         window = slice(max(top - n_below, 0), top + n_above + 1)
         if counts[window].all() and counts[window].size == n_below + n_above + 1:
             degree = n_below + n_above
             curves.append(make_interp_spline(square[window], inverse[window], degree))
+
+    # Place, height and half-power width of the peak by each curve. The first curve gives the values.
     shapes = [_find_shape(PPoly.from_spline(curve), square[near]) for curve in curves]
-    known = np.array(list(filter(None, shapes)) or [_Shape(0.0, 1.0, np.nan, np.nan)])
+    known = np.array(list(filter(None, shapes)) or [_PeakShape(0.0, 1.0, np.nan, np.nan)])
     frequencies = np.sqrt(frequency[top] ** 2 + known[:, [0, 2, 3]])
     heights = height[top] / np.sqrt(known[:, 1])
     widths = frequencies[:, 2] - frequencies[:, 1]
 
+    # Errors by the differences between the curves, and by the errors of the heights
     width = widths[0]
     frequency_error = _estimate_error(frequencies[:, 0])
     height_error = _estimate_error(heights)
@@ -141,30 +145,31 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     width_error = _estimate_error(widths) + 2 * width * slack
     height_error += np.nanmax(error[near])
-    numbers = (frequencies[0, 0], frequency_error, heights[0], height_error, width, width_error)
-    return SweptPeak(*numbers, spacing)
+    return SweptPeak(
+        frequencies[0, 0], frequency_error, heights[0], height_error, width, width_error, spacing
+    )
 
 
 def _estimate_error(values: np.ndarray) -> float:
     """Return the error of the first of some values (n,), from their differences; NaN for an unknown first value."""
-    return DIFFERENCE_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
+    return ERROR_SAFETY_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
 
 
-class _Shape(NamedTuple):
+class _PeakShape(NamedTuple):
     """Minimum of the curve of 1/y^2, where y is the response over its largest value at the frequency f_top.
 
     - place: f^2 - f_top^2 at the minimum [Hz^2].
-    - level: 1/y^2 at the minimum [1].
+    - inverse_square: 1/y^2 at the minimum [1].
     - below, above: f^2 - f_top^2 [Hz^2] at which 1/y^2 is twice as large on either side; NaN if there is no such place.
     """
 
     place: float
-    level: float
+    inverse_square: float
     below: float
     above: float
 
 
-def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
+def _find_shape(curve: PPoly, near: np.ndarray) -> _PeakShape | None:
     """Return the minimum of a curve of 1/y^2, where y is the response over its largest value at the frequency f_top.
 
     Parameters
@@ -176,7 +181,7 @@ def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
 
     Returns
     -------
-    _Shape or None
+    _PeakShape or None
         None if the curve has no minimum between both neighbours, or is not positive there.
     """
     places = curve.derivative().roots(extrapolate=False)
@@ -185,8 +190,10 @@ def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
     if not values.size or values.min() <= 0:
         return None
     place = places[values.argmin()]
-    level = values.min()
-    crossings = curve.solve(2 * level, extrapolate=False)
+    inverse_square = values.min()
+    crossings = curve.solve(2 * inverse_square, extrapolate=False)
     below = np.max(crossings[crossings < place], initial=-np.inf)
     above = np.min(crossings[crossings > place], initial=np.inf)
-    return _Shape(place, level, *(end if np.isfinite(end) else np.nan for end in (below, above)))
+    return _PeakShape(
+        place, inverse_square, *(end if np.isfinite(end) else np.nan for end in (below, above))
+    )

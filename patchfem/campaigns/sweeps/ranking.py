@@ -29,17 +29,19 @@ RANKED_MEASURES = (
     "tangential_stiffness",
     "stick_fraction",
 )
-MAX_SURFACE_CASES = 640  # largest number of cases of a surface, whose equations are dense
-N_SOBOL_POINTS = 1024  # sample points on a surface, for an error of about INDEX_ERROR
-INDEX_ERROR = 0.005  # sampling error of an index
+MAX_RESPONSE_SURFACE_CASES = 640  # largest number of cases of a surface, whose equations are dense
+N_SOBOL_POINTS = 1024  # sample points on a surface, for an error of about SOBOL_INDEX_ERROR
+SOBOL_INDEX_ERROR = 0.005  # sampling error of an index
 # Smoothing parameters of a surface, from interpolation to nearly a plane.
 SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
-N_FOLDS = 3  # parts of the cases, each of which checks a surface through the others
+# Parts of the cases, each of which checks a surface through the others
+N_CROSS_VALIDATION_FOLDS = 3
 MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
-MIN_EXPLAINED = 0.5  # fraction of the variance of the other half that a usable surface explains
+# Fraction of the variance of the other half that a usable surface explains
+MIN_EXPLAINED_VARIANCE_FRACTION = 0.5
 # Smallest fraction of cases with a value. The others may be no random sample.
-MIN_KNOWN_FRACTION = 0.9
-QUANTILE_LEVELS = (0.05, 0.5, 0.95)
+MIN_FRACTION_OF_KNOWN_CASES = 0.9
+QUANTILE_PROBABILITIES = (0.05, 0.5, 0.95)
 MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
 SPREAD_ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only
 
@@ -108,7 +110,7 @@ def _varies(table: SweepTable, name: str) -> bool:
         return False
     known = np.isfinite(column.values)
     values = column.values[known]
-    if known.mean() < MIN_KNOWN_FRACTION:
+    if known.mean() < MIN_FRACTION_OF_KNOWN_CASES:
         return False
     error = np.sqrt(np.mean(np.nan_to_num(column.errors[known]) ** 2.0))
     return bool(values.std() > max(SPREAD_ROUND_OFF * np.abs(values).max(), error))
@@ -149,8 +151,9 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
 
     # The cases are divided into folds: each is predicted by a response surface through the others
     rng = np.random.default_rng(0)
-    every = rng.permutation(len(coordinates))[:MAX_SURFACE_CASES]
-    folds = [(np.setdiff1d(every, fold), fold) for fold in np.array_split(every, N_FOLDS)]
+    every = rng.permutation(len(coordinates))[:MAX_RESPONSE_SURFACE_CASES]
+    parts = np.array_split(every, N_CROSS_VALIDATION_FOLDS)
+    folds = [(np.setdiff1d(every, part), part) for part in parts]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
@@ -183,10 +186,10 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     first, total = np.transpose([_compute_surface_indices(one) for one in surfaces], (1, 0, 2, 3))
 
     # Limits of the total index: the smallest and largest of all surfaces, widened by what they leave unexplained
-    margin = unexplained[:, None] + INDEX_ERROR
+    margin = unexplained[:, None] + SOBOL_INDEX_ERROR
     limits = [total.min(axis=0) - margin, total.max(axis=0) + margin]
     arrays = np.clip([first[0], total[0], *limits], 0.0, 1.0).transpose(1, 0, 2)
-    is_usable = unexplained < 1 - MIN_EXPLAINED
+    is_usable = unexplained < 1 - MIN_EXPLAINED_VARIANCE_FRACTION
     return [array if usable else None for array, usable in zip(arrays, is_usable)]
 
 
@@ -209,7 +212,7 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
-    """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure of a table of random cases.
+    """Return the quantiles of QUANTILE_PROBABILITIES [SI] of each ranked measure of a table of random cases.
 
     Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
     ones.
@@ -222,6 +225,6 @@ def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
         if _varies(table, name):
             values = table.measures[name].values
             counts = np.isfinite(values) & settled
-            if counts.mean() >= MIN_KNOWN_FRACTION:
-                quantiles[name] = np.quantile(values[counts], QUANTILE_LEVELS)
+            if counts.mean() >= MIN_FRACTION_OF_KNOWN_CASES:
+                quantiles[name] = np.quantile(values[counts], QUANTILE_PROBABILITIES)
     return quantiles

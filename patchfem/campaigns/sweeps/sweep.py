@@ -24,7 +24,7 @@ from .cases import Cases
 
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
-CHUNK_SECONDS = 1.0
+TARGET_CHUNK_SECONDS = 1.0
 MAX_CASES_PER_CHUNK = 1024  # Largest number of cases in a chunk.
 MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
@@ -190,7 +190,7 @@ class ChunkQueue:
         self.repeated: set[int] = set()
         self.workers = max(workers, 1)
         # Elapsed time per case of the last chunk, with a guess before the first chunk.
-        self.seconds_per_case = CHUNK_SECONDS
+        self.seconds_per_case = TARGET_CHUNK_SECONDS
 
     def take_chunk(self, *, is_idle: bool = True) -> list | None:
         """Return the case numbers of the next chunk; None if none is available at present.
@@ -209,7 +209,7 @@ class ChunkQueue:
             # A chunk has at most half of the remaining cases per worker, so that all workers finish
             # at about the same time.
             max_size = -(-n_remaining // (2 * self.workers))
-        size = max(int(CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
+        size = max(int(TARGET_CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
         size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
         return [self.remaining.popleft() for _ in range(size)]
 

@@ -16,7 +16,7 @@ from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from .cases import Cases
 
 # Largest error, relative to the value, of a value that counts for statements.
-MAX_TRUSTED_ERROR = 0.5
+MAX_TRUSTED_RELATIVE_ERROR = 0.5
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 
@@ -187,7 +187,7 @@ class SweepTable:
         settled = self.has_settled
         needs_settling = not name.endswith("_steady") and np.isfinite(column.values[settled]).any()
         counts = settled if needs_settling else np.ones(len(self), bool)
-        is_vague = column.misses(MAX_TRUSTED_ERROR) & column.misses(self.tolerance)
+        is_vague = column.misses(MAX_TRUSTED_RELATIVE_ERROR) & column.misses(self.tolerance)
         return np.where(counts & ~is_vague, column.values, np.nan)
 
     def count_cases(self) -> dict[str, int | dict]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...elasticity.elasticity import Layers, Piece, lame
+from ...elasticity.elasticity import Layers, Piece, lame_constants
 
 # Largest product of wavenumber and thickness for which a wave reaches the other side of a layer;
 # its relative amplitude exp(-40) there is below round-off
@@ -49,7 +49,7 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
     stack = [(thickness, layers.coating)] if thickness else []
     stack.append((height - thickness, layers.substrate))
     depths = [depth for depth, _ in stack]
-    moduli = [lame(*material, layers.plane) for _, material in stack]
+    moduli = [lame_constants(*material, layers.plane) for _, material in stack]
 
     # A uniform traction (k = 0) strains each layer by itself, confined along x
     uniform = [(depth / (lam + 2 * mu), depth / mu) for depth, (lam, mu) in zip(depths, moduli)]
@@ -142,7 +142,8 @@ def _layer_states(
     nu = lam / (2 * (lam + mu))
     softness = scale / (2 * mu)
     states = np.empty((k.size, 4, 4))
-    # The first two solutions decay downwards, the others upwards.
+    # The first two solutions decay downwards, the others upwards. The first of each pair is the gradient of the harmonic
+    # function exp(-k z) cos(k x), the second one contains the factor k z.
     for first, sign, distance in ((0, 1.0, z), (2, -1.0, depth - z)):
         kz = k * distance
         ones = np.ones(k.size)

@@ -16,12 +16,12 @@ from ..edges import ContactEdge, parabola_change, place_edges
 
 # Smallest magnitude of a compliance of the free ends, relative to the largest, whose eigenfunction
 # is kept
-MIN_RELATIVE_COMPLIANCE = 1e-9
+MIN_KEPT_COMPLIANCE_RATIO = 1e-9
 # Relative residual of the equations on the active points at which their solution has converged
-EQUATION_TOL = 1e-10
-# Offset of a contact edge (see `edges.edge_offset`) relative to the cell length, measured to 0.001
+ACTIVE_POINTS_RESIDUAL_TOL = 1e-10
+# Offset of a contact edge (see `edges.compute_edge_offset`) relative to the cell length, measured to 0.001
 # for Hertz contact on 24 rows of points
-EDGE_OFFSET_FRACTION = 0.189
+POINT_EDGE_OFFSET_FRACTION = 0.189
 # Largest number of points that are counted to find the longest contact; longer contacts count as
 # equal
 MAX_REFERENCE_POINTS = 64
@@ -90,7 +90,7 @@ class PointCompliance:
         # Conjugate gradients. The inverse of the compliance without contact edges (by cosine transforms) is the
         # preconditioner.
         residual = np.where(active, motion, 0.0)
-        tolerance = EQUATION_TOL * np.abs(residual).max()
+        tolerance = ACTIVE_POINTS_RESIDUAL_TOL * np.abs(residual).max()
         force = np.zeros(residual.size)
         direction = np.zeros(residual.size)
         last_square = np.inf
@@ -139,7 +139,7 @@ def smooth_modes(positions, change, x) -> SmoothModes:
     cells = np.diff(positions)
     weight = np.sqrt((np.append(cells, 0.0) + np.append(0.0, cells)) / 2)
     compliances, vectors = np.linalg.eigh(weight[:, None] * change * weight)
-    is_kept = np.abs(compliances) > MIN_RELATIVE_COMPLIANCE * np.abs(compliances).max(initial=0.0)
+    is_kept = np.abs(compliances) > MIN_KEPT_COMPLIANCE_RATIO * np.abs(compliances).max(initial=0.0)
     return SmoothModes(
         CubicSpline(positions, vectors[:, is_kept] / weight[:, None])(x), compliances[is_kept]
     )
@@ -169,7 +169,7 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list[Cont
         gap,
         force_rate,
         gap_rate,
-        lambda node, inner, outer, fraction: EDGE_OFFSET_FRACTION * outer,
+        lambda node, inner, outer, fraction: POINT_EDGE_OFFSET_FRACTION * outer,
     )
 
 

@@ -10,16 +10,16 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from .panels import Curve, Panel, make_panels
-from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
+from .plotly import CURVE_COLOURS, ERROR_BAND_OPACITY, STATE_COLOURS
 from .table import CHARTS
 
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
-PICTURE_CHARTS = {"backbone": 3}
+N_PICTURE_CHARTS = {"backbone": 3}
 
-MARKERS = {"circle": "o", "x": "x"}  # markers of matplotlib for the symbols of points
+MATPLOTLIB_MARKERS = {"circle": "o", "x": "x"}  # marker for each symbol of plotly
 # style of the pictures; two drawings of the same answer are equal files
-STYLE = {
+MATPLOTLIB_STYLE = {
     "svg.hashsalt": "patchfem",
     "svg.fonttype": "none",
     "font.size": 10,
@@ -35,19 +35,19 @@ STYLE = {
     "lines.linewidth": 1.4,
 }
 # metadata that leave out the date
-NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
+METADATA_WITHOUT_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+PANEL_SIZE_INCHES = (6.4, 4.2)  # width and height
 
 
-def draw(panel: Panel, axes):
+def draw_panel(panel: Panel, axes):
     """Draw a panel on matplotlib Axes and return them; of a menu, the first choice."""
     if panel.choices:
-        return draw(panel.choices[0], axes)
+        return draw_panel(panel.choices[0], axes)
     if panel.style in ("map", "film"):
         _draw_map(panel, axes)
     else:
         for number, curve in enumerate(panel.curves):
-            _draw_curve(curve, panel.style, COLOURS[number % len(COLOURS)], axes)
+            _draw_curve(curve, panel.style, CURVE_COLOURS[number % len(CURVE_COLOURS)], axes)
     for position in panel.marks:
         axes.axvline(position, color="0.5", lw=1, ls=":")
     axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
@@ -69,13 +69,13 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
             ends = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
             axes.errorbar(curve.x, curve.y, ends, fmt="none", ecolor=colour)
         symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-        for symbol, marker in MARKERS.items():
+        for symbol, marker in MATPLOTLIB_MARKERS.items():
             points = (values[symbols == symbol] for values in (curve.x, curve.y))
             label = curve.name if symbol == "circle" else None  # the entry of the legend
             axes.plot(*points, marker, color=colour, label=label, zorder=3)
         return
     axes.plot(curve.x, curve.y, color=colour, label=curve.name)
-    filling = {"color": colour, "alpha": BAND_OPACITY, "lw": 0}
+    filling = {"color": colour, "alpha": ERROR_BAND_OPACITY, "lw": 0}
     if curve.low is not None:
         axes.fill_between(curve.x, curve.low, curve.high, **filling)
     if style == "area":
@@ -91,7 +91,10 @@ def _draw_map(panel: Panel, axes) -> None:
     if curve.meanings:
         count = len(curve.meanings)
         edges = np.arange(count + 1) - 0.5
-        options = {"cmap": ListedColormap(CODE_COLOURS[:count]), "norm": BoundaryNorm(edges, count)}
+        options = {
+            "cmap": ListedColormap(STATE_COLOURS[:count]),
+            "norm": BoundaryNorm(edges, count),
+        }
     elif np.nanmin(curve.y) < 0 < np.nanmax(curve.y):
         limit = np.nanmax(np.abs(curve.y))
         # red is positive, as in the scale of plotly.js on the page
@@ -109,11 +112,11 @@ def make_figure(panels: list[Panel]):
 
     columns = min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows))
+    with rc_context(MATPLOTLIB_STYLE):
+        figure = Figure(figsize=(PANEL_SIZE_INCHES[0] * columns, PANEL_SIZE_INCHES[1] * rows))
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, axes in zip(panels, grid, strict=False):
-            draw(panel, axes)
+            draw_panel(panel, axes)
     for axes in grid[len(panels) :]:
         axes.remove()
     for element in (figure, *figure.axes):
@@ -121,7 +124,7 @@ def make_figure(panels: list[Panel]):
     return figure
 
 
-def save(figure, target, ending: str, dpi: float = 150.0) -> None:
+def save_figure(figure, target, ending: str, dpi: float = 150.0) -> None:
     """Write a figure of matplotlib such that equal figures give equal files.
 
     Parameters
@@ -137,14 +140,14 @@ def save(figure, target, ending: str, dpi: float = 150.0) -> None:
     """
     from matplotlib import rc_context
 
-    with rc_context(STYLE):
-        figure.savefig(target, dpi=dpi, format=ending, metadata=NO_DATE.get(ending))
+    with rc_context(MATPLOTLIB_STYLE):
+        figure.savefig(target, dpi=dpi, format=ending, metadata=METADATA_WITHOUT_DATE.get(ending))
 
 
 def _to_svg(figure) -> str:
     """Return a figure as SVG, the form in which a notebook shows it."""
     text = io.StringIO()
-    save(figure, text, "svg")
+    save_figure(figure, text, "svg")
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
@@ -170,8 +173,8 @@ def write_plot(answer: Answer, path: Path) -> None:
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
     with write_atomically(path) as partial:
-        figure = make_figure(panels[: PICTURE_CHARTS.get(answer.kind, 1)])
-        save(figure, partial, ending)
+        figure = make_figure(panels[: N_PICTURE_CHARTS.get(answer.kind, 1)])
+        save_figure(figure, partial, ending)
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
@@ -211,7 +214,7 @@ def draw_panels(panels: list[Panel], axes, caller: str):
         Function that the message about wrong `axes` names.
     """
     check_axes(axes, caller)
-    return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
+    return draw_panel(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 
 
 def check_axes(axes, caller: str) -> None:

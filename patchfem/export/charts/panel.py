@@ -6,7 +6,7 @@ import numpy as np
 
 from ..quantities import choose_scale
 
-MAX_CURVE_POINTS = 3000  # largest number of intervals of which a curve keeps the extremes
+MAX_CURVE_INTERVALS = 3000  # largest number of intervals of which a curve keeps the extremes
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
     return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)
 
 
-def thin(values: np.ndarray, count: int = MAX_CURVE_POINTS) -> np.ndarray:
+def select_curve_points(values: np.ndarray, count: int = MAX_CURVE_INTERVALS) -> np.ndarray:
     """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
     if values.size <= 2 * count:
         return np.arange(values.size)

@@ -6,14 +6,14 @@ import numpy as np
 
 from ...formatting import format_number, needs_log_scale
 from ..answer import Answers, Variable, Variables
-from .panel import Axis, Curve, Panel, join_names, make_axis, thin
+from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
-SWEEP_STYLES = ("relative", "menu", "maps")
-MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
-MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
+SWEEP_CHART_STYLES = ("relative", "menu", "maps")
+N_MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
+MAX_CHARTED_INTERFACES = 6  # largest number of interfaces with charts of their own
 
 
 def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
@@ -41,7 +41,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
 
 def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
-    numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
+    numbers = [number for number in range(1, MAX_CHARTED_INTERFACES + 1) if f"x_{number}" in data]
     if chart.x != "x" or "x" in data or not numbers:
         return [chart]
     charts = []
@@ -54,14 +54,14 @@ def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
 
 def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     """Return the panel of a chart, or None if no answer has data for it."""
-    if chart.style in SWEEP_STYLES:
+    if chart.style in SWEEP_CHART_STYLES:
         # only the page of a sweep loads this module
-        from .sweeps import STYLES
+        from .sweeps import STYLE_FUNCTIONS
 
-        return STYLES[chart.style](answers, chart)
+        return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
         chart = replace(chart, by="")
-    selected = {name: _select(answer.data, chart) for name, answer in answers.items()}
+    selected = {name: _select_span(answer.data, chart) for name, answer in answers.items()}
     selected = {name: data for name, data in selected.items() if data}
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
@@ -123,7 +123,7 @@ def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
     return axes[0], axes[1]
 
 
-def _select(data: Variables, chart: Chart) -> Variables:
+def _select_span(data: Variables, chart: Chart) -> Variables:
     """Return the variables restricted to the span of a chart; {} if the chart has nothing to show."""
     x_name = _find_x(data, chart)
     names = [name for name, _ in _split_names(chart.y)]
@@ -134,12 +134,12 @@ def _select(data: Variables, chart: Chart) -> Variables:
         return {}  # a curve over another variable
     if chart.style == "map" and "frame_time" in data:
         # frame 0 is the pressed state; the slip rate of frame 1 would need an earlier frame of the motion
-        data = _take(data, "frame", np.arange(2, data["frame_time"].values.size))
+        data = _take_indices(data, "frame", np.arange(2, data["frame_time"].values.size))
     keep = _find_span(data, chart.span, x_name)
     if keep is None:
         return data
     dimension = "time" if chart.span == "cycles" else x_name
-    return _take(data, dimension, keep) if keep.size else {}
+    return _take_indices(data, dimension, keep) if keep.size else {}
 
 
 def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
@@ -160,12 +160,12 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
         size = pressure.values.shape[-1]
         loaded = np.flatnonzero((pressure.values.reshape(-1, size) > 0).any(axis=0))
         if loaded.size:
-            first = max(loaded[0] - MARGIN_NODES, 0)
-            return np.arange(first, min(loaded[-1] + MARGIN_NODES + 1, size))
+            first = max(loaded[0] - N_MARGIN_NODES, 0)
+            return np.arange(first, min(loaded[-1] + N_MARGIN_NODES + 1, size))
     return None
 
 
-def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
+def _take_indices(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
     """Return the variables at some indices along a dimension.
 
     Variables without this dimension are unchanged.
@@ -181,17 +181,17 @@ def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
 
 
 def _make_curves(
-    data: Variables, chart: Chart, name: str, own_x: str, axes: tuple[Axis, Axis]
+    data: Variables, chart: Chart, name: str, own_x_name: str, axes: tuple[Axis, Axis]
 ) -> list[Curve]:
     """Return the curves of a variable: one for each interface, case, code, or element of an overlay.
 
-    `name` is the variable, and `own_x` that against which it is drawn, or "" for the horizontal variable of the chart.
+    `name` is the variable, and `own_x_name` that against which it is drawn, or "" for the horizontal variable of the chart.
     The scales of `axes`, the horizontal and the vertical one, apply.
     """
-    own_x = own_x or _find_x(data, chart)
-    if not {name, own_x} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
+    own_x_name = own_x_name or _find_x(data, chart)
+    if not {name, own_x_name} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
         return []
-    x_values = _as_floats(data[own_x]) * axes[0].scale
+    x_values = _as_floats(data[own_x_name]) * axes[0].scale
     values = _as_floats(data[name])
     bands = _find_band(data, name)
     labels = [name.replace("_", " ")]
@@ -208,7 +208,7 @@ def _make_curves(
     for number, (label, row) in enumerate(zip(labels, np.atleast_2d(values), strict=True)):
         x = x_values[number] if x_values.ndim == 2 else x_values
         # every case has points of its own
-        keep = np.flatnonzero(np.isfinite(row)) if first == "case" else thin(row)
+        keep = np.flatnonzero(np.isfinite(row)) if first == "case" else select_curve_points(row)
         parts = (row, *(np.atleast_2d(band)[number] for band in bands))
         curves.append(Curve(label, x[keep], *(one[keep] * axes[1].scale for one in parts)))
         if chart.by in data and not first and name == chart.y.split()[0]:

@@ -7,18 +7,20 @@ import numpy as np
 
 from .panels import Curve, Panel
 
-COLOURS = (
+CURVE_COLOURS = (
     *("#2a78c0", "#d1592a", "#2f9e63", "#9166c9", "#8a8f98", "#b08a12", "#c2478f", "#3aa6a6"),
     *("#7a4b2a", "#5b6fd6", "#97b02e", "#d98cb3"),
 )
-CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
-OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
-BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
-FRAME_MILLISECONDS = 120  # duration of a frame of a film
+# Colours of the codes 0, 1, ... of a state, such as open, stick and slip
+STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
+# Red, green and blue (0 to 255) of the first, the middle and the last of many overlaid curves
+OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
+ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
+FILM_FRAME_MILLISECONDS = 120
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
-MENU_PLACE = {
+MENU_POSITION = {
     "x": 0,
     "xanchor": "left",
     "y": 1.02,
@@ -26,7 +28,7 @@ MENU_PLACE = {
 }
 
 
-def draw(panel: Panel) -> Figure:
+def make_plotly_figure(panel: Panel) -> Figure:
     """Return the figure of a panel: `data`, `layout`, and `frames` of a film."""
     figure = {"data": _make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
@@ -80,10 +82,10 @@ def _make_traces(panel: Panel) -> list[Figure]:
         return traces
     traces = []
     for number, curve in enumerate(panel.curves):
-        colour = COLOURS[number % len(COLOURS)]
+        colour = CURVE_COLOURS[number % len(CURVE_COLOURS)]
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
-            mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAY_COLOURS)]
+            mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAID_CURVE_COLOURS)]
             colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
         traces += _make_curve_traces(curve, "line" if curve.is_line else panel.style, colour)
     return traces
@@ -121,7 +123,7 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
         "mode": "lines",
         "fill": "toself",
         "fillcolor": colour,
-        "opacity": BAND_OPACITY,
+        "opacity": ERROR_BAND_OPACITY,
         "line": {"width": 0},
         "hoverinfo": "skip",
         "showlegend": False,
@@ -134,7 +136,7 @@ def _make_map_trace(curve: Curve, label: str) -> Figure:
     trace = {"type": "heatmap", "x": curve.x, "y": curve.rows, "z": curve.y}
     if curve.meanings:
         count = len(curve.meanings)
-        steps = [[(k + j) / count, CODE_COLOURS[k]] for k in range(count) for j in (0, 1)]
+        steps = [[(k + j) / count, STATE_COLOURS[k]] for k in range(count) for j in (0, 1)]
         bar = {"tickvals": list(range(count)), "ticktext": curve.meanings}
         return trace | {"zmin": -0.5, "zmax": count - 0.5, "colorscale": steps, "colorbar": bar}
     low = float(np.nanmin(curve.y))
@@ -166,7 +168,7 @@ def _add_menu(figure: Figure, choices: list[Panel]) -> None:
     figure["layout"] |= {
         # the legend is below, because the menu is above
         "legend": {"orientation": "h", "x": 0, "y": -0.3, "yanchor": "top"},
-        "updatemenus": [MENU_PLACE | {"buttons": buttons}],
+        "updatemenus": [MENU_POSITION | {"buttons": buttons}],
     }
 
 
@@ -180,7 +182,7 @@ def _add_slider(figure: Figure, names: list[str]) -> None:
         {"name": name, "data": [{"z": trace["z"]}]}
         for name, trace in zip(names, traces, strict=True)
     ]
-    frame = {"duration": FRAME_MILLISECONDS, "redraw": True}
+    frame = {"duration": FILM_FRAME_MILLISECONDS, "redraw": True}
     move = {"frame": frame, "transition": {"duration": 0}, "mode": "immediate"}
     buttons = [
         {"label": label, "method": "animate", "args": [target, move]}
@@ -188,11 +190,11 @@ def _add_slider(figure: Figure, names: list[str]) -> None:
     ]
     play, stop, *steps = buttons
     slider = {"steps": steps, "active": 0, "pad": {"t": 40}, "currentvalue": {"prefix": "t = "}}
-    menu = MENU_PLACE | {"type": "buttons", "direction": "right", "buttons": [play, stop]}
+    menu = MENU_POSITION | {"type": "buttons", "direction": "right", "buttons": [play, stop]}
     figure["layout"] |= {"sliders": [slider], "updatemenus": [menu]}
 
 
-def pack(values: np.ndarray) -> Figure | list[str]:
+def pack_array(values: np.ndarray) -> Figure | list[str]:
     """Return an array in the binary form that plotly.js reads; strings and short arrays as a list."""
     values = np.asarray(values)
     if values.dtype.kind in "UO":

@@ -14,15 +14,15 @@ from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
 from ..answer import Answer, Answers, Variables
 from ..quantities import format_value
-from .panel import Axis, Curve, Panel, join_names, make_axis, thin
+from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_CHART_LINES = 8  # lines of a chart, one for each combination of the other keys
-MAX_MAP_VALUES = 40  # values of each key in a map
+MAX_MAP_VALUES_PER_KEY = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
-MIN_KEY_RATIO = 10.0
-MIN_MEASURE_RATIO = 100.0
+MIN_LOG_AXIS_KEY_RATIO = 10.0
+MIN_LOG_AXIS_MEASURE_RATIO = 100.0
 
 
 class SweepView(NamedTuple):
@@ -73,7 +73,9 @@ class SweepView(NamedTuple):
             lines = [join_names(line, f"{label} {value}") for line in lines for value in values]
         return lines
 
-    def scale(self, name: str, min_ratio: float = MIN_KEY_RATIO) -> tuple[Axis, np.ndarray]:
+    def scale(
+        self, name: str, min_ratio: float = MIN_LOG_AXIS_KEY_RATIO
+    ) -> tuple[Axis, np.ndarray]:
         """Return the axis of a variable and its values in the unit of the axis; words stay words.
 
         `min_ratio` is the ratio of its values at which the axis is logarithmic.
@@ -137,7 +139,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
                 continue
             values = view.split_lines(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
-                keep = thin(values, MAX_DRAWN_CASES // 2)
+                keep = select_curve_points(values, MAX_DRAWN_CASES // 2)
                 label = join_names(title, name.replace("_", " "))
                 curves.append(Curve(label, x[keep], values[keep] / values[0]))
     if not curves:
@@ -145,7 +147,9 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
 
     ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
     # A logarithmic axis leaves out 0.
-    is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * ratios[ratios > 0].min())
+    is_log = bool(
+        ratios.min() >= 0 and ratios.max() >= MIN_LOG_AXIS_KEY_RATIO * ratios[ratios > 0].min()
+    )
     band = [np.full(2, 1 + change) for change in (0, -NEGLIGIBLE_CHANGE, NEGLIGIBLE_CHANGE)]
     curves.insert(0, Curve("± 5 %", curves[0].x[[0, -1]], *band))
     axis = Axis("value / value of the first case", is_log=is_log)
@@ -153,7 +157,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
 
 
 def make_menu(answers: Answers, chart: Chart) -> Panel | None:
-    """Return a panel for each measure against a key, between which a menu chooses."""
+    """Return the measures against a swept key, one panel each, with a menu that selects the panel to show."""
     names = list_measures(answers)
     return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
 
@@ -186,7 +190,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         if shares and not view.others:
             view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
         x_axis, x = view.scale(view.axis)
-        axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
+        axes = axes or (x_axis, view.scale(name, MIN_LOG_AXIS_MEASURE_RATIO)[0])
 
         # the interval of a quantity without negative values does not reach below zero
         values = view.split_lines(name) * axes[1].scale
@@ -198,7 +202,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         labels = view.name_lines()
         lines = spread_indices(len(values), MAX_CHART_LINES)
         for line in lines:
-            keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
+            keep = select_curve_points(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, low, high, marks = (array[line][keep] for array in arrays)
             curve = Curve(join_names(title, labels[line]), x[keep], y)
             if not np.isnan(high).all():
@@ -210,14 +214,14 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
 
 
 def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
-    """Return a map of each measure over two keys, between which a menu chooses."""
+    """Return the measures as maps over two swept keys, one panel each, with a menu that selects the panel to show."""
     view = view_sweep(next(iter(answers.values())))
     if len(answers) > 1 or len(view.others) != 1:
         return None
     x_axis, x = view.scale(view.axis)
     y_axis, y = view.scale(view.others[0])
-    columns = spread_indices(x.size, MAX_MAP_VALUES)
-    rows = spread_indices(y.size, MAX_MAP_VALUES)
+    columns = spread_indices(x.size, MAX_MAP_VALUES_PER_KEY)
+    rows = spread_indices(y.size, MAX_MAP_VALUES_PER_KEY)
     panels = []
     for name in list_measures(answers):
         axis, _ = view.scale(name)
@@ -229,7 +233,7 @@ def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
     return _add_choices(chart, panels)
 
 
-STYLES = {
+STYLE_FUNCTIONS = {
     "relative": make_relative,
     "menu": make_menu,
     "maps": make_map_menu,

@@ -89,8 +89,8 @@ class CsvFile(NamedTuple):
     """CSV file of an answer.
 
     - source: its rows (`columns.list_rows`).
-    - columns: heading line (`parse_columns`), where a heading may end in a unit of CSV_UNITS, or "" for all columns of
-      the rows, and `labels` for the texts of an object, each of which has a column.
+    - columns: heading line (`parse_columns`), or "" for all columns of the rows. A heading may end in a unit of
+      CSV_UNITS_PER_SI_UNIT. The name `labels` stands for the texts of an object, each of which has a column.
     - has_intervals: whether the columns NAME, NAME_low and NAME_high of all quantities of the rows follow.
     """
 
@@ -112,7 +112,7 @@ class Table(NamedTuple):
     columns: str
 
 
-RUN = (
+RUN_CHARTS = (
     Chart(
         "Wear over the cycles",
         "wear_cycle",
@@ -292,7 +292,7 @@ RUN = (
     ),
 )
 
-SWEEP = (
+SWEEP_CHARTS = (
     Chart(
         "Main measures relative to the first case",
         "",
@@ -323,7 +323,7 @@ def _draw_methods(title: str, name: str, **options) -> Chart:
     return Chart(title, x, y, x_label="amplitude at the output", **options)
 
 
-BACKBONE = (
+BACKBONE_CHARTS = (
     _draw_methods(
         "Frequency",
         "frequency",
@@ -346,7 +346,7 @@ BACKBONE = (
         caption="Amplitude of a sinusoidal force at the output, in phase with the velocity there, that holds the amplitude.",
     ),
 )
-FIT = (
+FIT_CHARTS = (
     Chart(
         "Measured and fitted loop",
         "slide",
@@ -442,7 +442,7 @@ FIT = (
         caption="Measured depth at the fitted coefficient, and the computed depth beyond it.",
     ),
 )
-COST = (
+COST_CHARTS = (
     Chart(
         "Error against time",
         "seconds",
@@ -467,7 +467,7 @@ COST = (
         caption="The least accurate of the key measures in each run, with its numerical error.",
     ),
 )
-COMPARE = (
+COMPARE_CHARTS = (
     Chart(
         "Both traces",
         "x",
@@ -567,7 +567,7 @@ COMPARE = (
         caption="Height that a given fraction of the surface exceeds.",
     ),
 )
-PAIRS = (
+PAIRS_CHARTS = (
     Chart(
         "Worn depth of the pairs",
         "line",
@@ -587,7 +587,7 @@ PAIRS = (
         caption="Amplitude of the waves from 60 to 110 um after wear divided by before, with 95 % intervals.",
     ),
 )
-PROFILE = (
+PROFILE_CHARTS = (
     Chart(
         "Primary profile",
         "x",
@@ -629,14 +629,14 @@ PROFILE = (
 )
 
 CHARTS: dict[str, tuple[Chart, ...]] = {
-    **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
-    "sweep": SWEEP,
-    "backbone": BACKBONE,
-    "compare": COMPARE,
-    "pairs": PAIRS,
-    "profile": PROFILE,
-    "fit": FIT,
-    "cost": COST,
+    **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_CHARTS),
+    "sweep": SWEEP_CHARTS,
+    "backbone": BACKBONE_CHARTS,
+    "compare": COMPARE_CHARTS,
+    "pairs": PAIRS_CHARTS,
+    "profile": PROFILE_CHARTS,
+    "fit": FIT_CHARTS,
+    "cost": COST_CHARTS,
 }
 
 
@@ -686,7 +686,8 @@ CSV_FILES: dict[str, dict[str, CsvFile]] = {
     },
     "cost": {"cost.csv": CsvFile("run", "")},
 }
-CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
+# Number of these units in one SI unit
+CSV_UNITS_PER_SI_UNIT = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}
 
 # tables that stand below the charts
 RUN_TABLES = (
@@ -703,8 +704,8 @@ RUN_TABLES = (
         "interface = level_stuck",
     ),
 )
-PAIR_COLUMNS = "worn_depth_mean, worn_volume, track_width, track_depth, amplitude_ratio"
-_BOTH_SIDES = " = name, before, after, after / before = ratio, cut-off = cutoff"
+PAIR_TABLE_COLUMNS = "worn_depth_mean, worn_volume, track_width, track_depth, amplitude_ratio"
+_CHANGE_COLUMNS = " = name, before, after, after / before = ratio, cut-off = cutoff"
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
     "sweep": (
@@ -739,11 +740,13 @@ TABLES: dict[str, tuple[Table, ...]] = {
         ),
     ),
     "compare": (
-        Table("Roughness inside and outside of the track", "track_roughness", _BOTH_SIDES),
-        Table("Both runs", "measures", _BOTH_SIDES),
-        Table("Scene pressed with each of the two surfaces", "pressed/measures", _BOTH_SIDES),
+        Table("Roughness inside and outside of the track", "track_roughness", _CHANGE_COLUMNS),
+        Table("Both runs", "measures", _CHANGE_COLUMNS),
+        Table("Scene pressed with each of the two surfaces", "pressed/measures", _CHANGE_COLUMNS),
     ),
-    "pairs": (Table("Each pair", "pairs", f"before, after, verdict, message, {PAIR_COLUMNS}"),),
+    "pairs": (
+        Table("Each pair", "pairs", f"before, after, verdict, message, {PAIR_TABLE_COLUMNS}"),
+    ),
     "profile": (Table("Each file", "profiles", "file, Ra, Rq, Rz, RSm, Pa, Pq, Pt, Sa, Sq, Sz"),),
     "fit": (
         Table("Correlation of the fitted values", "pair", "values = pair, correlation:rounded"),

@@ -7,8 +7,8 @@ import numpy as np
 from ...runs.pieces import PieceFields, Pieces
 
 # parts of a run in the order in which they are stored
-PARTS = ("lower", "upper", "interface")
-CELL_TYPES = np.array([0, 1, 3, 5, 9], np.uint8)  # cell type of VTK by number of nodes
+STORED_PARTS = ("lower", "upper", "interface")
+VTK_CELL_TYPES = np.array([0, 1, 3, 5, 9], np.uint8)  # cell type of VTK by number of nodes
 
 
 class Field(NamedTuple):
@@ -16,7 +16,7 @@ class Field(NamedTuple):
 
     - unit: SI unit.
     - shape: shape of one value.
-    - codes: meaning of each of its codes, in their order.
+    - codes: meanings of its codes 0, 1, ...; empty for a field of numbers.
     """
 
     unit: str
@@ -24,7 +24,7 @@ class Field(NamedTuple):
     codes: tuple[str, ...] = ()
 
 
-FIELDS = {
+VTK_FIELDS = {
     "displacement": Field("m", (3,)),
     "stress": Field("Pa", (6,)),  # xx, yy, zz, xy, yz, xz; tension is positive
     "von_mises": Field("Pa"),
@@ -64,7 +64,7 @@ class Block(NamedTuple):
         sizes = self.cells.shape[1] - (self.cells[:, -1] == self.cells[:, -2])
         is_corner = np.arange(self.cells.shape[1]) < sizes[:, None]
         starts = np.concatenate([[0], np.cumsum(sizes)])
-        return self.cells[is_corner], starts, CELL_TYPES[sizes]
+        return self.cells[is_corner], starts, VTK_CELL_TYPES[sizes]
 
 
 def make_blocks(pieces: Pieces) -> dict[str, Block]:
@@ -75,13 +75,13 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
     x = pieces.x
     fields = {"weight": pieces.weight[None]}
     for name, values in pieces.interface.items():
-        has_strips = values.ndim == 3 and not FIELDS[name].shape
+        has_strips = values.ndim == 3 and not VTK_FIELDS[name].shape
         fields[name] = values.mean(axis=1) if has_strips else values
     segments = np.stack([np.arange(x.size - 1), np.arange(1, x.size)], axis=1)
     return {
         "lower": _piece_block(pieces.lower),
         "upper": _piece_block(pieces.upper),
-        "interface": Block(_pad(x[:, None], 3), segments, _store(fields), {}),
+        "interface": Block(_pad_components(x[:, None], 3), segments, _convert_fields(fields), {}),
     }
 
 
@@ -95,25 +95,30 @@ def _piece_block(piece: PieceFields) -> Block:
         "material": piece.is_coating[None],
     }
     point_data = {"displacement": piece.displacement}
-    return Block(_pad(piece.points, 3), cells, _store(point_data), _store(cell_data))
+    return Block(
+        _pad_components(piece.points, 3),
+        cells,
+        _convert_fields(point_data),
+        _convert_fields(cell_data),
+    )
 
 
-def _pad(values: np.ndarray, count: int) -> np.ndarray:
+def _pad_components(values: np.ndarray, count: int) -> np.ndarray:
     """Return values (..., k) with zeros for the other components (..., count)."""
     missing = (0, count - values.shape[-1])
     return np.pad(values, [*[(0, 0)] * (values.ndim - 1), missing])
 
 
-def _store(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _convert_fields(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return fields as they are stored: codes, or numbers in single precision.
 
     The pressure and the areas of the points stay as they are, so that their sum is the load.
     """
     out = {}
     for name, values in data.items():
-        field = FIELDS[name]
+        field = VTK_FIELDS[name]
         if field.shape:
-            values = _pad(values, *field.shape)
+            values = _pad_components(values, *field.shape)
         if name not in ("normal_stress", "weight"):
             values = values.astype(np.int8 if field.codes else np.float32)
         out[name] = values

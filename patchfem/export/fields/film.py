@@ -8,14 +8,14 @@ from ...formatting import format_number
 from ..charts.panel import Curve, Panel, make_axis
 from .vtkhdf import Frames, read_frames
 
-GRID_POINTS = (61, 60)  # columns and rows of the grid
+FILM_GRID_POINTS = (61, 60)  # columns and rows of the grid
 MAX_FILM_FRAMES = 30  # largest number of frames of a film
-WINDOW_HEIGHT = 0.6  # height of the window around the contact over its width
+WINDOW_HEIGHT_OVER_WIDTH = 0.6  # height of the window around the contact over its width
 # Largest contact, over the length of the pieces, that the window shows as a whole.
-MAX_CONTACT_FRACTION = 0.25
+MAX_SHOWN_CONTACT_FRACTION = 0.25
 # Ratio to the median interval between frames above which an interval separates the pressed state
 # from the last cycle.
-MIN_BREAK_RATIO = 3.0
+MIN_FRAME_GAP_RATIO = 3.0
 
 
 def last_frames(times) -> np.ndarray:
@@ -27,7 +27,7 @@ def last_frames(times) -> np.ndarray:
     steps = np.diff(times)
     if not steps.size:
         return np.arange(len(times))
-    breaks = np.flatnonzero(steps > MIN_BREAK_RATIO * np.median(steps))
+    breaks = np.flatnonzero(steps > MIN_FRAME_GAP_RATIO * np.median(steps))
     return np.arange(breaks[-1] + 1 if breaks.size else 0, len(times))
 
 
@@ -44,12 +44,12 @@ def contact_window(frames: Frames) -> tuple[float, float, float, float]:
     touching = x[pressure > 0]
     touching = touching if touching.size else x[[0, -1]]
     width = np.ptp(touching)
-    is_long = width > MAX_CONTACT_FRACTION * length
+    is_long = width > MAX_SHOWN_CONTACT_FRACTION * length
     centre = x[np.argmax(pressure)] if is_long else (touching[0] + touching[-1]) / 2
     half = length / 8 if is_long else max(width, 4 * np.diff(x).max())
     left = max(x[0], min(centre - half, x[-1] - 2 * half))
     right = min(x[-1], left + 2 * half)
-    reach = WINDOW_HEIGHT / 2 * (right - left)
+    reach = WINDOW_HEIGHT_OVER_WIDTH / 2 * (right - left)
     return float(left), float(right), float(-reach), float(reach)
 
 
@@ -73,7 +73,7 @@ def make_stress_panels(path: Path) -> list[Panel]:
     count = min(MAX_FILM_FRAMES, cycle.size)
     numbers = cycle[np.linspace(0, cycle.size - 1, count).round().astype(int)]
     left, right, bottom, top = contact_window(frames)
-    columns, rows = GRID_POINTS
+    columns, rows = FILM_GRID_POINTS
     x = np.linspace(left, right, columns)
     y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
     stress = _sample_stress(frames, numbers, x, y)

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
 from ...runs.pieces import compute_pieces
-from .blocks import FIELDS, PARTS, Block, make_blocks
+from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...runs.results.result import Result
 
 # Field of each part that PyVista colours by default.
-ACTIVE_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
+COLOURED_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 
 def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock:
@@ -49,7 +49,7 @@ def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock
             for name, values in fields.items():
                 data[name] = values[number % len(values)]  # a constant field has one frame
         grid.field_data["TimeValue"] = [time]
-        grid.set_active_scalars(ACTIVE_FIELDS[part])
+        grid.set_active_scalars(COLOURED_FIELDS[part])
         _label_units(grid)
         grids.append(grid, part)
     return grids
@@ -62,7 +62,7 @@ def _label_units(grid) -> None:
     for data in (grid.point_data, grid.cell_data):
         for name in data.keys():
             information = data.VTKObject.GetAbstractArray(name).GetInformation()
-            information.Set(vtkDataArray.UNITS_LABEL(), FIELDS[name].unit)
+            information.Set(vtkDataArray.UNITS_LABEL(), VTK_FIELDS[name].unit)
 
 
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
@@ -123,7 +123,7 @@ def _write_pvd(frames: Frames, out: Path) -> None:
     lines = []
     for number, time in enumerate(frames.times.tolist()):
         grids = make_grids(frames.blocks, number, time)
-        for code, part in enumerate(PARTS):
+        for code, part in enumerate(STORED_PARTS):
             name = f"{part}_{number:04d}.vtu"
             _write_vtu(grids[part], folder / name)
             lines.append(
@@ -142,7 +142,7 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
     columns = {"x [m]": line.points[:, 0]}
     for name, series in line.point_data.items():
         values = series[number % len(series)]
-        unit = FIELDS[name].unit
+        unit = VTK_FIELDS[name].unit
         if values.ndim == 1:
             columns[f"{name} [{unit}]"] = values
         else:

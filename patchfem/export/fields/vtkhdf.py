@@ -13,11 +13,11 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import add_yielding_notes, compute_pieces
-from .blocks import FIELDS, PARTS, Block, make_blocks
+from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 
-NAME = "fields.vtkhdf"  # name of the file in a results folder
+VTKHDF_FILE = "fields.vtkhdf"  # name of the file in a results folder
 # Version of the format VTKHDF
-VERSION = np.array([2, 2])
+VTKHDF_VERSION = np.array([2, 2])
 # Fields that every file has, by part.
 REQUIRED_FIELDS = {
     "lower": {"displacement", "von_mises"},
@@ -72,7 +72,7 @@ def write_blocks(path: Path, blocks: dict[str, Block], times: np.ndarray) -> Non
         h5py.File(opened, "w", libver=("earliest", "v110")) as file,
     ):
         root = _create_group(file, "VTKHDF")
-        root.attrs["Version"] = VERSION
+        root.attrs["Version"] = VTKHDF_VERSION
         root.attrs["Type"] = np.bytes_("MultiBlockDataSet")
         assembly = _create_group(root, "Assembly")
         for name, block in blocks.items():
@@ -99,7 +99,7 @@ def _write_block(group, block: Block, times) -> None:
     `times` (f,) [s] are those of the frames.
     """
     connectivity, starts, types = block.vtk_cells()
-    group.attrs["Version"] = VERSION
+    group.attrs["Version"] = VTKHDF_VERSION
     group.attrs["Type"] = np.bytes_("UnstructuredGrid")
     group["NumberOfPoints"] = [len(block.points)]
     group["NumberOfCells"] = [len(types)]
@@ -140,10 +140,10 @@ def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Data
 def _write_field(group, name: str, values: np.ndarray) -> None:
     """Write a field (f, n, ...) with its unit and the meaning of its codes.
 
-    `name` is that of the field in `FIELDS`, whose values are in SI units. A chunk is one component in one frame:
+    `name` is that of the field in `VTK_FIELDS`, whose values are in SI units. A chunk is one component in one frame:
     neighbours in it are neighbours in space, which compresses well.
     """
-    field = FIELDS[name]
+    field = VTK_FIELDS[name]
     flat = values.reshape(-1, *values.shape[2:])
     chunks = (values.shape[1], *(1 for _ in values.shape[2:]))
     dataset = _write_array(group, name, flat, chunks)
@@ -161,16 +161,16 @@ def find_fields(folder: Path) -> Path:
     Missing
         If there is no such folder, or it has no fields.
     """
-    path = Path(folder) / NAME
+    path = Path(folder) / VTKHDF_FILE
     if path.is_file():
         return path
     if not path.parent.is_dir():
         raise Missing(f"{folder}: no such results folder")
-    inside = sorted(path.parent.glob(f"interfaces/*/{NAME}"))
+    inside = sorted(path.parent.glob(f"interfaces/*/{VTKHDF_FILE}"))
     advice = "only a run with [contact] writes one"
     if inside:
         advice = f"give one of its interfaces, such as {inside[0].parent}"
-    raise Missing(f"{folder}: it has no {NAME}; {advice}")
+    raise Missing(f"{folder}: it has no {VTKHDF_FILE}; {advice}")
 
 
 def read_frames(path: Path) -> Frames:
@@ -182,7 +182,7 @@ def read_frames(path: Path) -> Frames:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            blocks = {part: _read_block(root[part], len(times)) for part in PARTS}
+            blocks = {part: _read_block(root[part], len(times)) for part in STORED_PARTS}
         for part, names in REQUIRED_FIELDS.items():
             present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
             if not names <= present:
@@ -217,7 +217,7 @@ def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
     `rows` is the HDF5 dataset of all frames below each other, `name` that of the field, and `size` the number of points
     or cells in a frame.
     """
-    values = rows[:].reshape(-1, size, *FIELDS[name].shape)
+    values = rows[:].reshape(-1, size, *VTK_FIELDS[name].shape)
     if len(values) not in (1, count):
         raise ValueError(f"{name} has {len(values)} frames")
     return values

@@ -8,4 +8,4 @@ Read `write` first.
 
 from ...scene.files import UNIVERSAL_EXTENSIONS
 
-ENDINGS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv")
+LAB_FILE_ENDINGS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv")

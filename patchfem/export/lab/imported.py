@@ -21,13 +21,15 @@ from ..columns import format_csv
 from . import universal
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
-EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
+DISPLACEMENT_COLUMN_NAMES = {
+    "displacement": ("output_displacement", "relative_displacement", "slide")
+}
 # options that each form of a file uses
-USED = {"table": (), "decay": ("decay", "begin"), "modes": ("band", "decay", "begin")}
-FREQUENCY_RESPONSE_TYPE = 4  # function type of a frequency response in dataset 58
+OPTIONS_OF_FORM = {"table": (), "decay": ("decay", "begin"), "modes": ("band", "decay", "begin")}
+FREQUENCY_RESPONSE_FUNCTION_TYPE = 4  # function type of a frequency response in dataset 58
 # records [SI] by quantity
 Records = dict[str, np.ndarray]
-DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
+DECAY_COLUMN_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
 class EstimateOptions(NamedTuple):
@@ -117,7 +119,7 @@ def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
 
     # an option without an effect is a mistake of the user
     given = [name for name, value in settings._asdict().items() if value]
-    unused = [f"--{name}" for name in given if name not in USED[form]]
+    unused = [f"--{name}" for name in given if name not in OPTIONS_OF_FORM[form]]
     if unused:
         raise PatchfemError(
             f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml), --begin with --decay also for "
@@ -172,7 +174,7 @@ def _write_decay(
     """
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
     columns = {f"decay_{name}": one.tolist() for name, one in curve._asdict().items()}
-    units = {name: DECAY_UNITS[name.removesuffix("_error")] for name in curve._fields}
+    units = {name: DECAY_COLUMN_UNITS[name.removesuffix("_error")] for name in curve._fields}
     headings = [f"decay_{name} [{unit}]" for name, unit in units.items()]
     write_text(out, format_csv(dict(zip(headings, columns.values(), strict=True))))
     ends = [
@@ -224,7 +226,7 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     mass = 'moving_mass = "1 kg"  # assumed: not in the record'
     if modes.mass is not None:
         mass = f'moving_mass = "{modes.mass!r} kg"'
-    remarks = [f"modes of {source}, by {universal.PROGRAM}", *modes.notes]
+    remarks = [f"modes of {source}, by {universal.PROGRAM_AND_VERSION}", *modes.notes]
     lines = [*(f"# {printable(remark)}" for remark in remarks), "", "[structure]", mass]
     for k, about in enumerate(modes.descriptions):
         comment = f"  # {printable(about)}" if about else ""
@@ -246,7 +248,9 @@ def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[st
 
     PatchfemError is raised if none of them is a response.
     """
-    file_records = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
+    file_records = laboratory.read_records(
+        file, records.parse_requests(requests), DISPLACEMENT_COLUMN_NAMES
+    )
     responses = measured_modes.DERIVATIVE_ORDERS
     if file_records.channel_list and not file_records.values.keys() & responses.keys():
         raise PatchfemError(
@@ -266,7 +270,7 @@ def _refuse_modal_data(file: Path) -> None:
             describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
         )
     functions = {int(dataset["func_type"]) for dataset in datasets if dataset["type"] == 58}
-    if functions == {FREQUENCY_RESPONSE_TYPE}:
+    if functions == {FREQUENCY_RESPONSE_FUNCTION_TYPE}:
         raise PatchfemError(
             describe_removed("fit of responses", f"{file}: the fit of modes to frequency responses")
         )

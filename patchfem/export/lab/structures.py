@@ -11,7 +11,7 @@ import numpy as np
 from ...core import Outcome, PatchfemError, SineDrive
 from ...disk.atomic_write import write_atomically
 from ...model.model import Model
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...model.source import locate_errors
 from ...runs.patch import mesh_levels
 from ...runs.rig import engines, joints
@@ -61,7 +61,7 @@ def _describe_omissions(model: Model) -> str:
     rig = model.rig
     missing = {
         "[wear]": model.wear is not None,
-        "structure.travel": rig.springs.travel < MAX_TRAVEL,
+        "structure.travel": rig.springs.travel < MAX_COMPUTED_DISPLACEMENT,
         "the initial motion": rig.start is not None,
         "the drive signal (Fex1 is for an amplitude of 1 N or 1 m/s^2)": rig.drive.kind != "free"
         and not isinstance(rig.drive.signal, SineDrive),

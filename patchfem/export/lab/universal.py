@@ -14,14 +14,14 @@ from ... import __version__
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import write_atomically
 
-PROGRAM = f"patchfem {__version__}"
+PROGRAM_AND_VERSION = f"patchfem {__version__}"
 # type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17}
-LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
+UNIVERSAL_TYPE_CODES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17}
+UNIVERSAL_UNIT_LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 # function types of dataset 58
-LOOP = 0
-HISTORY = 1
-SI_UNITS = {
+LOOP_FUNCTION_TYPE = 0
+HISTORY_FUNCTION_TYPE = 1
+SI_UNITS_DATASET = {
     "type": 164,
     "units_code": 1,
     "units_description": "SI: Meter (newton)",
@@ -63,7 +63,7 @@ def make_dataset(
     name : str
         First line of identification.
     function : int
-        LOOP or HISTORY.
+        LOOP_FUNCTION_TYPE or HISTORY_FUNCTION_TYPE.
     x, y : Column
         Abscissa and ordinate.
     title : str
@@ -74,17 +74,17 @@ def make_dataset(
         "binary": 1,
         "func_type": function,
         "id1": name[:80],
-        "id2": PROGRAM,
+        "id2": PROGRAM_AND_VERSION,
         "id4": title,
         "rsp_node": y.number or 1,
         "rsp_dir": 1,
         "ref_node": 0,
         "ref_dir": 0,
         "orddenom_spec_data_type": 0,
-        "abscissa_spec_data_type": TYPES[x.unit],
+        "abscissa_spec_data_type": UNIVERSAL_TYPE_CODES[x.unit],
         "abscissa_axis_units_lab": x.unit,
-        "ordinate_spec_data_type": TYPES.get(y.unit, 1),
-        "ordinate_axis_units_lab": LABELS.get(y.unit, y.unit),
+        "ordinate_spec_data_type": UNIVERSAL_TYPE_CODES.get(y.unit, 1),
+        "ordinate_axis_units_lab": UNIVERSAL_UNIT_LABELS.get(y.unit, y.unit),
         "data": np.array(y.values),
         "x": np.array(x.values, float),
     }
@@ -122,9 +122,14 @@ def write_histories(
                 f"{column.label} has values that are not finite, which a universal file cannot contain; export .mat or .csv"
             )
     time, *histories = columns
-    curves = [(f"{force.label} over {slide.label}", LOOP, slide, force) for slide, force in loops]
+    curves = [
+        (f"{force.label} over {slide.label}", LOOP_FUNCTION_TYPE, slide, force)
+        for slide, force in loops
+    ]
     if time.name == "time":
-        curves = [(column.label, HISTORY, time, column) for column in histories] + curves
+        curves = [
+            (column.label, HISTORY_FUNCTION_TYPE, time, column) for column in histories
+        ] + curves
     if not curves:
         raise PatchfemError("there is neither time nor loop to write")
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
@@ -145,7 +150,7 @@ def write_datasets(path: Path, datasets: list[dict]) -> None:
     with write_atomically(path) as partial:
         partial.write_bytes(b"")
         file = pyuff.UFF(str(partial))
-        file.write_sets(SI_UNITS, "add")
+        file.write_sets(SI_UNITS_DATASET, "add")
         for dataset in datasets:
             start = partial.stat().st_size
             file.write_sets(dataset, "add")

@@ -13,8 +13,8 @@ from . import universal
 from .universal import Column
 
 # histories that form a friction loop with the slide of the same interface
-FORCES = ("friction_force", "force", "friction_ratio", "fitted")
-MAX_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
+LOOP_FORCE_NAMES = ("friction_force", "force", "friction_ratio", "fitted")
+MAX_TIME_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
 def export_histories(folder: Path, out: Path) -> str:
@@ -25,7 +25,7 @@ def export_histories(folder: Path, out: Path) -> str:
     folder : Path
         Of a run, or of a fit to a loop.
     out : Path
-        File with one of the ENDINGS.
+        File with one of the LAB_FILE_ENDINGS.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def export_histories(folder: Path, out: Path) -> str:
     """
     if not folder.is_dir():
         raise Missing(f"{folder}: no such results folder")
-    answer = store.read(folder)
+    answer = store.read_answer(folder)
     columns = list_columns(answer)
     # a fitted loop may have no time
     histories = [column for column in columns if column.name != "time"]
@@ -57,7 +57,7 @@ def export_histories(folder: Path, out: Path) -> str:
         loops = [
             (slides[force.number], force)
             for force in histories
-            if force.name in FORCES and force.number in slides
+            if force.name in LOOP_FORCE_NAMES and force.number in slides
         ]
         universal.write_histories(out, columns, loops, answer.title)
         tail = f"; {len(loops)} loops"
@@ -74,7 +74,7 @@ def list_columns(answer: Answer) -> list[Column]:
     columns = []
     for name, variable in answer.data.items():
         is_history = dimension in variable.dims and variable.values.dtype.kind == "f"
-        if not is_history or (is_fit and name not in ("time", "slide", *FORCES)):
+        if not is_history or (is_fit and name not in ("time", "slide", *LOOP_FORCE_NAMES)):
             continue
         values = np.moveaxis(variable.values, variable.dims.index(dimension), -1)
         if values.ndim == 1:
@@ -90,7 +90,7 @@ def _note_thinning(answer: Answer) -> str:
         return ""
     time = answer.data["time"].values
     steps = np.diff(time)
-    (uneven,) = np.nonzero(steps > MAX_STEP_RATIO * steps[-1])
+    (uneven,) = np.nonzero(steps > MAX_TIME_STEP_RATIO * steps[-1])
     if not uneven.size:
         return ""
     return (
@@ -109,6 +109,6 @@ def write_matlab(path: Path, answer: Answer) -> None:
         if variable.values.dtype.kind in "fiu":
             content[name] = variable.values
             units[name] = variable.unit
-    content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
+    content |= {"title": answer.title, "source": universal.PROGRAM_AND_VERSION, "units": units}
     with write_atomically(path) as partial, open(partial, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)

@@ -12,20 +12,21 @@ from ...campaigns.compare import SurfaceRuns
 from ...core import PatchfemError
 from ...surface.areal import level
 from ...surface.compare import compare
-from ...surface.compare.compare import DEFAULTS, Options
+from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
-from ...surface.quantity import LEVEL, SIDE, Quantity
-from ...surface.spectrum import BAND
+from ...surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
+from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
 from .sentences import to_answers
-from .variables import band, make_variables, maps
+from .variables import make_band, make_maps, make_variables
 
 SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
-STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
+# Meanings of the codes of the variable `state`
+WEAR_STATES = ("not used", "unworn", "worn", "grown")
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
     "worn_depth_within",
@@ -40,7 +41,7 @@ MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 def answer_files(
     before: Path,
     after: Path,
-    options: Options = DEFAULTS,
+    options: Options = COMPARE_DEFAULTS,
     predicted: Path | None = None,
     piece: str = "",
 ) -> Answer:
@@ -113,12 +114,12 @@ def compare_with_scene(
 
 def make_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces."""
-    words = sentences.describe(comparison)
+    words = sentences.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
     track = comparison.track
 
-    answer = build(
+    answer = build_answer(
         sources=[surface.source for surface in surfaces],
         words=words._replace(notes=(*words.notes, *file_notes)),
         values=comparison.values,
@@ -126,7 +127,7 @@ def make_answer(comparison: Comparison) -> Answer:
         data=_make_data(comparison),
         details={
             "code": comparison.verdict.code,
-            "band": BAND,
+            "band": WAVE_BAND,
             "direction": comparison.direction or None,
             **_describe_place(comparison),
             "other_tracks": [to_answers(other.values) for other in comparison.tracks[1:]],
@@ -142,7 +143,7 @@ def make_answer(comparison: Comparison) -> Answer:
     return answer
 
 
-def build(
+def build_answer(
     *,
     sources: list[str],
     words: sentences.Words,
@@ -175,7 +176,7 @@ def build(
         "patchfem": __version__,
         "verdict": words.verdict[0],
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
-        "confidence": LEVEL,
+        "confidence": CONFIDENCE_LEVEL,
         **dict(zip(SURFACE_NAMES, sources, strict=True)),
         **to_answers(values),
         "track": to_answers(track) or None,
@@ -216,7 +217,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
-        content["reason"] = sentences.REASONS[_explain_no_roughness(comparison)]
+        content["reason"] = sentences.MISSING_VALUE_REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
 
 
@@ -236,14 +237,14 @@ def _make_data(comparison: Comparison) -> Variables:
         return _make_separate(comparison)
     heights = (curves.before, curves.after)
     if comparison.is_areal:
-        data = maps(
+        data = make_maps(
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
         data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= band("x", "depth", curves.depth, SIDE * curves.noise)
+        data |= make_band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
-        data["state"] = Variable(("x",), state, "", "state of each height", STATES)
+        data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 

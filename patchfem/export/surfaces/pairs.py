@@ -7,19 +7,17 @@ from ... import __version__
 from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
-from ...surface.compare.compare import DEFAULTS, Options
+from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ..answer import Answer, JsonObject, Variables, make_columns
 from . import compare, worn
-from .variables import TEXTS
+from .variables import VARIABLE_TEXTS
 
-CHARTED_QUANTITIES = {
-    "worn_depth_mean": "m",
-    "amplitude_ratio": "1",
-}  # quantities of the charts and their units
+# Quantities of the charts and their units
+CHARTED_QUANTITIES = {"worn_depth_mean": "m", "amplitude_ratio": "1"}
 
 
 def answer_pairs(
-    table: Path, options: Options = DEFAULTS, report_progress: Callable | None = None
+    table: Path, options: Options = COMPARE_DEFAULTS, report_progress: Callable | None = None
 ) -> Answer:
     """Compare the two files or results folders of each line of a table.
 
@@ -81,14 +79,14 @@ def make_answer(rows: list[JsonObject], name: str) -> Answer:
     return Answer(
         kind="pairs",
         title=name,
-        verdict=(_count(rows),),
+        verdict=(_count_pairs(rows),),
         data=_make_data(rows),
         details={"patchfem": __version__, "pairs": rows},
         origin={"patchfem": __version__},
     )
 
 
-def _count(rows: list[JsonObject]) -> str:
+def _count_pairs(rows: list[JsonObject]) -> str:
     """Return the headline: numbers of pairs, of pairs with wear and of failed pairs."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     depths = [row.get("worn_depth_mean", {}) for row in rows]
@@ -98,7 +96,7 @@ def _count(rows: list[JsonObject]) -> str:
 
 def _make_data(rows: list[JsonObject]) -> Variables:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    columns = {"line": ([float(row["line"]) for row in rows], "1", TEXTS["line"])}
+    columns = {"line": ([float(row["line"]) for row in rows], "1", VARIABLE_TEXTS["line"])}
     for name, unit in CHARTED_QUANTITIES.items():
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             columns[name + suffix] = ([row.get(name, {}).get(key) for row in rows], unit)

@@ -40,7 +40,7 @@ def read_patch(folder: Path) -> PatchRun:
     """
     if not folder.exists():
         raise Missing(f"{folder}: there is no such folder")
-    answer = store.read(folder)
+    answer = store.read_answer(folder)
     data = answer.data
     scene = tomllib.loads(answer.origin.get("resolved", ""))
     if "contact" not in scene:

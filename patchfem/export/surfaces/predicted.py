@@ -9,22 +9,22 @@ from ...core import PatchfemError
 from ...formatting import format_length, format_number
 from ...scene.keys.quantities import parse_quantity
 from ...surface.compare.records import Comparison
-from ...surface.quantity import SIDE
+from ...surface.quantity import HALF_WIDTH_95
 from ...wear import predicted
 from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
 from . import sentences
 from .patches import read_patch, worn_depths
-from .variables import band, make_variables
+from .variables import make_band, make_variables
 
 # Smallest relative difference of the proportional coefficient that is reported.
-MIN_DEPARTURE = 0.01
+MIN_COEFFICIENT_DIFFERENCE = 0.01
 # Number of independent blocks of a difference of depths below which it is a smooth pattern, not scatter
 MIN_SCATTER_BLOCKS = 10.0
 # Smallest rms of a smooth difference, relative to the mean depth and to its noise, that shows another shape
-MIN_MISFIT = 0.1
-MIN_MISFIT_DEVIATIONS = 2.0
-COEFFICIENT_MARGIN = 1.2  # ratio of the coefficient that a note proposes to the fitted one
+MIN_SHAPE_MISFIT_FRACTION = 0.1
+MIN_SHAPE_MISFIT_DEVIATIONS = 2.0
+PROPOSAL_FACTOR = 1.2  # ratio of the wear coefficient that a note proposes to the fitted one
 
 
 def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: str) -> Answer:
@@ -49,7 +49,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     fitted = predicted.fit_wear(_measure_depth(comparison), read_history(folder, piece))
     numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
     values = sentences.to_answers(numbers)
-    sentence = describe(fitted)
+    sentence = describe_fit(fitted)
     notes = describe_reliability(fitted)
     warnings = warn_of_other_shape(fitted)
 
@@ -72,7 +72,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     details["notes"] = [*details["notes"], *notes]
 
     # the sentence belongs to the verdict, whose last sentence then becomes a note
-    kept = sentences.MAX_SENTENCES - 1
+    kept = sentences.MAX_VERDICT_SENTENCES - 1
     notes = (*answer.remarks.notes, *answer.verdict[kept:], *notes)
     depths = fitted.depths
     data = make_variables(
@@ -81,7 +81,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         computed_depth=depths.computed,
         depth_difference=depths.measured - depths.computed,
     )
-    data |= band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
+    data |= make_band("x_patch", "measured_depth", depths.measured, HALF_WIDTH_95 * depths.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),
@@ -102,7 +102,9 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     if comparison.is_areal or comparison.direction == "y":
         reason = "the computed depth lies along x, the sliding direction; give traces along x, not scans or traces along y"
     elif curves is None or not sentences.is_known(area) or not area.low > 0:
-        reason = sentences.REASONS.get(getattr(area, "reason", ""), "no wear is shown")
+        reason = sentences.MISSING_VALUE_REASONS.get(
+            getattr(area, "reason", ""), "no wear is shown"
+        )
         reason = f"no worn depth was measured: {reason}"
     if reason:
         raise PatchfemError(f"compare --predicted: {reason}")
@@ -110,7 +112,7 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     # what the interval of the lost area adds to all depths alike
     known = np.isfinite(curves.depth)
     x = curves.x[known]
-    datum_error = (area.high - area.low) / (2 * SIDE) / np.ptp(x)
+    datum_error = (area.high - area.low) / (2 * HALF_WIDTH_95) / np.ptp(x)
     track = comparison.track
     width = None if track is None or any(track.cut) else track.values["width"].value
     correlation = curves.errors.correlation
@@ -172,7 +174,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     )
 
 
-def describe(fitted: PredictedWear) -> str:
+def describe_fit(fitted: PredictedWear) -> str:
     """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
     return (
@@ -194,7 +196,9 @@ def warn_of_other_shape(fitted: PredictedWear) -> list[str]:
     """
     noise = fitted.depths.noise[fitted.on_patch]
     deviation = np.sqrt(np.mean(noise**2) + fitted.datum_error**2)
-    limit = max(MIN_MISFIT * fitted.mean_computed, MIN_MISFIT_DEVIATIONS * deviation)
+    limit = max(
+        MIN_SHAPE_MISFIT_FRACTION * fitted.mean_computed, MIN_SHAPE_MISFIT_DEVIATIONS * deviation
+    )
     if fitted.n_blocks >= MIN_SCATTER_BLOCKS or fitted.difference_rms <= limit:
         return []
     return [
@@ -212,10 +216,10 @@ def describe_reliability(fitted: PredictedWear) -> list[str]:
     if fitted.is_extrapolated:
         notes.append(
             "The measured depth is larger than that of the run, so that the coefficient is extrapolated from its "
-            f'last frames; run the scene again with wear.coefficient = "{COEFFICIENT_MARGIN * value:.2g} m^2/N" and compare '
-            "again."
+            "last frames; run the scene again with "
+            f'wear.coefficient = "{PROPOSAL_FACTOR * value:.2g} m^2/N" and compare again.'
         )
-    if abs(fitted.proportional / value - 1) > MIN_DEPARTURE:
+    if abs(fitted.proportional / value - 1) > MIN_COEFFICIENT_DIFFERENCE:
         notes.append(
             "The computed depth is not proportional to the coefficient, because the pressure changes with wear; the last "
             f"depth of the run in proportion would give {format_number(fitted.proportional, 4)} m^2/N."

@@ -9,24 +9,25 @@ from ... import __version__
 from ...core import PatchfemError
 from ...formatting import format_length
 from ...surface.files.read import read_surface
-from ...surface.quantity import LEVEL, Quantity
+from ...surface.quantity import CONFIDENCE_LEVEL, Quantity
 from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
-from ...surface.spectrum import BAND
+from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variable, Variables
 from ..quantities import format_value
 from . import sentences
-from .variables import make_variables, maps
+from .variables import make_maps, make_variables
 
-KINDS = {"profile": "traces", "areal": "scans"}
-CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace, from 5 to 95 %
+ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
+# Probability of the interval of a parameter of a single trace, from 5 to 95 %
+TRACE_INTERVAL_PROBABILITY = 0.9
 # Ratio of lengths or steps of several files, above which their means mix quantities.
-MAX_SIZE_RATIO = 1.001
+MAX_LENGTH_OR_STEP_RATIO = 1.001
 # Largest ratio of the end of an interval of a mean to the mean that says something.
-MAX_INTERVAL_FACTOR = 2.0
+MAX_INTERVAL_END_TO_MEAN = 2.0
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
-MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
+HEADLINE_PARAMETERS = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
     "Intervals of a single trace are 90 % intervals (5 to 95 %) by Student's t of the logarithm, from the changes of each "
     "parameter if one section of a cut-off is left out."
@@ -77,7 +78,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
 def make_answer(reports: list[RoughnessReport]) -> Answer:
     """Return the answer of the reports of one or several surfaces."""
     quantities, means, headlines, cautions = {}, [], [], []
-    for kind, name in KINDS.items():
+    for kind, name in ROUGHNESS_INPUT_WORDS.items():
         members = [report for report in reports if report.kind == kind]
         if not members:
             continue
@@ -85,13 +86,13 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         state = ""
         # Several surfaces of one kind give means, with a caution where these are of limited use.
         if len(members) > 1:
-            averages = _average(members)
+            averages = _average_parameters(members)
             caution = _find_caution(members)
             cautions += caution
             means.append(_means_to_dict(kind, len(members), averages, caution))
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
-        headlines.append(f"{state}{_state_main(values, members)}.")
+        headlines.append(f"{state}{_format_main_parameters(values, members)}.")
         quantities |= sentences.to_answers(values)
 
     notes = [text for report in reports for text in report.notes]
@@ -102,7 +103,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     return Answer(
         kind="profile",
         title="Roughness of " + ", ".join(Path(report.source).name for report in reports),
-        verdict=(*headlines, *treatments)[: sentences.MAX_SENTENCES],
+        verdict=(*headlines, *treatments)[: sentences.MAX_VERDICT_SENTENCES],
         quantities=quantities,
         data=_make_data(reports),
         remarks=Remarks(tuple(cautions), (*notes, *([MEANS_NOTE] if means else []))),
@@ -111,7 +112,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     )
 
 
-def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
+def _average_parameters(members: list[RoughnessReport]) -> dict[str, Mean]:
     """Return the means of the parameters that all files have, with 95 % intervals from the scatter of the files.
 
     Student's t of the logarithm keeps the interval of a positive parameter above 0. An interval that is wider than
@@ -120,7 +121,7 @@ def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
     from scipy.special import stdtrit
 
     count = len(members)
-    student = stdtrit(count - 1, (1 + LEVEL) / 2)
+    student = stdtrit(count - 1, (1 + CONFIDENCE_LEVEL) / 2)
     means = {}
     for quantity in members[0].values:
         name = quantity.name
@@ -137,7 +138,7 @@ def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
         if not name.endswith("sk") and mean > 0:
             factor = np.exp(error / mean)
             ends = (mean / factor, mean * factor)
-            if factor > MAX_INTERVAL_FACTOR:
+            if factor > MAX_INTERVAL_END_TO_MEAN:
                 ends = (None, None)
                 reason = "few_files"
         averaged = quantity._replace(value=mean, low=ends[0], high=ends[1], reason=reason)
@@ -150,7 +151,8 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
     if len({report.source for report in members}) < len(members):
         return [TWICE_NOTE]
     sizes = np.array([(report.sampling.length, report.sampling.step) for report in members])
-    return [SIZES_NOTE] if (sizes.max(axis=0) > MAX_SIZE_RATIO * sizes.min(axis=0)).any() else []
+    is_mixed = (sizes.max(axis=0) > MAX_LENGTH_OR_STEP_RATIO * sizes.min(axis=0)).any()
+    return [SIZES_NOTE] if is_mixed else []
 
 
 def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> JsonObject:
@@ -161,14 +163,14 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     measures = {}
     for name, mean in means.items():
         measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
-    content = {"kind": kind, "files": count, "confidence": LEVEL, "notes": notes}
+    content = {"kind": kind, "files": count, "confidence": CONFIDENCE_LEVEL, "notes": notes}
     return content | {"measures": measures}
 
 
-def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
-    """Return the main parameters as text; a mean without an interval has the range of the files."""
+def _format_main_parameters(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
+    """Return the parameters of the headline as text; a mean without an interval has the range of the files."""
     parts = []
-    names = next(names for names in MAIN if names[0] in values)
+    names = next(names for names in HEADLINE_PARAMETERS if names[0] in values)
     for name in names:
         if not sentences.is_known(values.get(name)):
             continue
@@ -181,9 +183,9 @@ def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> 
     return ", ".join(parts)
 
 
-def describe_treatment(each: RoughnessReport) -> str:
+def describe_treatment(roughness: RoughnessReport) -> str:
     """Return the sentence on size, form, window and filters of a measured surface."""
-    size, treatment = each.sampling, each.treatment
+    size, treatment = roughness.sampling, roughness.treatment
     shape = " x ".join(map(str, size.shape))
     text = f"{shape} heights over {format_length(size.length)}, every {format_length(size.step)}"
     text += f", about the least-squares {treatment.form}"
@@ -195,7 +197,7 @@ def describe_treatment(each: RoughnessReport) -> str:
         return (
             f"{text}, cut-off {format_length(treatment.cutoff)} (half of it trimmed at each end)."
         )
-    if each.kind == "areal":
+    if roughness.kind == "areal":
         return f"{text}, no L-filter."
 
     # the trace is longer than its last position by one sampling interval
@@ -204,12 +206,13 @@ def describe_treatment(each: RoughnessReport) -> str:
     return f"{text}; without a cut-off there is no roughness profile{advice and ', '}{advice}."
 
 
-def report_to_dict(each: RoughnessReport) -> JsonObject:
+def report_to_dict(roughness: RoughnessReport) -> JsonObject:
     """Return the roughness of a surface as an object of profile.json."""
-    size, treatment = each.sampling, each.treatment
+    size, treatment = roughness.sampling, roughness.treatment
+    has_interval = any(value.low is not None for value in roughness.values)
     content = {
-        "file": each.source,
-        "kind": each.kind,
+        "file": roughness.source,
+        "kind": roughness.kind,
         "length": size.length,
         "step": size.step,
         "shape": size.shape,
@@ -217,20 +220,20 @@ def report_to_dict(each: RoughnessReport) -> JsonObject:
         "window": treatment.window,
         "form": treatment.form,
         "s_filter": treatment.short,
-        "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
-        "measures": sentences.to_answers({value.name: value for value in each.values}),
-        "notes": each.notes,
+        "confidence": TRACE_INTERVAL_PROBABILITY if has_interval else None,
+        "measures": sentences.to_answers({value.name: value for value in roughness.values}),
+        "notes": roughness.notes,
     }
-    if each.kind == "areal":
+    if roughness.kind == "areal":
         return content
-    return content | {"band": BAND, "asperities": _find_moments(each)}
+    return content | {"band": WAVE_BAND, "asperities": _find_moments(roughness)}
 
 
-def _find_moments(each: RoughnessReport) -> dict | None:
+def _find_moments(roughness: RoughnessReport) -> dict | None:
     """Return what an asperity law needs of the waves below the cut-off: rms height, slope and curvature; None if flat."""
-    cutoff = each.treatment.cutoff
+    cutoff = roughness.treatment.cutoff
     try:
-        moments = peaks.trace_moments(each.surface.primary, cutoff)
+        moments = peaks.trace_moments(roughness.surface.primary, cutoff)
     except PatchfemError:
         return None
     values = {f"rms_{name}": value for name, value in moments.fine._asdict().items()}
@@ -251,7 +254,7 @@ def _make_data(reports: list[RoughnessReport]) -> Variables:
 
     surface = reports[0].surface
     if reports[0].kind == "areal":
-        return data | maps(surface.x, surface.y, height_map=surface.z)
+        return data | make_maps(surface.x, surface.y, height_map=surface.z)
     data |= make_variables("x", x=surface.primary.x, primary=surface.primary.z)
     if surface.roughness is not None:
         rough = surface.roughness

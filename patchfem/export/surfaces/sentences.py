@@ -10,12 +10,15 @@ from ...surface.compare.records import Comparison, Track
 from ...surface.quantity import Quantity
 from .. import answer, quantities
 
-ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
-MAX_SENTENCES = 4  # largest number of sentences of a verdict
-INTERVALS = "Numbers in brackets are 95 % intervals for the measured place; another place on the surface may differ by more."
+RATIO_ROUND_OFF = 1e-6  # largest difference of a ratio from 1 that is round-off
+MAX_VERDICT_SENTENCES = 4  # largest number of sentences of a verdict
+INTERVALS_SENTENCE = (
+    "Numbers in brackets are 95 % intervals for the measured place; another place on the surface may differ by "
+    "more."
+)
 
 # Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
-VERDICTS = {
+VERDICT_HEADLINES = {
     "worn": "Worn depth {mean}, the mean of the lost material over {region}.",
     "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
     "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
@@ -33,7 +36,7 @@ VERDICTS = {
 }
 
 # Second sentence where there is no worn depth: what would be seen, or what to do.
-ADVICE = {
+NO_DEPTH_ADVICE = {
     "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
     "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
@@ -45,20 +48,20 @@ ADVICE = {
 }
 
 # Headline and advice of scans where they differ; flanks are those of a track in a trace.
-SCANS = {
+SCAN_VERDICTS = {
     "elsewhere": (
         "Not comparable: no part of the first scan is found in the second one.",
         "Measure the same place again, with more of the unworn surface beside the track.",
     ),
     "no_wear": (
-        VERDICTS["no_wear"],
+        VERDICT_HEADLINES["no_wear"],
         "A worn square as large as those that are tested, up to 25 x 25 points, is not seen below a mean depth of "
         "{detection_limit}.",
     ),
 }
 
 # Sentences on findings: further sentences of the verdict, warnings, and notes.
-IN_VERDICT = {
+VERDICT_FINDINGS = {
     "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
     "the unworn flanks.",
     "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
@@ -67,7 +70,7 @@ IN_VERDICT = {
     "datum and is not in these depths.",
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
-WARNINGS = {
+FINDING_WARNINGS = {
     "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
     "them, and wear does not; calibrate z of both measurements.",
     "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
@@ -75,17 +78,17 @@ WARNINGS = {
     "drift": "The datum drifts by {height} (rms), more than the noise of neighbouring depths ({noise}); the intervals "
     "contain this error.",
 }
-NOTES = {
+FINDING_NOTES = {
     "left_out": "{before} heights before wear and {after} after it are spikes, dropouts or dust and are left out; "
     "--keep-spikes keeps them.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
     "the other end.",
     "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
 }
-NO_LIMIT = "any amount"  # stands for a missing number
+MISSING_NUMBER_TEXT = "any amount"  # stands for a missing number
 
 # Why a quantity has no value.
-REASONS = {
+MISSING_VALUE_REASONS = {
     "elsewhere": "no common part of both surfaces is found",
     "no_wear": "no wear is shown",
     "no_track": "no track is shown",
@@ -111,9 +114,9 @@ REASONS = {
 }
 
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
-RATIOS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
-UNITS = dict.fromkeys(RATIOS, "1")
-AMOUNTS = ("grown", "lost", "area")
+RATIO_NUMBERS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
+FINDING_NUMBER_UNITS = dict.fromkeys(RATIO_NUMBERS, "1")
+AREA_OR_VOLUME_NUMBERS = ("grown", "lost", "area")
 
 
 class Words(NamedTuple):
@@ -127,9 +130,9 @@ class Words(NamedTuple):
 def to_answer(quantity: Quantity) -> answer.Quantity:
     """Convert a measured quantity to a quantity of an answer.
 
-    The code of a reason for a missing interval or value, such as "few_files", becomes a sentence of REASONS.
+    The code of a reason for a missing interval or value, such as "few_files", becomes a sentence of MISSING_VALUE_REASONS.
     """
-    reason = REASONS.get(quantity.reason, quantity.reason)
+    reason = MISSING_VALUE_REASONS.get(quantity.reason, quantity.reason)
     value, low, high, unit = quantity[:4]
     return answer.Quantity(value, unit, low=low, high=high, reason=reason)
 
@@ -150,11 +153,11 @@ def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
 
 
 def describe_region(comparison: Comparison) -> str:
-    """Return what the mean worn depth is the mean of."""
+    """Return in words the part of the surface over which the worn depth is averaged, such as "the track"."""
     return "the common area" if comparison.is_areal else "the common length"
 
 
-def describe(comparison: Comparison) -> Words:
+def describe_comparison(comparison: Comparison) -> Words:
     """Return the sentences of a comparison."""
     values = comparison.values
     code, numbers = comparison.verdict
@@ -162,11 +165,11 @@ def describe(comparison: Comparison) -> Words:
     fields["region"] = describe_region(comparison)
     if is_known(values.get("worn_depth_mean")):
         fields["mean"] = format_value("worn_depth_mean", values["worn_depth_mean"])
-    headline, advice = VERDICTS[code], ADVICE.get(code, "")
+    headline, advice = VERDICT_HEADLINES[code], NO_DEPTH_ADVICE.get(code, "")
     if comparison.is_areal:
-        headline, advice = SCANS.get(code, (headline, advice))
+        headline, advice = SCAN_VERDICTS.get(code, (headline, advice))
     verdict = [headline.format_map(fields)]
-    if code in ADVICE:
+    if code in NO_DEPTH_ADVICE:
         # the limit of a track that would be found may be unknown
         if code != "no_wear" or numbers.get("detection_limit") is not None:
             verdict.append(advice.format_map(fields))
@@ -178,16 +181,16 @@ def describe(comparison: Comparison) -> Words:
     for code, numbers in comparison.findings:
         fields = _format_numbers(numbers, comparison.is_areal)
         fields["region"] = describe_region(comparison)
-        if code in WARNINGS:
-            warnings.append(WARNINGS[code].format_map(fields))
-        elif code in NOTES:
-            notes.append(NOTES[code].format_map(fields))
+        if code in FINDING_WARNINGS:
+            warnings.append(FINDING_WARNINGS[code].format_map(fields))
+        elif code in FINDING_NOTES:
+            notes.append(FINDING_NOTES[code].format_map(fields))
         else:
-            verdict.append(IN_VERDICT[code].format_map(fields))
-    notes = [*verdict[MAX_SENTENCES:], *notes]
+            verdict.append(VERDICT_FINDINGS[code].format_map(fields))
+    notes = [*verdict[MAX_VERDICT_SENTENCES:], *notes]
     if any(is_known(quantity) and quantity.low is not None for quantity in values.values()):
-        notes.append(INTERVALS)
-    return Words(tuple(verdict[:MAX_SENTENCES]), tuple(warnings), tuple(notes))
+        notes.append(INTERVALS_SENTENCE)
+    return Words(tuple(verdict[:MAX_VERDICT_SENTENCES]), tuple(warnings), tuple(notes))
 
 
 def _describe_loss(comparison: Comparison) -> str:
@@ -222,9 +225,9 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
     if ratio is None or None in ratio[:3]:
         return []
     change = "no change is shown"
-    if ratio.high < 1 - ROUNDING:
+    if ratio.high < 1 - RATIO_ROUND_OFF:
         change = "they are reduced"
-    elif ratio.low > 1 + ROUNDING:
+    elif ratio.low > 1 + RATIO_ROUND_OFF:
         change = "they are increased"
     text = format_value("amplitude_ratio", ratio)
     return [
@@ -233,11 +236,11 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
 
 
 def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> dict[str, str]:
-    """Return the numbers of a finding as text by name."""
-    fields = defaultdict(lambda: NO_LIMIT)
+    """Return the numbers of a finding as text by name; `is_areal` tells whether the surfaces are scans."""
+    fields = defaultdict(lambda: MISSING_NUMBER_TEXT)
     for name, number in numbers.items():
-        unit = UNITS.get(name, "m")
-        if name in AMOUNTS:
+        unit = FINDING_NUMBER_UNITS.get(name, "m")
+        if name in AREA_OR_VOLUME_NUMBERS:
             unit = "m3" if is_areal else "m2"
         if isinstance(number, float):
             # a ratio of lengths differs from 1 in its last digits

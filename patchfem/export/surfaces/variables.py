@@ -5,7 +5,7 @@ import numpy as np
 from ..answer import Variable, Variables
 
 MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
-TEXTS = {
+VARIABLE_TEXTS = {
     "x": "position along the surface; in the second trace of a comparison",
     "y": "position across; middle of a strip",
     "before": "height before wear",
@@ -37,11 +37,13 @@ def make_variables(dimension: str, **arrays: np.ndarray | tuple[np.ndarray, str]
     data = {}
     for name, values in arrays.items():
         values, unit = values if isinstance(values, tuple) else (values, "m")
-        data[name] = Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
+        data[name] = Variable(
+            (dimension,), values, unit, VARIABLE_TEXTS.get(name, name.replace("_", " "))
+        )
     return data
 
 
-def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Variables:
+def make_band(dimension: str, name: str, values: np.ndarray, half_width: np.ndarray) -> Variables:
     """Return lengths with the ends of their band as the variables NAME, NAME_low and NAME_high.
 
     Parameters
@@ -50,7 +52,7 @@ def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Var
         Name of the dimension.
     name : str
         Name of the variable.
-    values, half : (n,) array
+    values, half_width : (n,) array
         Lengths, and half-widths of their band [m].
 
     Returns
@@ -58,15 +60,15 @@ def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> Var
     dict of str to Variable
         The three variables.
     """
-    ends = {f"{name}_low": values - half, f"{name}_high": values + half}
+    ends = {f"{name}_low": values - half_width, f"{name}_high": values + half_width}
     return make_variables(dimension, **{name: values}, **ends)
 
 
-def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
+def make_maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
     """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
     rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
     data = make_variables("x", x=x[columns]) | make_variables("y", y=y[rows])
     for name, values in heights.items():
         shown = values[rows, columns].astype(np.float32)
-        data[name] = Variable(("y", "x"), shown, "m", TEXTS[name])
+        data[name] = Variable(("y", "x"), shown, "m", VARIABLE_TEXTS[name])
     return data

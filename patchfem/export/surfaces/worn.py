@@ -11,13 +11,13 @@ from ...wear.between_runs import Wear
 from .. import quantities
 from ..answer import Answer, Quantity, Variables
 from . import sentences
-from .compare import SURFACE_NAMES, build
+from .compare import SURFACE_NAMES, build_answer
 from .patches import PatchRun, read_patch
 from .sentences import format_value
-from .variables import make_variables, maps
+from .variables import make_maps, make_variables
 
 # measures of both runs that stand beside each other; the first three are in the verdict
-MEASURES = (
+BEFORE_AND_AFTER_MEASURES = (
     "contact_fraction",
     "pressure_peak",
     "loop_area",
@@ -30,10 +30,13 @@ MEASURES = (
     "relative_displacement_amplitude",
     "friction_force_peak",
 )
-N_IN_VERDICT = 3
+N_VERDICT_MEASURES = 3
 # Hidden wear relative to the mean depth from which on the verdict states it.
-MIN_HIDDEN_RATIO = 0.01
-NOTE = "Depths, areas and volumes are those of both pieces together; their intervals are the numerical errors of the runs."
+MIN_HIDDEN_WEAR_RATIO = 0.01
+BOTH_PIECES_NOTE = (
+    "Depths, areas and volumes are those of both pieces together; their intervals are the numerical errors of "
+    "the runs."
+)
 
 
 def answer_runs(before: Path, after: Path) -> Answer:
@@ -72,11 +75,11 @@ def answer_runs(before: Path, after: Path) -> Answer:
 
 def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear between two runs."""
-    verdict = describe(runs, wear)
+    verdict = describe_wear(runs, wear)
     sides = {}
     warnings = []
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
-        known = {name: run.answer.quantities.get(name) for name in MEASURES}
+        known = {name: run.answer.quantities.get(name) for name in BEFORE_AND_AFTER_MEASURES}
         measures = {name: q for name, q in known.items() if sentences.is_known(q)}
         outcome = run.answer.details.get("outcome")
         sides[side] = {"outcome": outcome, "cycles": run.cycles, "measures": measures}
@@ -90,11 +93,12 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
         )
 
     zero = {"shift": Quantity(0.0, "m", low=0.0, high=0.0)}
-    names = [name for name in MEASURES if any(name in side["measures"] for side in sides.values())]
+    stored = sides["before"]["measures"] | sides["after"]["measures"]
+    names = [name for name in BEFORE_AND_AFTER_MEASURES if name in stored]
 
-    return build(
+    return build_answer(
         sources=[run.state.source for run in runs],
-        words=sentences.Words(verdict, tuple(warnings), (NOTE,)),
+        words=sentences.Words(verdict, tuple(warnings), (BOTH_PIECES_NOTE,)),
         values=wear.values,
         track=wear.track,
         data=_make_data(runs, wear),
@@ -114,7 +118,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     )
 
 
-def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
+def describe_wear(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
     """Return the verdict: worn depth, worn part, hidden wear, and the main measures before and after."""
     values = wear.values
     if not values["worn_depth_mean"].value > 0:
@@ -136,7 +140,7 @@ def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
 
     verdict = [headline, f"{loss}."]
     # A part that hardly counts is not stated.
-    if values["hidden_wear"].value > MIN_HIDDEN_RATIO * values["worn_depth_mean"].value:
+    if values["hidden_wear"].value > MIN_HIDDEN_WEAR_RATIO * values["worn_depth_mean"].value:
         hidden = format_value("hidden_wear", values["hidden_wear"])
         measurement = "trace" if after.state.y is None else "scan"
         verdict.append(
@@ -156,7 +160,7 @@ def _find_place(run: PatchRun, number) -> str:
 def _describe_measures(runs: tuple[PatchRun, PatchRun]) -> list[str]:
     """Return the sentence with the main measures before and after; [] if there are none."""
     parts = []
-    for name in MEASURES[:N_IN_VERDICT]:
+    for name in BEFORE_AND_AFTER_MEASURES[:N_VERDICT_MEASURES]:
         pair = [run.answer.quantities.get(name) for run in runs]
         if all(sentences.is_known(number) for number in pair):
             first, second = (quantities.format_quantity(name, number) for number in pair)
@@ -169,7 +173,7 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
     state = runs[1].state
     before, after = wear.gaps
     if state.y is not None:
-        data = maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
+        data = make_maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
     else:
         line = np.interp(state.x, state.x[[0, -1]], wear.hidden)
         data = make_variables("x", x=state.x, gap_before=before, gap_after=after)

@@ -13,7 +13,7 @@ from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...response import rows
-from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
@@ -21,9 +21,9 @@ from ..runs import list_versions
 from .words import describe_place, make_peak_quantities, make_verdict
 
 # place of a measure in the reference
-MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
-MAX_RANGES = 3  # measures whose largest and smallest values are quantities
-MAX_MESSAGES = 5  # messages of failed cases among the warnings
+MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.MOTION_TABLE))}
+MAX_MEASURE_RANGES = 3  # measures whose largest and smallest values are quantities
+MAX_FAILURE_MESSAGES = 5  # messages of failed cases among the warnings
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
 
 
@@ -122,7 +122,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
             reason="it is reached in no case" if limit.is_never_reached else reason,
         )
 
-    for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
+    for name, low, high, _ in analysis.ranges[:MAX_MEASURE_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):
             quantities[f"{word}_{name}"] = Quantity(
@@ -197,5 +197,5 @@ def _describe_failures(table: SweepTable) -> tuple[str, ...]:
     counts = Counter(table.messages[number] for number in sorted(table.messages))
     return tuple(
         f"{message} ({count} of {len(table)} cases)"
-        for message, count in counts.most_common(MAX_MESSAGES)
+        for message, count in counts.most_common(MAX_FAILURE_MESSAGES)
     )

@@ -24,11 +24,11 @@ from ...model.model import Model
 from ...runs.batch.case_results import CaseResults
 from .. import store as answers
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks
-from ..folder import LOCK, refuse_others, remove, remove_partial_files
-from .store import CHUNKS, Chunks, case_folder_name, write_chunk
+from ..folder import WRITER_LOCK_FILE, refuse_others, remove_partial_files, remove_path
+from .store import CHUNKS_FOLDER, Chunks, case_folder_name, write_chunk
 
 CASES_FOLDER = "cases"  # name of the folder with the results of single cases
-TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
+SWEEP_FILES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +140,8 @@ class Writer:
                 if self.keep == "summaries" or case in results.messages:
                     folder = self.target / CASES_FOLDER / case_folder_name(names[case])
                     folder.mkdir(parents=True, exist_ok=True)
-                    write_text(folder / answers.SUMMARY, text)
-            write_chunk(self.target / CHUNKS, names, results)
+                    write_text(folder / answers.SUMMARY_FILE, text)
+            write_chunk(self.target / CHUNKS_FOLDER, names, results)
         except (OSError, WriteError) as error:
             reason = str(error) if isinstance(error, WriteError) else error.strerror
             raise Missing(
@@ -188,14 +188,14 @@ class Folder:
         self.target = Path(os.path.abspath(target))
         self.shown = target
         self.is_shared = is_shared
-        self.claim = FolderLock(self.target / LOCK, target, "sweep")
-        self.chunks = Chunks(self.target / CHUNKS, names)
+        self.claim = FolderLock(self.target / WRITER_LOCK_FILE, target, "sweep")
+        self.chunks = Chunks(self.target / CHUNKS_FOLDER, names)
 
     def __enter__(self) -> Folder:
-        allowed = (CASES_FOLDER, CHUNKS, *TABLES)
-        refuse_others(self.target, self.shown, allowed, "those of a sweep", dots=True)
+        allowed = (CASES_FOLDER, CHUNKS_FOLDER, *SWEEP_FILES)
+        refuse_others(self.target, self.shown, allowed, "those of a sweep", allows_dot_names=True)
         try:
-            (self.target / CHUNKS).mkdir(parents=True, exist_ok=True)
+            (self.target / CHUNKS_FOLDER).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Missing(
                 f"{self.shown}: the folder of the sweep cannot be made ({explain_mkdir_error(error)})"
@@ -217,7 +217,7 @@ class Folder:
 
     def _remove_empty(self) -> None:
         """Remove the folders of the sweep that are empty."""
-        for folder in (self.target / CASES_FOLDER, self.target / CHUNKS, self.target):
+        for folder in (self.target / CASES_FOLDER, self.target / CHUNKS_FOLDER, self.target):
             with suppress(OSError):  # a folder with results is kept
                 folder.rmdir()
 
@@ -244,7 +244,7 @@ class Folder:
 
     def find_stored_cases(self, keep: str) -> np.ndarray:
         """Return whether each case (n,) has a result and the files that `keep` requires."""
-        required = [answers.SUMMARY, answers.SCENE, answers.PAGE]
+        required = [answers.SUMMARY_FILE, answers.SCENE_FILE, answers.PAGE_FILE]
         required = required[: ("none", "summaries", "results", "pages").index(keep)]
         is_stored = np.zeros(len(self.chunks.names), bool)
         for numbers, results in self.chunks.iterate_results():
@@ -263,7 +263,7 @@ class Folder:
 
     def remove_tables(self, *names: str) -> None:
         """Remove some of the tables; all without names."""
-        for name in names or TABLES:
+        for name in names or SWEEP_FILES:
             (self.target / name).unlink(missing_ok=True)
 
     def clean(self, *, removes_others: bool, keep: str = "") -> None:
@@ -281,10 +281,10 @@ class Folder:
         own = set() if keep == "none" else set(self.case_folder_names())
         stored = set(self.chunks.list_files())
         stored |= {self.target / CASES_FOLDER / name for name in own}
-        for folder in (CHUNKS, CASES_FOLDER):
+        for folder in (CHUNKS_FOLDER, CASES_FOLDER):
             for path in (self.target / folder).glob("*"):
                 is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
                 if path not in stored and (is_incomplete or removes_others):
-                    remove(path)
+                    remove_path(path)
         with suppress(OSError):  # the folder does not exist, or still contains cases
             (self.target / CASES_FOLDER).rmdir()

@@ -154,7 +154,7 @@ def write_tables(
     cases: Cases,
     folder: Folder,
     page: bool,
-    abandoned: Sequence[tuple[list[int], CaseResults]] = (),
+    unstored_results: Sequence[tuple[list[int], CaseResults]] = (),
     is_collected: bool = False,
 ) -> Answer | None:
     """Write the tables and the page of a sweep from its chunks, and return the answer in them.
@@ -169,7 +169,7 @@ def write_tables(
         Open folder of the sweep.
     page : bool
         Whether report.html is written.
-    abandoned : sequence
+    unstored_results : sequence
         (numbers, CaseResults) of cases that are not in the chunks.
     is_collected : bool
         Whether every case must have a result, and sweep.csv is written for any number of cases.
@@ -185,7 +185,7 @@ def write_tables(
         If a case has no result although all must have one.
     """
     table = SweepTable.blank(cases, read_tolerance(sweep_scene, cases))
-    for numbers, results in chain(folder.chunks.iterate_results(), abandoned):
+    for numbers, results in chain(folder.chunks.iterate_results(), unstored_results):
         table.insert(numbers, results)
     n_missing = int(np.sum(table.outcome == ""))
     if is_collected and n_missing:
@@ -196,15 +196,15 @@ def write_tables(
     if n_missing == len(table):
         return None
 
-    folder.remove_tables("sweep.csv", answers.PAGE)
+    folder.remove_tables("sweep.csv", answers.PAGE_FILE)
     names = folder.case_folder_names()
     if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
         write_csv(cases, table, names, folder.target / "sweep.csv")
-    answers.write(make_answer(sweep_scene, cases, table, names), folder.target)
+    answers.write_answer(make_answer(sweep_scene, cases, table, names), folder.target)
     del table  # its memory is needed for the page, which is made from the files
     if page:
-        pages.write_page(folder.target)
-    return answers.read(folder.target)
+        pages.write_report(folder.target)
+    return answers.read_answer(folder.target)
 
 
 def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:
@@ -237,10 +237,10 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     write_rows(path, chain([[*(axis.key for axis in cases.axes), *columns]], lines))
 
 
-def _format_numbers(numbers: np.ndarray, template: str) -> Iterator[str]:
+def _format_numbers(numbers: np.ndarray, number_format: str) -> Iterator[str]:
     """Yield numbers as strings; "" for NaN."""
     for number in map(float, numbers):
-        yield "" if number != number else template.format(number)
+        yield "" if number != number else number_format.format(number)
 
 
 def compute_in_memory(

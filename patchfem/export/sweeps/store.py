@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from ...runs.batch.case_results import CaseResults, join_case_results
-from ..answer import Variable, encode
+from ..answer import Variable, encode_texts
 from ..netcdf import read_netcdf, write_arrays
 
-CHUNKS = "chunks"
-SUFFIX = ".nc"
-TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
+CHUNKS_FOLDER = "chunks"
+CHUNK_FILE_ENDING = ".nc"
+CHUNK_NUMBER_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
@@ -37,9 +37,9 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
     """
     data = {
         "name": Variable(("case",), np.asarray(names, np.uint64), ""),
-        "outcome": encode("case", results.outcome),
+        "outcome": encode_texts("case", results.outcome),
     }
-    for part, kind in TABLE_TYPES.items() if results.units else ():
+    for part, kind in CHUNK_NUMBER_TYPES.items() if results.units else ():
         columns = [getattr(results, part)[measure] for measure in results.units]
         data[part] = Variable(("measure", "case"), np.array(columns, kind), "")
     attributes = {
@@ -47,7 +47,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
         "messages": json.dumps(results.messages, ensure_ascii=False),
         "faults": json.dumps(results.faults, ensure_ascii=False),
     }
-    path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{SUFFIX}"
+    path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{CHUNK_FILE_ENDING}"
     write_arrays(data, attributes, path)
     return path
 
@@ -64,7 +64,7 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         messages = json.loads(attributes["messages"])
         results.messages.update({int(case): text for case, text in messages.items()})
         results.faults += json.loads(attributes["faults"])
-        for part in TABLE_TYPES if results.units else ():
+        for part in CHUNK_NUMBER_TYPES if results.units else ():
             columns = zip(results.units, data[part].values, strict=True)
             getattr(results, part).update(columns)
         return data["name"].values, results
@@ -90,7 +90,7 @@ class Chunks:
 
     def list_files(self) -> list[Path]:
         """Return the files of the folder, the newest last."""
-        files = self.folder.glob(f"[!.]*{SUFFIX}")
+        files = self.folder.glob(f"[!.]*{CHUNK_FILE_ENDING}")
         return sorted(files, key=lambda path: (path.stat().st_mtime_ns, path.name))
 
     def iterate_results(self) -> Iterator[tuple[np.ndarray, CaseResults]]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
-from ...campaigns.sweeps.limits import DOUBLING, KeyLimit
+from ...campaigns.sweeps.limits import DOUBLED_VALUE_CHANGE, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
@@ -12,7 +12,7 @@ from ...response import rows
 from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value
 
-SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
+MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
 
 
@@ -24,7 +24,9 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
             sentences.append(_describe_ranking(name, indices))
         for name, (low, _, high) in list(analysis.quantiles.items())[:1]:
             ends = (_format_measure(name, table.measures[name].unit, end) for end in (low, high))
-            sentences.append(f"90 % of the cases have a {_label(name)} of {' to '.join(ends)}.")
+            sentences.append(
+                f"90 % of the cases have a {_name_in_words(name)} of {' to '.join(ends)}."
+            )
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
     elif analysis.limits:
@@ -51,7 +53,7 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if len(varied) == 1:
         places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
         return (
-            f"With {varied[0].key}, {_label(name)} changes most: from {low} at {places[0]} "
+            f"With {varied[0].key}, {_name_in_words(name)} changes most: from {low} at {places[0]} "
             f"to {high} at {places[1]}."
         )
 
@@ -59,10 +61,10 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
         share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
-    return f"{_label(name).capitalize()} changes most: from {low} to {high}{share}."
+    return f"{_name_in_words(name).capitalize()} changes most: from {low} to {high}{share}."
 
 
-def _label(name: str) -> str:
+def _name_in_words(name: str) -> str:
     """Return the name of a measure as words."""
     return name.replace("_", " ")
 
@@ -74,23 +76,23 @@ def _format_measure(name: str, unit: str, value: float) -> str:
 
 def _describe_limit(limits: list[KeyLimit]) -> str:
     """Return how far the key may go before a measure changes by 5 %; "" if no such limit exists."""
-    small = [limit for limit in limits if abs(limit.change) < DOUBLING]
+    small = [limit for limit in limits if abs(limit.change) < DOUBLED_VALUE_CHANGE]
     open_ended = [limit for limit in small if not limit.is_never_reached]
     if not open_ended:
-        names = " and ".join(_label(limit.measure) for limit in small)
+        names = " and ".join(_name_in_words(limit.measure) for limit in small)
         return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
     # limits of a motion come before those of its patch, which change before the motion does
-    moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
+    moving = [limit for limit in open_ended if limit.measure in rows.MOTION_TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
     numbers = (first.low, first.high, first.value)
     low, high, value = (format_value(number, first.unit, 3) for number in numbers)
     if not np.isfinite(first.value):
         return (
-            f"{first.key} may reach at least {low} before {_label(first.measure)} changes by 5 %; "
+            f"{first.key} may reach at least {low} before {_name_in_words(first.measure)} changes by 5 %; "
             "more cases are needed to find this limit."
         )
     return (
-        f"{first.key} may reach {value} before {_label(first.measure)} changes by 5 % "
+        f"{first.key} may reach {value} before {_name_in_words(first.measure)} changes by 5 % "
         f"(between the cases at {low} and {high})."
     )
 
@@ -127,7 +129,7 @@ def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
         if np.isfinite(entry.peak.width):
             text += f", half-power width {width}"
         clauses.append(f"{text})")
-    return f"{_label(name).capitalize()} peaks at {' and at '.join(clauses)}."
+    return f"{_name_in_words(name).capitalize()} peaks at {' and at '.join(clauses)}."
 
 
 def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
@@ -135,9 +137,9 @@ def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
     parts = [
         f"{index.key} {100 * index.total:.0f} % ({100 * index.low:.0f} to {100 * index.high:.0f} %)"
         for index in indices[:MAX_NAMED_KEYS]
-        if index.total >= SMALLEST_SHARE
+        if index.total >= MIN_NAMED_VARIANCE_FRACTION
     ]
-    return f"Shares of the variance of {_label(name)}: {', '.join(parts)}."
+    return f"Shares of the variance of {_name_in_words(name)}: {', '.join(parts)}."
 
 
 def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
@@ -155,7 +157,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
         others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
-        counts[f"over the tolerance in {_label(name)}{others}"] = missed[name]["count"]
+        counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses and len(table) == 1:
         return "The only case settled and meets the tolerance."
@@ -174,4 +176,4 @@ def _describe_unsettled(table: SweepTable) -> str:
     if not unsettled.size or unsettled.max() <= np.nanmax(values[table.has_settled], initial=0.0):
         return ""
     text = format_value(unsettled.max(), table.measures[name].unit)
-    return f" (their {_label(name)} is up to {text} at the end)"
+    return f" (their {_name_in_words(name)} is up to {text} at the end)"

@@ -5,7 +5,8 @@ length: a cut-off beyond which old strips are dropped, and a width up to which n
 
 `bonds` is a `list_rows_kernels.BondList`. Forces [1] and stored energies [m] are divided by the friction limit mu_s N.
 `increment` is a straight increment [m] from the present state, `v0` the velocity [m/s] at its start and `dt` its duration
-[s]; both determine the growth of bonds.
+[s]; both determine the growth of bonds. A bond acts with (|u|/eps)^p exp(-damage) for reading="stretch", with its stretch u
+and the damage int dR/eps since it formed, and with (R/eps)^p exp(-R/eps) for reading="report", with the path R since then.
 """
 
 from math import expm1, log1p
@@ -49,8 +50,8 @@ MAX_NEW_AGE = 40.0
 # Largest growth J within a strip of growing bonds; with it, two Gauss points per strip sum growing
 # bonds to 1e-6 (test_exact_direct_growing_bonds_equal_hand_sum)
 MAX_STRIP_GROWTH = 0.5
-# Largest number of strips into which growth alone divides an increment; J has no bound after a long
-# rest
+# Largest number of strips into which growth alone divides an increment. The growth J along an increment that takes a long
+# time has no bound, but with a large J nearly all of its bonds are mature.
 MAX_GROWTH_STRIPS = 16
 # Largest error, relative to the friction limit, of the growing bonds that form on an increment; it
 # falls with the fourth power of the number of strips
@@ -63,9 +64,12 @@ TOUCH_TOL = 1e-6
 MIN_ENERGY_STEP = 1e-3
 # The same limit for distributed initial bonds, because solvers rely on a force without jumps
 MIN_ENERGY_STEP_SPREAD = 1e-6
-# Largest increment in bond lengths for which Simpson's rule is accurate enough
+# Largest increment in bond lengths for which Simpson's rule has a weight in the mean force: the force bends over a bond
+# length, so that the rule with three points has an error of about x^4/2880 there
 MAX_SIMPSON_STEP = 0.1
-MAX_SIMPSON_STEP_STEEP = 0.03  # the same limit for an order below 1
+MAX_SIMPSON_STEP_STEEP = (
+    0.03  # the same limit for an order below 1, whose force starts with an infinite slope
+)
 MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of Gauss points, in bond lengths
 # Increment [bond lengths] at which the slope of the force at rest is the mean of both directions
 SLOPE_INCREMENT_RATIO = 1e-9
@@ -140,8 +144,9 @@ def find_path(fraction, increment, bonds, v0, v1, dt):
 def sum_list(fraction, increment, bonds, v0, dt):
     """Write force and stored energy of all strips, of the initial and of the new bonds after a fraction of an increment.
 
-    For reading="report" the energy excludes the bonds that form on the increment. Each bond stores the work of its force
-    when its stretch goes to zero at constant damage.
+    They go to the rows `STRIP.force` [1] and `STRIP.energy` [m] for unit pressure; the row `STRIP.pressure` has the factor
+    of each strip, and `total` sums the products. Each bond stores the work of its force when its stretch goes to zero at
+    constant damage. For reading="report" the energy excludes the bonds that form on the increment.
 
     Parameters
     ----------
@@ -168,6 +173,8 @@ def sum_list(fraction, increment, bonds, v0, dt):
     new = _sum_new(fraction * abs(increment), after, bonds)
     strips[STRIP.force, end] = np.copysign(new.force, increment)
     strips[STRIP.energy, end] = new.energy
+
+    # Bonds keep the pressure under which they formed: the initial ones that of the start, new ones the present one.
     strips[STRIP.pressure, first] = status[STATUS.initial_pressure]
     strips[STRIP.pressure, end] = status[STATUS.pressure]
 
@@ -503,8 +510,9 @@ def _needs_energy_balance(increment, bonds):
 def _find_simpson_fraction(increment, bonds):
     """Return the weight of Simpson's rule in the mean of an increment; Gauss's rule on panels has the remaining weight.
 
-    It is 1 for increments of up to half a limit with a smooth force and falls to 0 at the limit, so that the mean depends
-    continuously on the increment. For distributed initial bonds it must not depend on their position.
+    It is 1 for increments of up to half a limit (MAX_SIMPSON_STEP, in bond lengths) with a smooth force, and falls
+    linearly to 0 at the limit, so that the mean depends continuously on the increment. For distributed initial bonds it
+    must not depend on their position.
     """
     law = bonds.law
     p = law[LAW.order]

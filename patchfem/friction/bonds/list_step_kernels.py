@@ -101,7 +101,7 @@ def list_step(increment, bonds, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_sums(bonds):
-    """Write force and energy of the present state into the strips and into the status."""
+    """Write force [1] and energy [m] of the present state into the rows `STRIP.present_...` and into the status."""
     strips = bonds.bondlist
     status = bonds.status
     first = int(status[STATUS.first_column])
@@ -198,7 +198,9 @@ def _make_space(count, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_weights(width, eps, bonds, column):
-    """Write the scaled weights of a strip, for reading="stretch".
+    """Write the scaled weights of a strip at its Gauss points to `STRIP.value_1` and `value_2`, for reading="stretch".
+
+    They are covered/(2 eps^p) exp(damage at formation - reference), half of the strip each.
 
     Parameters
     ----------
@@ -221,7 +223,7 @@ def _write_weights(width, eps, bonds, column):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_start_lengths(low, width, before, after, bonds, column):
-    """Write the scaled starting lengths of a strip of growing bonds.
+    """Write the scaled starting lengths [m] of a strip of growing bonds to `STRIP.value_1` and `value_2`.
 
     At a Gauss point it is the mature length when its bonds formed, times exp(J - reference) at that time. Later, the
     length of these bonds is that of mature bonds less exp(reference - J) times this number.

@@ -96,7 +96,9 @@ def sum_strips(after, bonds):
 
     strips = bonds.bondlist
     scale = _value_scale(after, bonds)
-    # A bond of reading="stretch" stores f u/(p + 1), because its force is proportional to |u|^p
+    # Force and energy of a strip are integrals over its bonds of |f| and |f u|, times these factors. A bond of
+    # reading="stretch" stores f u/(p + 1), because its force is proportional to |u|^p. One of reading="report" stores f u,
+    # because its force depends on the path alone, and so stays while the stretch goes to 0.
     p = law[LAW.order]
     force_factor = law[LAW.inverse_gamma] / law[LAW.length]
     energy_factor = force_factor
@@ -168,6 +170,11 @@ def _suits_gauss(after, bonds, column, p, form):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
     """Write force and energy of all strips for reading="stretch" by two Gauss points each.
+
+    With the stretch u_g = q - q_g of the bonds that formed at the Gauss point q_g, when the displacement is q, and their
+    weights w_g (the values of the strip),
+
+        force = force_factor sum_g w_g |u_g|^p sgn u_g,    energy = energy_factor sum_g w_g |u_g|^(p + 1).
 
     Parameters
     ----------

@@ -214,6 +214,8 @@ def _integrate_slowness(v, min_speed):
 def press_point(bonds, s0, s1, initial, length):
     """Change the normal load on the bonds of a contact point at rest; the stored energy never increases.
 
+    m, z and s2 are sums over the bonds: of their loads, and of these times the stretch and times its square.
+
     Parameters
     ----------
     bonds : (float, float, float)
@@ -231,8 +233,9 @@ def press_point(bonds, s0, s1, initial, length):
     if s1 >= s0:
         return BondMoments(m + initial * (s1 - s0), z, s2)
 
-    # The bonds that formed last, without stretch, are released first. Once m would fall below z^2/s2, the least for
-    # which a population with these moments exists, all stretches shrink.
+    # m falls in proportion to the load. The bonds that formed last, without stretch, are released first, so that z and s2
+    # stay. By the Cauchy-Schwarz inequality no bonds have m < z^2/s2. Beyond that z and s2 fall by the same factor, so that
+    # z^2/s2 falls to the remaining m.
     remaining = m * s1 / s0
     min_density = z * z / s2 if s2 > 0 else 0.0
     factor = remaining / min_density if min_density > remaining else 1.0

@@ -63,6 +63,23 @@ class BoucWen:
             form="flow",
         )
 
+    def steady_loop(self, load: float, amplitude) -> SteadyLoop:
+        """Return the steady loops under a load [N] at amplitudes u [m] of the relative displacement.
+
+        The tip y is that of the displacement 2 u/eps = int_0^y dv/(1 - (1 - 2 s) v^n) + int_0^y dv/(1 - v^n). Newton's
+        method solves for w = -ln(1 - y). The relative errors are below 1e-12 for an exponent up to 8, and 1e-9 up to 50.
+        """
+        limit = self.static * load
+        target = 2 * np.asarray(amplitude, float) / self.length
+        w = np.minimum(target / 2, 1.0)
+        for _ in range(MAX_TIP_STEPS):
+            half_loop = self._half_loop(w)
+            step = (half_loop.displacement - target) / half_loop.displacement_by_w
+            if np.all(np.abs(step) <= TIP_TOL * (1 + w)):
+                break
+            w = np.maximum(w - step, w / 8)
+        return SteadyLoop(limit * -np.expm1(-w), 2 * limit * self.length * half_loop.area)
+
     def _half_loop(self, w) -> _HalfLoop:
         """Integrate the half-loop from -y to y, where w = -ln(1 - y) is an array of any shape.
 
@@ -106,42 +123,10 @@ def _gauss_rule() -> tuple[np.ndarray, np.ndarray]:
     return root**4, (half * weights).ravel() * 4 * root**3
 
 
-def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loops of the Bouc-Wen law.
-
-    The tip y is that of the displacement 2 u/eps = int_0^y dv/(1 - (1 - 2 s) v^n) + int_0^y dv/(1 - v^n). Newton's
-    method solves for w = -ln(1 - y). The relative errors are below 1e-12 for an exponent up to 8, and 1e-9 up to 50.
-
-    Parameters
-    ----------
-    friction : table
-        Keys of [friction] in SI units.
-    load : float
-        Load [N].
-    amplitude : float or array
-        Amplitudes u [m] of the relative displacement.
-
-    Returns
-    -------
-    SteadyLoop
-    """
-    law = from_keys(friction, load)
-    limit = friction.static * load
-    target = 2 * np.asarray(amplitude, float) / law.length
-    w = np.minimum(target / 2, 1.0)
-    for _ in range(MAX_TIP_STEPS):
-        half_loop = law._half_loop(w)
-        step = (half_loop.displacement - target) / half_loop.displacement_by_w
-        if np.all(np.abs(step) <= TIP_TOL * (1 + w)):
-            break
-        w = np.maximum(w - step, w / 8)
-    return SteadyLoop(limit * -np.expm1(-w), 2 * limit * law.length * half_loop.area)
-
-
 def from_keys(friction, load: float) -> BoucWen:
     """Return the Bouc-Wen law defined by a [friction] table, for a load N [N] on the whole contact.
 
-    The bond length is mu N/stiffness; a load of 0 counts as 1 N.
+    The bond length is mu N/stiffness.
     """
-    length = friction.static * (load or 1.0) / friction.stiffness
+    length = friction.static * load / friction.stiffness
     return BoucWen(friction.static, length, friction.exponent, friction.shape)

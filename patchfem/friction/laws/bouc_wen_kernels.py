@@ -39,7 +39,7 @@ class BoucWenNumber(IntEnum):
 
 
 class FollowedPath(NamedTuple):
-    """Reduced force y after a path, or its distance from 1.
+    """Reduced force y = z sgn(dq) [1] after a path in one direction, or its distance 1 - y from saturation.
 
     - end: value at the end of the path
     - mean: mean over the path

@@ -29,6 +29,11 @@ class ElasticPlastic:
         stiffness = self.static * load / self.length
         return parallel_element([stiffness], [self.length])._replace(length=self.length)
 
+    def steady_loop(self, load: float, amplitude) -> SteadyLoop:
+        """Return the steady loops under a load [N] at amplitudes [m] of the relative displacement."""
+        stiffness = self.static * load / self.length
+        return masing_loop(np.array([stiffness]), np.array([self.length]), amplitude)
+
 
 def parallel_element(stiffness, yield_displacement) -> Element:
     """Return one Element for parallel elastic-plastic elements (eq. 3.12, extended to reversals).
@@ -76,26 +81,6 @@ def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
     slips = np.maximum(np.asarray(amplitude)[..., None] - yield_displacement, 0.0)
     force = amplitude * np.sum(stiffness) - slips @ stiffness
     return SteadyLoop(force, 4 * slips @ (stiffness * yield_displacement))
-
-
-def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loop of the law that a [friction] table defines.
-
-    Parameters
-    ----------
-    friction : model of a [friction] table
-        Keys `static` [1] and `bond_length` [m].
-    load : float
-        Normal load [N].
-    amplitude : float or array
-        Amplitudes [m] of the relative displacement.
-
-    Returns
-    -------
-    SteadyLoop
-    """
-    length = friction.bond_length
-    return masing_loop(np.array([friction.static * load / length]), np.array([length]), amplitude)
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:

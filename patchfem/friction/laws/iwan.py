@@ -41,23 +41,46 @@ class Sliders(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Iwan:
-    """Iwan model of a contact: parallel sliders, whose forces are per newton of normal load.
-
-    - stiffness (t,): [1/m]
-    - yield_displacement (t,): [m]
-    - density (3,): phi_max [m], at which all sliders slip, chi + 1 and beta
+    """Iwan model of a contact, whose forces are per newton of normal load.
 
     All points of a contact have the same relative displacement and the same stretches.
+
+    - static: slip force F_S [1]
+    - stiffness: K_T [1/m]
+    - chi, beta: exponent of the micro-slip, and weight of the last slider
     """
 
-    stiffness: np.ndarray
-    yield_displacement: np.ndarray
-    density: tuple[float, float, float]
+    static: float
+    stiffness: float
+    chi: float
+    beta: float
+
+    @property
+    def phi_max(self) -> float:
+        """Displacement [m] at which all sliders slip."""
+        return max_yield_displacement(self.static, self.stiffness, self.chi, self.beta)
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: parallel elements, and the density which they represent."""
-        element = parallel_element(self.stiffness * load, self.yield_displacement)
-        return element._replace(density=self.density)
+        """Return the Element under a constant load [N]: parallel elements that represent the density."""
+        cells = slider_cells(self.static * load, self.stiffness * load, self.chi, self.beta)
+        return parallel_element(*cells)
+
+    def steady_loop(self, load: float, amplitude) -> SteadyLoop:
+        """Return the steady loops of the continuous density under a load [N] at amplitudes [m], by Masing's rule.
+
+        The curve of first loading is Segalman's eq. 22.
+        """
+        limit = self.static * load
+        phi_max = self.phi_max
+        order = self.chi + 1
+        scale = limit / (self.beta + order / (order + 1))
+        x = np.minimum(amplitude / phi_max, 1.0)
+        force = scale * ((self.beta + 1) * x - x ** (order + 1) / (order + 1))
+
+        # By Masing's rule, a loop has 8 times the work of first loading, minus the area of its diagonal.
+        work = (self.beta + 1) * x**2 / 2 - x ** (order + 2) / ((order + 1) * (order + 2))
+        work = scale * phi_max * work + limit * np.maximum(amplitude - phi_max, 0.0)
+        return SteadyLoop(force, 8 * work - 4 * amplitude * force)
 
 
 def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:
@@ -127,43 +150,6 @@ def _unit_sliders(chi: float, beta: float) -> Sliders:
 def from_keys(friction, load: float) -> Iwan:
     """Return the Iwan law defined by a [friction] table, for a load N [N] on the whole contact.
 
-    The stiffness [N/m] of the table is that under this load; a load of 0 counts as 1 N.
+    The stiffness [N/m] of the table is that under this load.
     """
-    stiffness = friction.stiffness / (load or 1.0)
-    chi = friction.chi
-    beta = friction.beta
-    phi_max = max_yield_displacement(friction.static, stiffness, chi, beta)
-    cells = slider_cells(friction.static, stiffness, chi, beta)
-    return Iwan(*cells, (phi_max, chi + 1, beta))
-
-
-def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loops of the continuous Iwan law (not divided into cells) by Masing's rule.
-
-    The curve of first loading is Segalman's eq. 22.
-
-    Parameters
-    ----------
-    friction : table
-        Keys of [friction] in SI units.
-    load : float
-        Load [N].
-    amplitude : float or array
-        Amplitudes [m] of the relative displacement.
-
-    Returns
-    -------
-    SteadyLoop
-    """
-    chi = friction.chi
-    beta = friction.beta
-    limit = friction.static * load
-    phi_max = max_yield_displacement(limit, friction.stiffness, chi, beta)
-    scale = limit / (beta + (chi + 1) / (chi + 2))
-    x = np.minimum(amplitude / phi_max, 1.0)
-    force = scale * ((beta + 1) * x - x ** (chi + 2) / (chi + 2))
-    # By Masing's rule, a loop has 8 times the work of first loading, minus the area of its
-    # diagonal.
-    work = (beta + 1) * x**2 / 2 - x ** (chi + 3) / ((chi + 2) * (chi + 3))
-    work = scale * phi_max * work + limit * np.maximum(amplitude - phi_max, 0.0)
-    return SteadyLoop(force, 8 * work - 4 * amplitude * force)
+    return Iwan(friction.static, friction.stiffness / load, friction.chi, friction.beta)

@@ -36,9 +36,9 @@ class LuGre:
         # In the order of `lugre_kernels.LuGreNumber`; the first number is reserved for the engines
         numbers = [
             0.0,
-            load * self.stiffness,
-            load * self.kinetic,
             load * self.static,
+            load * self.kinetic,
+            load * self.stiffness,
             self.speed,
             load * self.micro_damping,
             load * self.viscous,
@@ -56,17 +56,14 @@ class LuGre:
 def from_keys(friction, load: float) -> LuGre:
     """Return the LuGre law defined by a [friction] table, for a load N [N] on the whole contact.
 
-    Stiffness and damping refer to this load.
-
-    A load of 0 counts as 1 N. Without a kinetic coefficient it is the static one.
+    Stiffness and damping refer to this load. Without a kinetic coefficient it is the static one.
     """
-    reference_load = load or 1.0
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
     return LuGre(
         friction.static,
         kinetic,
-        friction.stiffness / reference_load,
+        friction.stiffness / load,
         friction.stribeck_speed,
-        friction.micro_damping / reference_load,
-        friction.viscous / reference_load,
+        friction.micro_damping / load,
+        friction.viscous / load,
     )

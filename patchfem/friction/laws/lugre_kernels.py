@@ -1,6 +1,6 @@
 """LuGre law, compiled, in forms that follow from `rate_equation`. Equations: `lugre`.
 
-numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m/s], micro-damping and viscous damping
+numbers: static and kinetic force [N], stiffness [N/m], Stribeck velocity v_s [m/s], micro-damping and viscous damping
 [N s/m]; memory: stretch z [m]. At the constant velocity of a step, z relaxes towards +-g/stiffness over that length of
 path.
 """
@@ -22,15 +22,15 @@ class LuGreNumber(IntEnum):
 
     Index 0 is reserved for the engines.
 
+    - STATIC, KINETIC: static and kinetic friction force [N]
     - STIFFNESS: stiffness [N/m]
-    - KINETIC, STATIC: kinetic and static friction force [N]
     - SPEED: Stribeck velocity [m/s]
     - MICRO_DAMPING, VISCOUS: micro-damping and viscous damping [N s/m]
     """
 
-    STIFFNESS = 1
+    STATIC = 1
     KINETIC = 2
-    STATIC = 3
+    STIFFNESS = 3
     SPEED = 4
     MICRO_DAMPING = 5
     VISCOUS = 6

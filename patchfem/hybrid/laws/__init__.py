@@ -9,8 +9,8 @@ A law has three functions of plain numbers and arrays, which `table_kernels` com
 
 They may call functions of their module that HELPERS lists. `p` are the numbers of the law, `memory` is a row of
 `records.Memory`. Within a regime force and rates must be smooth. A law needs no tangent, no solver and no error formula.
-`RIGID` says whether it rests without displacement. A law of a table [friction] has `from_keys(friction, load, speed)`,
-which returns its `records.LawNumbers` for a mean load [N] and an expected speed [m/s].
+`RIGID` says whether it rests without displacement. A law of a table [friction] has `from_law(law, load)`, which returns
+its `records.LawNumbers` from the law of `friction.laws` and a mean load [N].
 
 LAWS lists the modules; the number of a law is its place. LAW_OF_NAME gives the module for each `friction.law`, and
 VARYING_LAW_OF_NAME that under a load that varies.
@@ -18,7 +18,7 @@ VARYING_LAW_OF_NAME that under a load that varies.
 
 from importlib import import_module
 
-from ...core import PatchfemError
+from ...core import MIN_LOAD, PatchfemError
 from ..records import LawNumbers
 
 LAWS = (
@@ -35,7 +35,6 @@ LAWS = (
 )
 LAW_OF_NAME = {
     "coulomb": "coulomb",
-    "convolution": "coulomb",
     "tanh": "tanh",
     "elastic-plastic": "masing",
     "iwan": "masing",
@@ -48,20 +47,19 @@ VARYING_LAW_OF_NAME = {
     "tanh": "tanh",
     "elastic-plastic": "pressed_springs",
 }
-MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
 
-def make_law(friction, load: float, speed: float, *, varies: bool = False) -> LawNumbers:
-    """Return the law that the keys of a table [friction] define.
+def make_law(name: str, law, load: float, *, varies: bool = False) -> LawNumbers:
+    """Return a friction law in the form of this engine.
 
     Parameters
     ----------
-    friction : table
-        Keys in SI units.
+    name : str
+        Name of the law, `friction.law`.
+    law : friction law per newton of load, or friction.bonds.parameters.Bonds
+        Law as `friction.record.make_law` returns it.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s], from which the rest speed of bonds follows.
     varies : bool
         Whether the load changes.
 
@@ -71,15 +69,13 @@ def make_law(friction, load: float, speed: float, *, varies: bool = False) -> La
         If the law does not exist under a load that varies.
     """
     table = VARYING_LAW_OF_NAME if varies else LAW_OF_NAME
-    if friction.law not in table:
+    if name not in table:
         raise PatchfemError(
-            f"law '{friction.law}' under a normal load that varies is not computed from event to event; "
+            f"law '{name}' under a normal load that varies is not computed from event to event; "
             f"use {', '.join(table)}",
             "friction.law",
         )
-    return import_module(f"{__name__}.{table[friction.law]}").from_keys(
-        friction, max(load, MIN_LOAD), speed
-    )
+    return import_module(f"{__name__}.{table[name]}").from_law(law, max(load, MIN_LOAD))
 
 
 def is_rigid(law: str) -> bool:

@@ -15,8 +15,6 @@ from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
 MIN_DENSITY = 1e-30  # density below which no bond exists that could slip
-REST_SPEED_FRACTION = 1e-3  # default of the speed v_h relative to the expected peak speed
-MIN_REST_SPEED = 1e-12  # smallest default of v_h [m/s]
 DENSITY_SCALE = 1.0  # largest density, to which its error is relative
 
 
@@ -26,15 +24,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     density = s[0]
     stretch = s[1]
@@ -69,15 +67,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     speed = memory[Memory.DIRECTION] * point.velocity
     margins[Margin.MOTION] = speed / point.speed_scale
@@ -91,13 +89,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -106,31 +104,27 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the law of a constant load; only order 1 with reading = "stretch" has moments that close.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.bonds.parameters.Bonds
+        Parameters of the bonds.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    if friction.reading != "stretch" or friction.order != 1:
+    if law.reading != "stretch" or law.order != 1:
         raise PatchfemError(
             "bonds with reading = 'report' or an order other than 1 have no finite set of rates, so their motion is not "
             "computed from event to event",
             "friction.reading",
         )
-    length = friction.bond_length
-    ratio = friction.kinetic / friction.static if friction.static > 0 else 1.0
+    length = law.length
     growth = (0.0, 1.0, 1.0)
-    if friction.rest_growth is not None:
-        rest_speed = friction.rest_speed or max(REST_SPEED_FRACTION * speed, MIN_REST_SPEED)
-        growth = (friction.rest_growth, friction.slip_growth, rest_speed)
-    numbers = (friction.static, length, ratio * length, *growth)
+    if law.has_growth:
+        growth = (law.rest_growth, law.slip_growth, law.rest_speed)
+    numbers = (law.static, length, law.ratio * length, *growth)
     scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
-    states = (friction.initial_bonds, 0.0, 0.0, length)
-    return LawNumbers("bonds", numbers, states, scales, stiffness=friction.static * load / length)
+    states = (law.initial, 0.0, 0.0, length)
+    return LawNumbers("bonds", numbers, states, scales, stiffness=law.static * load / length)

@@ -14,15 +14,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     side = memory[Memory.FLAG]
     size = (side * s[0]) ** p[2] if side * s[0] > 0 else 0.0
@@ -40,15 +40,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     margins[Margin.MOTION] = memory[Memory.DIRECTION] * point.velocity / point.speed_scale
     margins[Margin.BRANCH] = memory[Memory.FLAG] * s[0]
@@ -60,13 +60,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -75,18 +75,17 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the law of a constant load [N].
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.bouc_wen.BoucWen
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    length = friction.static * load / friction.stiffness
-    numbers = friction.static, length, friction.exponent, friction.shape
-    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,), stiffness=friction.stiffness)
+    numbers = law.static, law.length, law.exponent, law.shape
+    return LawNumbers(
+        "bouc_wen", numbers, (0.0,), (1e-2,), stiffness=law.static * load / law.length
+    )

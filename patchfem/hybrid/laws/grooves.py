@@ -34,7 +34,7 @@ def find_flank(p, memory, point):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
@@ -59,15 +59,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     flank = find_flank(p, memory, point)
     loss = (flank.ratio - flank.slope) * flank.vertical * point.velocity
@@ -80,15 +80,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     flank = find_flank(p, memory, point)
     direction = memory[Memory.DIRECTION]
@@ -109,13 +109,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """

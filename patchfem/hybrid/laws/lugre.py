@@ -18,15 +18,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     v = point.velocity
     limit = max(p[1] + (p[0] - p[1]) * exp(-((v / p[3]) ** 2)), MIN_LIMIT * p[0])
@@ -44,15 +44,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     speed = memory[Memory.DIRECTION] * point.velocity
     margins[Margin.MOTION] = speed / point.speed_scale
@@ -66,13 +66,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -81,23 +81,16 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the law of a constant load [N], to which stiffness and damping refer.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.lugre.LuGre
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    stiffness = friction.stiffness / load
-    numbers = (
-        friction.static, kinetic, stiffness, friction.stribeck_speed,
-        friction.micro_damping / load, friction.viscous / load,
-    )  # fmt: skip
-    scale = 1e-2 * friction.static / stiffness
-    return LawNumbers("lugre", numbers, (0.0,), (scale,), stiffness=friction.stiffness)
+    numbers = (law.static, law.kinetic, law.stiffness, law.speed, law.micro_damping, law.viscous)
+    scale = 1e-2 * law.static / law.stiffness
+    return LawNumbers("lugre", numbers, (0.0,), (scale,), stiffness=law.stiffness * load)

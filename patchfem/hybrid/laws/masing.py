@@ -100,15 +100,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     direction = memory[Memory.DIRECTION]
     if memory[Memory.CONTACT] < 0:
@@ -148,15 +148,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     direction = memory[Memory.DIRECTION]
     margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
@@ -185,13 +185,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -406,27 +406,20 @@ def has_power_law(law: LawNumbers) -> bool:
     return law.law == "masing" and law.numbers[1] >= 0
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.elastic_plastic.ElasticPlastic or friction.laws.iwan.Iwan
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    limit = friction.static * load
-    if friction.law == "iwan":
-        from ...friction.laws.iwan import max_yield_displacement
-
-        chi = friction.chi
-        beta = friction.beta
-        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
-        numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
-        length = limit / friction.stiffness
-        return LawNumbers("masing", numbers, length=length, stiffness=friction.stiffness)
-    length = friction.bond_length or limit / friction.stiffness
-    return from_elements([limit / length], [length])
+    limit = law.static * load
+    if hasattr(law, "chi"):
+        numbers = (law.chi, law.beta, limit, law.phi_max, 1, 0.0, law.phi_max, 0.0, limit)
+        return LawNumbers(
+            "masing", numbers, length=law.static / law.stiffness, stiffness=law.stiffness * load
+        )
+    return from_elements([limit / law.length], [law.length])

@@ -18,15 +18,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     if memory[Memory.CONTACT] < 0:
         return Friction(0.0, point.velocity, 0.0)
@@ -58,15 +58,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     contact = memory[Memory.CONTACT]
     margins[Margin.CONTACT] = contact * point.load / point.load_scale
@@ -90,13 +90,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -118,17 +118,14 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
+def from_law(law, load):
     """Return the elastic-plastic law of a load that varies around `load` [N].
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.elastic_plastic.ElasticPlastic
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    length = friction.bond_length or friction.static * load / friction.stiffness
-    return LawNumbers("pressed_springs", (friction.static, length), (0.0, load), (load, load))
+    return LawNumbers("pressed_springs", (law.static, law.length), (0.0, load), (load, load))

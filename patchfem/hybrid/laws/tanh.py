@@ -13,15 +13,15 @@ def force_and_rates(p, memory, point, s, rates):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    rates : (n,) array
-        Rates, which are written.
+        States of the law, in the order that the top of the module names.
+    rates : (j,) array
+        Rates of the states per second, which are written.
     """
     if memory[Memory.CONTACT] < 0:
         return Friction(0.0, point.velocity, 0.0)
@@ -35,15 +35,15 @@ def write_margins(p, memory, point, s, margins):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
-    margins : array
-        Margins, which are written.
+        States of the law, in the order that the top of the module names.
+    margins : (5,) array
+        Margins of the regime, in the order of `records.Margin`, which are written.
     """
     margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
 
@@ -54,13 +54,13 @@ def switch(p, memory, point, s, which):
     Parameters
     ----------
     p : (k,) array
-        Numbers of the law.
+        Numbers of the law, in the order that the top of the module names.
     memory : (l,) array
         Row of `records.State.memory`.
     point : Point
         Load and motion of the interface.
     s : (j,) array
-        States of the law.
+        States of the law, in the order that the top of the module names.
     which : int
         Margin that has vanished (`records.Margin`).
     """
@@ -68,16 +68,14 @@ def switch(p, memory, point, s, which):
     return False
 
 
-def from_keys(friction, load, speed):
-    """Return the rate law.
+def from_law(law, load):
+    """Return the numbers of the rate law.
 
     Parameters
     ----------
-    friction : table
-        Keys of [friction] in SI units.
+    law : friction.laws.tanh.TanhLaw
+        Law per newton of load.
     load : float
         Mean load [N].
-    speed : float
-        Expected peak speed [m/s].
     """
-    return LawNumbers("tanh", (friction.static, friction.reference_speed))
+    return LawNumbers("tanh", (law.static, law.speed))

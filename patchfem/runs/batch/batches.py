@@ -26,7 +26,7 @@ def find_group(model: Model, n_study_cases: int) -> Hashable | None:
         return None
     try:
         return None if lumped.refusal_reason(model) else lumped.group_key(model)
-    except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
+    except one_by_one.FAILED_CASE_ERRORS:  # a single run of the case reports its error
         return None
 
 
@@ -40,7 +40,7 @@ def solve_models(
     """Compute the case results of a sequence of models.
 
     If cases cannot be computed together because of a fault, they are computed one by one, and a message names the
-    error. Errors of single cases (`one_by_one.CASE_ERRORS`) cause no message.
+    error. Errors of single cases (`one_by_one.FAILED_CASE_ERRORS`) cause no message.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _solve_group(
     if group is not None:
         try:
             return lumped.solve(models, report)
-        except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
+        except one_by_one.FAILED_CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
             # without a number, so that the same fault of many groups is one warning of a sweep

@@ -16,6 +16,8 @@ import numpy as np
 
 from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
+from ...friction.bonds.parameters import Bonds
+from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
 from ...points.case_kernels import TICKS
@@ -23,23 +25,19 @@ from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import MAX_ORDER, convergence_errors, total_error
+from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
 from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
-from ...response.reasons import (
-    CHANGE_NOT_RESOLVED_REASON,
-    STICKS_AT_REVERSAL_REASON,
-    find_missing,
-)
+from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
 from ...response.rows import (
     AMPLITUDE,
     INTERNAL_VALUES,
+    MOTION_TABLE,
     STEADY_AMPLITUDE,
-    TABLE,
     error_floor,
     larger_term,
 )
 from ...response.settling import (
-    CLASSES,
+    MOTION_CLASSES,
     MotionEnds,
     judge_motions,
     measure_windows,
@@ -54,21 +52,21 @@ from ..rig.motion_warnings import note_on_creep
 from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements
 
-ENGINE = "points"  # name of the engine in the settings of a case
+BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Steps per cycle of successive marches. No two of them have a step in common, whose error would not show in their
 # difference.
-STEPS = (20, 34, 54, 86, 138, 222, 354, 566, 906)
+BATCH_STEPS_PER_CYCLE = (20, 34, 54, 86, 138, 222, 354, 566, 906)
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
 MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
-MIN_TOLERANCE = 1e-4  # smallest tolerance that STEPS meet
+MIN_BATCH_TOLERANCE = 1e-4  # smallest tolerance that BATCH_STEPS_PER_CYCLE meet
 # Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
-MAX_STICK_SLIP = 1e-3
+MAX_STICKING_SLIP_RATIO = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
-MAX_MICRO_DAMPING = 4.0
+MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
-CHANGE_ROUND_OFF = 1e-12
+MEASURE_CHANGE_ROUND_OFF = 1e-12
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
@@ -160,7 +158,7 @@ def refusal_reason(model: Model) -> str:
     if (
         model.accuracy.method != "auto"
         or list_fixed_settings(model.accuracy)
-        or model.accuracy.tolerance < MIN_TOLERANCE
+        or model.accuracy.tolerance < MIN_BATCH_TOLERANCE
     ):
         return "the case asks for another method, or for an accuracy beyond that of a batch"
     return ""
@@ -216,12 +214,15 @@ def _list_numbers(model: Model) -> tuple:
     """Return the parameters, law, memory, reference stiffness and scales of a model."""
     rig, friction = model.rig, model.friction
     load = model.point.load
-    law = make_point_law(friction, load)
+    # Bonds of a batch do not grow.
+    has_bonds = law_has_trait(friction.law, "bonds")
+    law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
+    point_law = make_point_law(friction.law, law, load)
     cycles = int(rig.drive.cycles)
 
     # Stiffness during stick: friction limit / bond length for laws with a length.
     stiffness = 0.0
-    if friction.law == "elastic-plastic" or law_has_trait(friction.law, "bonds"):
+    if friction.law == "elastic-plastic" or has_bonds:
         stiffness = friction.static * load / friction.bond_length
     elif friction.law not in ("coulomb", "tanh"):
         stiffness = friction.stiffness
@@ -229,8 +230,8 @@ def _list_numbers(model: Model) -> tuple:
     # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
-        *law.numbers,
-        *law.memory,
+        *point_law.numbers,
+        *point_law.memory,
         rig.first_mode.stiffness,
         model.accuracy.tolerance,
         rig.displacement_scale,
@@ -248,7 +249,7 @@ def _may_create_energy(model: Model):
     if friction.law == "lugre":
         kinetic = friction.static if friction.kinetic is None else friction.kinetic
         power = friction.micro_damping * model.rig.speed_scale
-        return np.greater(power, MAX_MICRO_DAMPING * kinetic * model.point.load)
+        return np.greater(power, MAX_MICRO_DAMPING_RATIO * kinetic * model.point.load)
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
@@ -259,8 +260,8 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     others. The errors follow from the march before, with fewer steps.
     """
     remaining = np.arange(len(cases.parameters))
-    coarse = march_cases(cases, STEPS[0])
-    for fewer, count in pairwise(STEPS):
+    coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
+    for fewer, count in pairwise(BATCH_STEPS_PER_CYCLE):
         fine = march_cases(cases.select(remaining), count)
         part = _select(scales, remaining)
         errors = estimate_errors(fine.values, coarse.values, count, fewer)
@@ -273,7 +274,7 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
             is_met &= (errors[name] <= allowed) | is_absent
 
         # Only cases beyond their tolerance are marched again.
-        is_done = is_met | (count == STEPS[-1])
+        is_done = is_met | (count == BATCH_STEPS_PER_CYCLE[-1])
         if is_done.any():
             march = _select(fine, is_done)
             yield (
@@ -307,19 +308,22 @@ def estimate_errors(
         # the value of a measure or to the terms of a difference.
         sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
         relative = np.array([errors[name] / sizes[name] for name in errors])
-        is_change = (relative > CHANGE_ROUND_OFF) & (relative < 1)
+        is_change = (relative > MEASURE_CHANGE_ROUND_OFF) & (relative < 1)
         relative = np.where(is_change, relative, np.nan)
         relative[:, ~is_change.any(axis=0)] = 0.0
-        typical = np.nanmedian(relative, axis=0) / 2**MAX_ORDER
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_CONVERGENCE_ORDER
         for name, error in errors.items():
-            least = typical * sizes[name] * (error > CHANGE_ROUND_OFF * sizes[name])
+            least = typical * sizes[name] * (error > MEASURE_CHANGE_ROUND_OFF * sizes[name])
             error = np.fmax(error, least)
             errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
     return errors
 
 
 def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
-    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms.
+    """Return the absolute part (n,) of the allowed error of a measure, in its unit.
+
+    The allowed error is the tolerance times the value plus this floor. A small difference of large terms cannot have a
+    small relative error, so that the floor is at least the tolerance times these terms (`response.rows.larger_term`).
 
     Parameters
     ----------
@@ -339,7 +343,7 @@ def _select(record, rows):
     if isinstance(record, dict):
         return {name: value[rows] for name, value in record.items()}
     return type(record)(
-        *(_select(one, rows) if isinstance(one, dict) else one[rows] for one in record)
+        *(_select(field, rows) if isinstance(field, dict) else field[rows] for field in record)
     )
 
 
@@ -365,7 +369,8 @@ def make_results(
     classes, steady = _judge_motions(cases, scales, refined)
     is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
     outcomes = [
-        Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
+        Outcome.STUCK if stuck else MOTION_CLASSES[number]
+        for number, stuck in zip(classes, is_stuck)
     ]
     results.outcome[:] = list(map(str, outcomes))
 
@@ -381,7 +386,7 @@ def make_results(
     for name, value in values.items():
         is_known = ~np.isnan(value)
         if name not in INTERNAL_VALUES and is_known.any():
-            results.units[name] = TABLE[name].unit
+            results.units[name] = MOTION_TABLE[name].unit
             results.values[name] = value
             results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
             results.floors[name] = np.where(is_known, find_floor(name, values, scales), np.nan)
@@ -392,7 +397,10 @@ def make_results(
     # The secant stiffness of a rigid stick is infinite at a reversal.
     first = models[0]
     if first.sticks_rigidly:
-        sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
+        sticks = (
+            values["stick_fraction"]
+            > MOTION_TABLE["stick_fraction"].floor + errors["stick_fraction"]
+        )
         moves = values[AMPLITUDE] > 0
         _put_reason(
             results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
@@ -407,7 +415,7 @@ def make_results(
         }
         for name, measure in find_missing(known, last_cycles, drive, True).items():
             results.fill(case, {name: measure})
-    numerics = {"engine": ENGINE, "steps_per_cycle": refined.steps, "window_cycles": window}
+    numerics = {"engine": BATCH_ENGINE, "steps_per_cycle": refined.steps, "window_cycles": window}
     results.numerics.update(dict.fromkeys(range(len(results)), numerics))
     return results
 
@@ -419,10 +427,10 @@ def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str)
     """
     if not cases.size:
         return
-    results.add_measure(name, TABLE[name].unit)
+    results.add_measure(name, MOTION_TABLE[name].unit)
     for column in (results.values[name], results.errors[name]):
         column[cases] = np.nan
-    results.floors[name][cases] = TABLE[name].floor
+    results.floors[name][cases] = MOTION_TABLE[name].floor
     results.reasons.setdefault(name, {}).update(dict.fromkeys(cases.tolist(), reason))
 
 
@@ -431,7 +439,7 @@ def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
     stiffness = scales.stick_stiffness
     if not stiffness.any():
         return np.where(cases.numbers[0] == 0, 0.0, -1.0)
-    return MAX_STICK_SLIP * scales.limit / stiffness
+    return MAX_STICKING_SLIP_RATIO * scales.limit / stiffness
 
 
 def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds:
@@ -469,9 +477,9 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
         scales.tolerance,
         error_floor("drift_per_cycle", scales.displacement),
     )
-    is_steady = classes == CLASSES.index(Outcome.STEADY)
+    is_steady = classes == MOTION_CLASSES.index(Outcome.STEADY)
     return MotionEnds(
-        np.where(is_steady & drifts, CLASSES.index(Outcome.TRANSIENT), classes), steady
+        np.where(is_steady & drifts, MOTION_CLASSES.index(Outcome.TRANSIENT), classes), steady
     )
 
 

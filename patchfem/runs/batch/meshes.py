@@ -51,9 +51,7 @@ class SharedMeshes:
         return replace(model, patch=model.patch.with_mesh(shared=meshes))
 
 
-def with_shared_meshes(
-    models: Sequence[Model | PatchfemError],
-) -> list[Model | PatchfemError]:
+def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list[Model | PatchfemError]:
     """Return the models with common meshes for patches of the same geometry.
 
     A patch whose geometry occurs only once keeps the mesh of its single run.

@@ -10,19 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 
-from ...core import NotConverged, Outcome
+from ...core import NotConverged
+from ..results.result import UNBOUNDED_OUTCOMES
 from ..rig.engines import ENGINES
 from ..rig.numerics import choose_numerics
 from ..rig.solve import solve_rig
 from ..rig.steady.curves import COLUMN_MEASURES, ObservedMotion
 from ..rig.steady.shooting import ShootingFinder
-
-UNBOUNDED_OUTCOMES = (
-    Outcome.GROWS,
-    Outcome.NOT_CONVERGED,
-    Outcome.EXCEEDS_TRAVEL,
-    Outcome.LEAVES_GROOVES,
-)
 
 
 class MotionObserver:

@@ -18,7 +18,8 @@ from ..results.result import collect_used_settings
 from ..run import run
 from .case_results import CaseResults
 
-CASE_ERRORS = (PatchfemError, MemoryError)  # errors caused by a case, not by a fault of the program
+# Errors that a case causes, and not a fault of the program.
+FAILED_CASE_ERRORS = (PatchfemError, MemoryError)
 NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 
@@ -50,7 +51,7 @@ def solve(
             result = run(plan(model), report, estimate=estimate)
             if on_result is not None:
                 on_result(case, result)
-        except CASE_ERRORS as error:
+        except FAILED_CASE_ERRORS as error:
             results.fail(case, str(error) or NO_MEMORY_MESSAGE)
         # An unexpected exception in one case must not discard the results of the other cases.
         except Exception as error:

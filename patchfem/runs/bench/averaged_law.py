@@ -10,7 +10,7 @@ from ...core import PatchfemError
 from ...effects import describe_unsupported, import_effect, law_has_trait
 
 # Largest relative difference between the slip forces forward and backward that counts as zero.
-EQUAL_LIMITS_TOL = 1e-9
+EQUAL_FRICTION_LIMITS_TOL = 1e-9
 
 
 def _import_averaged_law():
@@ -60,7 +60,7 @@ def slip_force_ratio(model, patch) -> float:
     forward, back = _import_averaged_law().sliding_limits(
         patch.x, sigma, weight, f.bond_length, f.order
     )
-    if abs(forward - back) > EQUAL_LIMITS_TOL * max(forward, back):
+    if abs(forward - back) > EQUAL_FRICTION_LIMITS_TOL * max(forward, back):
         raise PatchfemError(
             describe_unsupported(
                 f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "

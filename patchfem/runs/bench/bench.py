@@ -133,7 +133,17 @@ def _choose_frames(n_samples: int, n_frames: int) -> np.ndarray:
 
 
 def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Values:
-    """Compute all measures of a bench run except those of the friction loop."""
+    """Compute all measures of a bench run except those of the friction loop, by name.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    histories : SlideHistories
+        Friction force, load, slip and energies at all samples.
+    cycle_start : int
+        Index of the first sample of the last cycle.
+    """
     force = histories.force
     load = histories.load
 
@@ -197,12 +207,7 @@ def _compute_loop_measures(
     means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
 
     reversals = find_reversals(
-        time,
-        slide,
-        np.zeros(time.size),
-        force,
-        time[-1] - time[0],
-        reversal_force_rule(model),
+        time, slide, np.zeros(time.size), force, time[-1] - time[0], reversal_force_rule(model)
     )
 
     # Without a mode there is no stiffness that damping could refer to, hence the 0.

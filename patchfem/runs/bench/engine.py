@@ -17,7 +17,7 @@ from ...friction.bonds import engines as bond_engines
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
-N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
+N_GROOVE_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 
 
 # Names of two methods of computing the friction force. Summaries and plans print them, and the code compares with them.
@@ -77,7 +77,7 @@ def choose_bench_engine(
 def steps_per_cycle(model) -> int:
     """Return the number of steps per cycle of a bench run, as given or from the tolerance.
 
-    The path over grooves needs at least N_SAMPLES_PER_RADIAN samples per radian of their phase.
+    The path over grooves needs at least N_GROOVE_SAMPLES_PER_RADIAN samples per radian of their phase.
     """
     slide = model.slide
     accuracy = model.accuracy
@@ -86,7 +86,7 @@ def steps_per_cycle(model) -> int:
         return steps
     path = float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
     phase = model.grooves.wave_number * path
-    return max(steps, min(4 * ceil(N_SAMPLES_PER_RADIAN * phase / 4), MAX_GROOVE_STEPS))
+    return max(steps, min(4 * ceil(N_GROOVE_SAMPLES_PER_RADIAN * phase / 4), MAX_GROOVE_STEPS))
 
 
 def has_changing_pressure(model) -> bool:

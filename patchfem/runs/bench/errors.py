@@ -17,11 +17,7 @@ from ...response.coarser import (
     list_step_runs,
     second_order_errors,
 )
-from ...response.errors import (
-    convergence_errors,
-    finer_errors,
-    friction_errors,
-)
+from ...response.errors import convergence_errors, finer_errors, friction_errors
 from ...slip import shear_modes
 from ..results.patch_rows import Values
 from . import bench, shear
@@ -29,9 +25,9 @@ from .engine import uses_parallel_elements
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
-MESH_TOL = 1e-2
+COARSE_MESH_STEPS_TOL = 1e-2
 # Ratio of the merge width in the comparison run to that of the finest run.
-FINER_MERGE_FACTOR = 0.5
+FINER_MERGE_WIDTH_FACTOR = 0.5
 
 
 class CoarseRun(NamedTuple):
@@ -87,11 +83,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
             accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
             coarse_model = replace(model, accuracy=accuracy)
         return bench.run_bench(
-            coarse_model,
-            patches[variant.level],
-            variant.steps,
-            choice=variant.choice,
-            say=say,
+            coarse_model, patches[variant.level], variant.steps, choice=variant.choice, say=say
         )
 
     # The runs are stored by their settings, because several estimates share one run.
@@ -138,7 +130,9 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):
         length = model.friction.bond_length
-        steps_on_coarse_mesh = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
+        steps_on_coarse_mesh = model.slide.steps(
+            COARSE_MESH_STEPS_TOL, model.accuracy.steps_per_cycle, length
+        )
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
         out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
@@ -153,7 +147,9 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
 
     # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:
-        narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
+        narrow = quarter._replace(
+            choice=replace(choice, merge=FINER_MERGE_WIDTH_FACTOR * choice.merge)
+        )
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
     return out
 

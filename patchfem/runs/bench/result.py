@@ -10,11 +10,11 @@ import numpy as np
 from ...core import Missing, NotConverged, Outcome
 from ...formatting import format_quantity
 from ...response.errors import add_errors
-from ...response.outcome import OPEN_LOOP, remove_errors
+from ...response.outcome import OPEN_LOOP_MESSAGE, remove_errors
 from ...response.rows import set_final_floors
 from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import (
-    N_FRAMES,
+    N_INTERFACE_FRAMES,
     MotionData,
     Result,
     RunInputs,
@@ -22,15 +22,12 @@ from ..results.result import (
     SlipRule,
     make_interface_frames,
 )
-from ..results.travel import (
-    check_pieces_overlap,
-    warn_of_large_slide,
-)
+from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from . import bench, shear
 from .engine import nodal_element_limit, steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors
 
-EXTRA_CYCLES = 4  # Cycles that are added to see whether the last loop is steady.
+N_STEADY_CHECK_CYCLES = 4  # Cycles that are added to see whether the last loop is steady.
 
 
 def run_prescribed(inputs: RunInputs) -> Result:
@@ -38,7 +35,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     model = inputs.plan.model
     patch = inputs.patch
     steps = steps_per_cycle(model)
-    frames = N_FRAMES if patch is not None else 0
+    frames = N_INTERFACE_FRAMES if patch is not None else 0
     fine = bench.run_bench(model, patch, steps, frames, say=inputs.say, progress=inputs.progress)
     inputs.seconds["bench"] = fine.seconds
 
@@ -148,12 +145,12 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
     if gap <= tolerance:
         return []
     text = (
-        f"{OPEN_LOOP}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
+        f"{OPEN_LOOP_MESSAGE}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
         "work of the last cycle, is not the energy dissipated in a steady loop"
     )
 
     # The comparison must not end a run that is complete.
-    cycles = slide.cycles + EXTRA_CYCLES
+    cycles = slide.cycles + N_STEADY_CHECK_CYCLES
     try:
         longer = bench.run_bench(replace(model, slide=replace(slide, cycles=cycles)), patch, steps)
     except (Missing, NotConverged):

@@ -17,16 +17,16 @@ from ..patch import store
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
-OPEN_PRESSURE_FRACTION = 1e-3
+UNLOADED_NODE_PRESSURE_FRACTION = 1e-3
 # Bond length of the points that represent Coulomb's law over grooves, relative to the tolerance times the slide at gross
 # slip; on flat ground the force is then wrong by at most .17 of the tolerance, relative to the friction limit.
-COULOMB_LENGTH_RATIO = 0.1
+COULOMB_BOND_LENGTH_RATIO = 0.1
 # Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
-MIN_LENGTH_RATIO = 1e-3
+MIN_BOND_LENGTH_RATIO = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
-ADDED_PRESSURE_FRACTION = 1.0
+ADDED_WEIGHT_PRESSURE_FRACTION = 1.0
 # Error of the backbone curve by neglected shear modes, relative to the tolerance.
-MODES_TOLERANCE_RATIO = 0.1
+SHEAR_MODES_ERROR_RATIO = 0.1
 
 
 def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "contacts.Contact":
@@ -81,8 +81,8 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     """Return the points of a patch whose contact set changes with heave and pitch of the upper piece.
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
-    pieces. The shear modes are weighted with mu_s times the preload plus ADDED_PRESSURE_FRACTION of its mean pressure, so
-    that nodes that are open at first also count. With m modes they are exact for any weights.
+    pieces. The shear modes are weighted with mu_s times the preload plus ADDED_WEIGHT_PRESSURE_FRACTION of its mean
+    pressure, so that nodes that are open at first also count. With m modes they are exact for any weights.
 
     Parameters
     ----------
@@ -99,6 +99,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
     n_modes : int or None
         Number of shear modes. It follows from the tolerance if this is None.
     """
+    # Without pressure, the gap at the approach of the preload is g - C f.
     weight = patch.pieces.interface.weight
     force = patch.pressure.sigma_n * weight
     compliance = patch.pieces.normal
@@ -117,7 +118,7 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
         if weakening != 1:
             _choose_modes(patch, law.static * force, length, 1, 1.0, weakening)
         mean = force.sum() * weight / weight.sum()
-        limit = law.static * (force + mean * ADDED_PRESSURE_FRACTION)
+        limit = law.static * (force + mean * ADDED_WEIGHT_PRESSURE_FRACTION)
         shear = _choose_modes(patch, limit, length, n_modes, model.accuracy.tolerance)
 
     modes = model.rig.modes
@@ -149,7 +150,10 @@ def _find_weakening(law) -> float:
 def _choose_modes(
     patch, limit, length: float, n_modes: int | None, tolerance: float, weakening: float = 1.0
 ) -> "shear_modes.ShearModes":
-    """Return a number of shear modes of the pieces, by default as many as a part of the tolerance needs.
+    """Return the shear modes of the pieces by which the interface deforms; without a number, as many as are needed.
+
+    The neglected modes then change the backbone curve of the interface by at most SHEAR_MODES_ERROR_RATIO times the
+    tolerance.
 
     Parameters
     ----------
@@ -158,9 +162,9 @@ def _choose_modes(
     limit : (m,) array
         Friction limits of the nodes [N].
     length : float
-        Length over which the force grows [m].
+        Displacement over which the force of a node grows to its limit [m]; 0 for rigid friction.
     n_modes : int or None
-        Number of modes.
+        Number of modes; None: by the tolerance.
     tolerance : float
         Relative tolerance of the scene.
     weakening : float
@@ -174,7 +178,7 @@ def _choose_modes(
         limit,
         length,
         shear_modes.N_SHEAR_MODES,
-        MODES_TOLERANCE_RATIO * tolerance,
+        SHEAR_MODES_ERROR_RATIO * tolerance,
         weakening,
     )
 
@@ -228,10 +232,9 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
-        law = f.model_copy(
-            update={"bond_length": COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide}
-        )
-        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
+        ratio = COULOMB_BOND_LENGTH_RATIO * tolerance
+        law = f.model_copy(update={"bond_length": ratio * gross_slip_slide})
+        length = max(ratio, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
 
     reduced = _choose_modes(patch, limit, length, n_modes, tolerance, _find_weakening(law))
 
@@ -257,13 +260,13 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     """
     reduction = contact.reduction
     index = np.arange(patch.x.size) if reduction is None else reduction.points
-    slide = np.array([one.slide for one in snapshots])[:, None]
+    slide = np.array([snapshot.slide for snapshot in snapshots])[:, None]
     shape = (len(snapshots), index.size)
-    forces = np.reshape([one.forces for one in snapshots], shape)
-    elastic = np.reshape([one.stretch + one.bend for one in snapshots], shape)
+    forces = np.reshape([snapshot.forces for snapshot in snapshots], shape)
+    elastic = np.reshape([snapshot.stretch + snapshot.bend for snapshot in snapshots], shape)
     if contact.grooves is not None:
         slope = contact.grooves.slope(slide)
-        vertical = np.array([one.vertical for one in snapshots])[:, None]
+        vertical = np.array([snapshot.vertical for snapshot in snapshots])[:, None]
         loads = contact.point_sets[0].law.load
         length = np.hypot(1.0, slope)
         forces = vertical * loads / loads.sum() * slope + forces * length
@@ -294,7 +297,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
     """Return the shear modes of the contact points of a nonlocal law.
 
     If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
-    node then has OPEN_PRESSURE_FRACTION times the mean pressure of the loaded nodes.
+    node then has UNLOADED_NODE_PRESSURE_FRACTION times the mean pressure of the loaded nodes.
 
     Parameters
     ----------
@@ -318,7 +321,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
             # A single mode is computed first, because this rejects a patch that could jump at constant
             # displacement.
             _choose_modes(patch, limit * sigma, law.length, 1, tolerance, weakening)
-            sigma = np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch))
+            sigma = np.maximum(sigma, UNLOADED_NODE_PRESSURE_FRACTION * mean_loaded_pressure(patch))
         return _choose_modes(patch, limit * sigma, law.length, n_modes, tolerance, weakening)
 
     key = ("shear modes", patch, law, model.side, n_modes, tolerance)

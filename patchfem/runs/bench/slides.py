@@ -15,6 +15,7 @@ from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import contacts, slides
+from ...points.laws import make_elements, make_point_law
 from ...slip import fields
 from ..patch import jenkins_elements
 from . import averaged_law, shear
@@ -22,7 +23,7 @@ from .engine import CLOSED_FORM, BenchEngine, BondListGuard, has_changing_pressu
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
-CREATED_ROUND_OFF = 1e-13
+CREATED_ENERGY_ROUND_OFF = 1e-13
 
 
 class SlideHistories(NamedTuple):
@@ -122,7 +123,7 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     rises = np.zeros(slide.size - 1)
     stored = np.zeros(slide.size)
     if grooves is None:
-        force, losses = _slide_on_faces(task, load)
+        force, losses = _slide_on_flat_surfaces(task, load)
     else:
         force, losses = _climb_grooves(task, load)
         rises = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
@@ -149,8 +150,8 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     return SlideHistories(force, load, slide, ledger, tau, local)
 
 
-def _slide_on_faces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
-    """Return the force (k,) [N] and the loss of each step (k - 1,) [J] of a law without memory on flat faces.
+def _slide_on_flat_surfaces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force (k,) [N] and the loss of each step (k - 1,) [J] of a law without memory on flat surfaces.
 
     The force is phi L, with the friction limit L under the pressure at the sample, and its fraction phi, from the
     direction or the speed of the step that ends there. The loss has the mean limit of both ends of the step.
@@ -176,9 +177,10 @@ def _slide_on_faces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _find_limits(task: SlideTask, load, direction: float) -> np.ndarray:
-    """Return the largest forces (k,) [N] against a motion to +x (`direction` 1) or to -x (-1) at all samples.
+    """Return the friction limits (k,) [N] of a motion to +x (`direction` 1) or to -x (-1) at all samples.
 
-    Only an averaged pressure depends on more than the load (k,) [N].
+    The limit is mu N with the load N (k,) [N]. If the law acts on a pressure that is averaged along x, it is the sum of
+    the nodal limits, which depends on the position of the averaging windows, i.e. on the slide of `task`.
     """
     coefficient = _find_coefficient(task)
     if not _averages_pressure(task):
@@ -235,6 +237,7 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
     moves = np.diff(slide)
     if law_has_trait(friction.law, "set-valued"):
         kinetic = _find_coefficient(task)
+        # Index of the last step in which the interface moved, up to each step; -1 before the first one.
         last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
         ratio = grooves.force_ratio(slide, direction, kinetic)
@@ -292,7 +295,7 @@ def stack_energies(work, stored, losses) -> np.ndarray:
     """
     steps = np.stack([work, np.maximum(losses, 0.0), np.maximum(-losses, 0.0)])
     work, dissipated, created = np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
-    if created[-1] <= CREATED_ROUND_OFF * dissipated[-1]:
+    if created[-1] <= CREATED_ENERGY_ROUND_OFF * dissipated[-1]:
         created = np.zeros(created.size)
     return np.stack([work, stored, dissipated, created])
 
@@ -321,9 +324,9 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     slip = motion.slip
     frames = task.frames
     if jenkins_set is not None:
-        states = [(one.slide, one.stretch) for one in motion.snapshots]
+        states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
         length = make_law(model.friction, 1.0).element(1.0).length
-        tau, local = fields.element_fields(patch, jenkins_set, states, length)
+        tau, local = fields.compute_element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
@@ -345,7 +348,15 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
 
 
 def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
-    """Return the elastic stretch [m] of springs of one bond length under forces and normal loads, or stresses."""
+    """Return the elastic stretch [m] of bonds: the bond length times the force relative to the friction limit.
+
+    Parameters
+    ----------
+    task : SlideTask
+        Task whose friction law has the coefficient and the bond length.
+    force, load : (k,) or (k, m) array
+        Friction force and normal load [N] of the interface, or shear and normal stress [Pa] of its nodes.
+    """
     limit = task.model.friction.static * load
     share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
     return (task.model.friction.bond_length or 0.0) * share
@@ -365,9 +376,9 @@ def _make_contact(task: SlideTask):
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
-        springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        return contacts.make_parallel_contact(*springs, row), jenkins_set
+        law = make_elements(jenkins_set.stiffness, jenkins_set.yield_displacement)
+        return contacts.make_contact([law], [row]), jenkins_set
 
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
-    element = make_law(friction, load).element(load)
-    return contacts.make_contact([element], [row]), None
+    law = make_point_law(friction.law, make_law(friction, load), load)
+    return contacts.make_contact([law], [row]), None

@@ -11,16 +11,13 @@ import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
 from ...elasticity import mortar
-from ...elasticity.elasticity import (
-    Piece,
-    interface_compliance,
-)
+from ...elasticity.elasticity import Piece, compute_interface_compliance
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 from . import store
 
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
-COUPLING_ROUND_OFF = 1e-7
+RELATIVE_COUPLING_ROUND_OFF = 1e-7
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,10 +97,10 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
     piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
-    lower_compliance = upper_compliance = interface_compliance(piece)
+    lower_compliance = upper_compliance = compute_interface_compliance(piece)
     if upper_grid is not None:
         upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
-        upper_compliance = interface_compliance(upper)
+        upper_compliance = compute_interface_compliance(upper)
 
     # Interfaces with different nodes are joined by the mortar method.
     joint = None
@@ -128,7 +125,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
 
     # The compliances hold per unit width; pairs of equal pieces act in parallel.
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
-    if np.abs(closing).max() <= COUPLING_ROUND_OFF * np.abs(tangential).max():
+    if np.abs(closing).max() <= RELATIVE_COUPLING_ROUND_OFF * np.abs(tangential).max():
         closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
 

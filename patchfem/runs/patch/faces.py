@@ -116,7 +116,7 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length
-            tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
+            tau, local = slip_fields.compute_element_fields(face.patch, jenkins_set, states, length)
             fields = make_interface_frames(
                 face.patch,
                 np.array([snapshot.time for snapshot in snapshots]),

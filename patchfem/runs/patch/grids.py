@@ -28,53 +28,68 @@ N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
 MAX_GRID_COLUMNS = 120
-# Each of the following dicts has a value for a fine mesh (True) and for that of a patch in a rig or with wear (False), which
-# gets fewer nodes, because every node slows down each time step or jump (`PatchMesh.is_fine`).
-CELL_GROWTH = {
-    True: 0.5,
-    False: 0.9,
-}  # Growth of the cell length with distance on the coarsest grid [1].
-# Ratio of the contact length to the cell length at the contact edges, on the coarsest grid.
-EDGE_CELLS = {True: 20, False: 10}
 # Smallest ratio of cell length to interface length on the coarsest grid. For an interface of 10 mm this is a cell of 40 pm,
 # whose length, a difference of coordinates, still has about 7 digits.
-MIN_CELL_RATIO = 4e-9
+MIN_CELL_LENGTH_RATIO = 4e-9
 # Ratio of the cell length at a contact edge to that at a step of the gap.
-STEP_CELL_FACTOR = 8
+EDGE_TO_GAP_STEP_CELL_RATIO = 8
 # Largest number of contact edges for which the mesh is graded; with more edges it has equal
 # columns.
-MAX_CONTACT_ENDS = 12
+MAX_GRADED_CONTACT_ENDS = 12
 # Expected range of a varying load, relative to its mean.
-LOAD_RANGE_FACTORS = (0.5, 1.5)
+VARYING_LOAD_FACTORS = (0.5, 1.5)
 # Ratio of the longest cell to the length of the interface if wear may move the contact edges.
-MAX_WEAR_CELL_RATIO = 1 / 48
+MAX_WEAR_CELL_LENGTH_RATIO = 1 / 48
 # Number of cells along a contact of one or two nodes in the next search.
-N_SMALL_CONTACT_CELLS = 64
+N_SEARCH_CELLS_IN_SMALL_CONTACT = 64
 # Number of cells per wavelength of the gap, in the search and on the third grid.
-N_CELLS_PER_WAVE = 16
+N_CELLS_PER_WAVELENGTH = 16
 # Smallest local pressure maximum, relative to the peak pressure, around which the mesh is refined.
-MIN_PEAK_RATIO = 0.3
-N_CELLS_PER_PEAK = 4  # Number of cells of the coarsest grid per half-width of a pressure maximum.
+MIN_REFINED_PRESSURE_RATIO = 0.3
+# Number of cells of the coarsest grid per half-width of a pressure maximum.
+N_CELLS_PER_PRESSURE_HALF_WIDTH = 4
 # Number of cells in a slip zone on the coarsest grid; the third grid has 16, which give the work to
 # about 1 %.
 N_CELLS_PER_SLIP_ZONE = 4
 # Largest ratio of a search cell in a slip zone to the cell of the layout; above it the search is
 # repeated.
-MAX_SEARCH_CELL_RATIO = 4.0
+MAX_SLIP_ZONE_CELL_RATIO = 4.0
 # The same ratio for the waves of a surface.
 MAX_WAVE_CELL_RATIO = 2.0
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
-MAX_SEARCHES = 8
-MIN_LEVELS = 3  # Smallest number of nested meshes at which the order of convergence is known.
-# Largest predicted CPU time [s] of condensing a mesh, by whether the mesh is a fine one; more
-# expensive meshes are not tried.
-MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
-SECONDS_PER_NODE = 4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^NODE_EXPONENT
-NODE_EXPONENT = 1.1
+MAX_CONTACT_SEARCHES = 8
+# Smallest number of nested meshes at which the order of convergence is known.
+MIN_NESTED_MESHES = 3
+# CPU time [s] of condensing a mesh over (number of nodes)^CONDENSING_NODE_EXPONENT
+CONDENSING_SECONDS_PER_NODE = 4.2e-6
+CONDENSING_NODE_EXPONENT = 1.1
 
 Pairs = tuple[tuple[float, float], ...]  # (start, end) or (position, half-width) [m]
 Bands = list[tuple[float, float, float]]  # (from, to, cell length) [m], as in `Layout.bands`
+
+
+class GridDensity(NamedTuple):
+    """How short the cells of a coarsest grid are, and how many nodes its finer grids may have.
+
+    - cell_growth: growth of the cell length with the distance from the contact [1].
+    - n_edge_cells: ratio of the contact length to the cell length at the contact edges.
+    - max_condensing_seconds: largest predicted CPU time [s] of condensing a mesh; more expensive ones are not tried.
+    """
+
+    cell_growth: float
+    n_edge_cells: int
+    max_condensing_seconds: float
+
+
+FINE_GRID_DENSITY = GridDensity(0.5, 20, 3.6)
+# For a patch in a rig or with wear: every node slows down each time step or jump.
+COARSE_GRID_DENSITY = GridDensity(0.9, 10, 0.8)
+
+
+def choose_density(patch_model) -> GridDensity:
+    """Return the density of the grids of a patch, which depends on whether the mesh takes most of the time of its run."""
+    return FINE_GRID_DENSITY if patch_model.mesh.is_fine else COARSE_GRID_DENSITY
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -146,11 +161,11 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
     contact. The search ends when the cells at all edges are short compared to the contact, after
-    MAX_SEARCHES solutions at most.
+    MAX_CONTACT_SEARCHES solutions at most.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
-    LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
-    MAX_WEAR_CELL_RATIO times the interface.
+    VARYING_LOAD_FACTORS times the load. If wear moves them, no column is longer than
+    MAX_WEAR_CELL_LENGTH_RATIO times the interface.
 
     Parameters
     ----------
@@ -167,7 +182,7 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
     first = cases[0]
     layout = make_search_layout(first)
     contact = None
-    for _ in range(MAX_SEARCHES):
+    for _ in range(MAX_CONTACT_SEARCHES):
         pair = condense(first, *make_grids(first, layout))
         solved = []
         for case in cases:
@@ -185,10 +200,10 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
         if not solved:
             break
         contact = solved[0][1][0]
-        layout = _merge_layouts([make_column_layout(*one) for one in solved])
+        layout = _merge_layouts([make_column_layout(case, extents) for case, extents in solved])
 
         # The search ends when this grid has resolved all contacts.
-        max_ratio = 1 / (EDGE_CELLS[first.mesh.is_fine] - 1)
+        max_ratio = 1 / (choose_density(first).n_edge_cells - 1)
         is_resolved = True
         for case, extents in solved:
             edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
@@ -213,7 +228,7 @@ def make_load_variants(patch_model) -> list[PatchModel]:
     load = patch_model.loading.load
     if patch_model.mesh.edge_motion != "load" or load is None:
         return []
-    return [patch_model.with_loading(load=factor * load) for factor in LOAD_RANGE_FACTORS]
+    return [patch_model.with_loading(load=factor * load) for factor in VARYING_LOAD_FACTORS]
 
 
 def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
@@ -228,13 +243,13 @@ def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
     has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_GRID_COLUMNS
     if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
         return False
-    return all(_resolves_span(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
+    return all(_resolves_span(layout, x, MAX_SLIP_ZONE_CELL_RATIO, zone) for zone in zones)
 
 
 def _max_wave_cell(patch_model) -> float:
     """Return the longest cell [m] that resolves the waves of the gap; inf without waves."""
     return min(
-        patch_model.gap.wave / N_CELLS_PER_WAVE,
+        patch_model.gap.wave / N_CELLS_PER_WAVELENGTH,
         np.inf if patch_model.gap.profile is None else patch_model.uniform_element_size,
     )
 
@@ -254,7 +269,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     length = patch_model.pieces.length
     half = length / 2
     mesh = patch_model.mesh
-    n_edge_cells = EDGE_CELLS[mesh.is_fine]
+    density = choose_density(patch_model)
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
 
@@ -262,50 +277,50 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     # The third mesh, whose cells are a quarter as long, has to resolve the waves.
     max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
 
-    if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
+    if max(len(extent.places) for extent in extents) > MAX_GRADED_CONTACT_ENDS:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
     if mesh.edge_motion == "wear":
-        max_cell = min(max_cell, length * MAX_WEAR_CELL_RATIO)
+        max_cell = min(max_cell, length * MAX_WEAR_CELL_LENGTH_RATIO)
     max_loaded_cell = min(width / 6, length / 24, max_cell)
 
     # A contact of one or two nodes is searched for again with shorter cells.
-    n_contact_cells = N_SMALL_CONTACT_CELLS
+    n_contact_cells = N_SEARCH_CELLS_IN_SMALL_CONTACT
     if np.isfinite(max(extent.cell for extent in extents)):
-        n_contact_cells = n_edge_cells
+        n_contact_cells = density.n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
     # contact set.
     coating_cell = coating / 4 if mesh.edge_motion != "load" else np.inf
-    min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
+    min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_LENGTH_RATIO * length)
 
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A node is placed on each step of the gap; the quantities there converge at first order in the
     # cell length.
-    step_cell = min_cell / STEP_CELL_FACTOR
-    bands += _make_point_bands(patch_model.gap.jumps, step_cell)
+    step_cell = min_cell / EDGE_TO_GAP_STEP_CELL_RATIO
+    bands += _make_point_bands(patch_model.gap.step_edges, step_cell)
 
     rounded_edges, rounding_length = find_rounded_edges(patch_model)
     for place in rounded_edges:
         if span[0] - min_cell <= place <= span[1] + min_cell:
             bands.append((place, place, min(min_cell, rounding_length / 4)))
 
-    # Peaks of the pressure and zones of slip each have a number of cells.
-    corner_factor = STEP_CELL_FACTOR if patch_model.has_singular_ends else 1
+    # The half-width of a pressure maximum on a wavy surface, and a slip zone, are divided into at least
+    # N_CELLS_PER_PRESSURE_HALF_WIDTH and N_CELLS_PER_SLIP_ZONE cells.
+    corner_factor = EDGE_TO_GAP_STEP_CELL_RATIO if patch_model.has_singular_ends else 1
     has_waves = _max_wave_cell(patch_model) < np.inf
     for extent in extents if has_waves else ():
         for place, half_width in extent.crests:
-            bands.append((place, place, max(half_width / N_CELLS_PER_PEAK, step_cell)))
+            bands.append(
+                (place, place, max(half_width / N_CELLS_PER_PRESSURE_HALF_WIDTH, step_cell))
+            )
     for extent in extents:
         for start, stop in extent.slip_zones:
-            cell = max((stop - start) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length)
+            cell = max((stop - start) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_LENGTH_RATIO * length)
             bands.append((start, stop, cell))
 
     # At a loaded corner the pressure is singular or, under a coating, changes over its thickness.
     corner_cell = max(
-        min(
-            coating / 16,
-            width / n_edge_cells / corner_factor,
-        ),
-        MIN_CELL_RATIO * length,
+        min(coating / 16, width / density.n_edge_cells / corner_factor),
+        MIN_CELL_LENGTH_RATIO * length,
     )
     ends = set(chain.from_iterable(extent.corners for extent in extents))
     bands += _make_point_bands(sorted(ends), corner_cell)
@@ -318,7 +333,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[mesh.is_fine],
+        density.cell_growth,
     )
 
 
@@ -425,14 +440,14 @@ def _find_pressure_maxima(x, sigma) -> Pairs:
     Both follow from parabolas through three nodal pressures.
     """
     peak_node = np.flatnonzero(
-        (sigma[1:-1] > MIN_PEAK_RATIO * sigma.max())
+        (sigma[1:-1] > MIN_REFINED_PRESSURE_RATIO * sigma.max())
         & (sigma[1:-1] > sigma[:-2])
         & (sigma[1:-1] >= sigma[2:])
     )
     slope = np.diff(sigma) / np.diff(x)
     curvature = -2 * np.diff(slope)[peak_node] / (x[peak_node + 2] - x[peak_node])
     half_width = np.sqrt(2 * sigma[peak_node + 1] / curvature)
-    if peak_node.size > MAX_CONTACT_ENDS:
+    if peak_node.size > MAX_GRADED_CONTACT_ENDS:
         return ()
     return tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
 
@@ -454,13 +469,13 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     -------
     list of TensorGrid
     """
-    x = divide_into_columns(layout, patch_model.gap.jumps)
+    x = divide_into_columns(layout, patch_model.gap.step_edges)
     while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
-        x = divide_into_columns(layout, patch_model.gap.jumps)
+        x = divide_into_columns(layout, patch_model.gap.step_edges)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
-    growth = CELL_GROWTH[patch_model.mesh.is_fine]
+    growth = choose_density(patch_model).cell_growth
     pieces = patch_model.pieces.both
     grids = []
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
@@ -513,5 +528,7 @@ def predict_condensing_seconds(bodies) -> float:
         Meshes of the lower and the upper piece; None for the upper one of identical pieces.
     """
     return sum(
-        SECONDS_PER_NODE * body.n_nodes**NODE_EXPONENT for body in bodies if body is not None
+        CONDENSING_SECONDS_PER_NODE * body.n_nodes**CONDENSING_NODE_EXPONENT
+        for body in bodies
+        if body is not None
     )

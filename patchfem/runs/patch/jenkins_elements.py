@@ -42,7 +42,7 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
     return store.get_or_compute(
         ("elements", patch, static, length),
-        lambda: shear_modes.jenkins_set(patch.slip_compliance, limit, length),
+        lambda: shear_modes.make_jenkins_set(patch.slip_compliance, limit, length),
     )
 
 
@@ -71,7 +71,7 @@ def list_elements(patch: Patch, static: float, length: float) -> tuple[PatchElem
         """Return the Jenkins elements of a strip under nodal normal forces (m,) [N]."""
         if not (static > 0 and force.any()):
             return PatchElements(np.array([1 / slip_compliance.mean()]), np.zeros(1))
-        sliders = shear_modes.jenkins_set(slip_compliance, static * force, length)
+        sliders = shear_modes.make_jenkins_set(slip_compliance, static * force, length)
         return PatchElements(sliders.stiffness, sliders.yield_displacement)
 
     return store.get_or_compute(

@@ -9,21 +9,21 @@ from typing import NamedTuple
 
 # Upper bound of the ratio of successive changes in the extrapolation; it is about that of second
 # order.
-MAX_RATIO = 4.0
+MAX_RATIO_OF_CHANGES = 4.0
 # The same bound for meshes that are not nested.
-MAX_RATIO_NOT_NESTED = 2.5
+MAX_RATIO_OF_CHANGES_NOT_NESTED = 2.5
 # Smallest ratio of successive changes of a series that converges at its expected order.
-MIN_REGULAR_RATIO = 2.6
+MIN_EXPECTED_RATIO_OF_CHANGES = 2.6
 # Largest ratio of successive changes of a regular series; above it the last change is small by
 # chance.
-MAX_REGULAR_RATIO = 6.0
-MIN_RATIO = 1.6  # Lower bound of the ratio of successive changes in the extrapolation.
+MAX_REGULAR_RATIO_OF_CHANGES = 6.0
+MIN_RATIO_OF_CHANGES = 1.6  # Lower bound of the ratio of successive changes in the extrapolation.
 # Smallest ratio of successive changes of a convergent series.
-MIN_CONVERGING_RATIO = 1.3
+MIN_CONVERGING_RATIO_OF_CHANGES = 1.3
 # Ratio of error to remainder for a regular series. With this value the interval misses the limit in
 # less than 2 of 100 random scenes.
-REGULAR_ERROR_FACTOR = 1.8
-IRREGULAR_ERROR_FACTOR = 2.0  # Ratio of error to the largest change for an irregular series.
+REGULAR_SERIES_ERROR_FACTOR = 1.8
+IRREGULAR_SERIES_ERROR_FACTOR = 2.0  # Ratio of error to the largest change for an irregular series.
 
 
 class Limit(NamedTuple):
@@ -44,13 +44,13 @@ class Limit(NamedTuple):
 def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     """Extrapolate values on successively refined meshes to vanishing cell length.
 
-    Three values give a ratio of successive changes. It is regular between MIN_CONVERGING_RATIO and
-    MAX_REGULAR_RATIO. The value is then extrapolated by the remainder of the geometric series, and the error
-    of the value on the finest mesh is REGULAR_ERROR_FACTOR times this remainder. The error of the
-    extrapolated value is a quarter of the remainder, half of it if the ratio is below MIN_REGULAR_RATIO; it
+    Three values give a ratio of successive changes. It is regular between MIN_CONVERGING_RATIO_OF_CHANGES and
+    MAX_REGULAR_RATIO_OF_CHANGES. The value is then extrapolated by the remainder of the geometric series, and the error
+    of the value on the finest mesh is REGULAR_SERIES_ERROR_FACTOR times this remainder. The error of the
+    extrapolated value is a quarter of the remainder, half of it if the ratio is below MIN_EXPECTED_RATIO_OF_CHANGES; it
     is at least the change of the extrapolated value by the last refinement, and doubled if this is unknown.
 
-    If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_ERROR_FACTOR times the last
+    If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_SERIES_ERROR_FACTOR times the last
     change, or a fraction of the change before if that is larger. With two values the error is twice their
     change. For meshes that are not nested the order is limited to log2(2.5), and no value is
     extrapolated.
@@ -76,25 +76,29 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
         ratio = previous_change / last_change
 
     # Irregular series, and those of two values, are not extrapolated.
-    if not nested or not MIN_CONVERGING_RATIO <= ratio <= MAX_REGULAR_RATIO:
-        largest_change = max(last_size, previous_size / MAX_RATIO)
+    if not nested or not MIN_CONVERGING_RATIO_OF_CHANGES <= ratio <= MAX_REGULAR_RATIO_OF_CHANGES:
+        largest_change = max(last_size, previous_size / MAX_RATIO_OF_CHANGES)
         if not nested and len(values) > 2:
-            bounded_ratio = min(max(ratio, MIN_RATIO), MAX_RATIO_NOT_NESTED)
-            largest_change = max(last_size, previous_size / MAX_RATIO_NOT_NESTED)
+            bounded_ratio = min(max(ratio, MIN_RATIO_OF_CHANGES), MAX_RATIO_OF_CHANGES_NOT_NESTED)
+            largest_change = max(last_size, previous_size / MAX_RATIO_OF_CHANGES_NOT_NESTED)
             largest_change = largest_change / (bounded_ratio - 1)
-        elif ratio > MAX_REGULAR_RATIO:
-            largest_change = max(last_size / (MAX_RATIO - 1), previous_size / MAX_RATIO**2 * 2)
-        error = IRREGULAR_ERROR_FACTOR * largest_change
+        elif ratio > MAX_REGULAR_RATIO_OF_CHANGES:
+            largest_change = max(
+                last_size / (MAX_RATIO_OF_CHANGES - 1), previous_size / MAX_RATIO_OF_CHANGES**2 * 2
+            )
+        error = IRREGULAR_SERIES_ERROR_FACTOR * largest_change
         return Limit(finest, error, finest, error)
 
     # The error of the extrapolated value is its change due to the last refinement, but at least a
     # quarter of the remainder.
-    remainder = last_change / (min(max(ratio, MIN_RATIO), MAX_RATIO) - 1)
+    remainder = last_change / (min(max(ratio, MIN_RATIO_OF_CHANGES), MAX_RATIO_OF_CHANGES) - 1)
     extrapolated = finest + remainder
-    extrapolated_error = abs(remainder) / (4 if ratio >= MIN_REGULAR_RATIO else 2)
+    extrapolated_error = abs(remainder) / (4 if ratio >= MIN_EXPECTED_RATIO_OF_CHANGES else 2)
     if len(values) < 4:
         extrapolated_error = 2 * extrapolated_error
     else:
         change = abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
         extrapolated_error = max(extrapolated_error, change)
-    return Limit(finest, REGULAR_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error)
+    return Limit(
+        finest, REGULAR_SERIES_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error
+    )

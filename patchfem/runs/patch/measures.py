@@ -23,7 +23,7 @@ from ..results.patch_rows import (
     EXTRAPOLATED_SOURCE,
     FINEST_MESH_SOURCE,
     MESH_MEASURES,
-    TABLE,
+    PATCH_TABLE,
     Measures,
     Values,
     make_measure,
@@ -40,25 +40,28 @@ from .values import (
 
 # Smallest width/height of a piece for plane strain without doubt; the inverse holds for plane
 # stress.
-MIN_PLANE_STRAIN_RATIO = 8.0
+MIN_PLANE_STRAIN_WIDTH_RATIO = 8.0
 # Smallest number of contact nodes at which the measures no longer depend on it.
-MIN_RESOLVED_NODES = 12
-MAX_UNRESOLVED_NODES = 3  # Largest number of nodes of a contact that counts as not resolved.
-ROUND_OFF_FRACTION = 5e-12  # Relative round-off error of the solved contact equations.
-MIN_ERROR = 1e-9  # Smallest relative error that is reported; no application needs a smaller one.
-MIN_EDGE_OFFSET = 0.012  # Smallest position error of a contact edge, in cell lengths.
+MIN_RESOLVED_CONTACT_NODES = 12
+# Largest number of nodes of a contact that counts as not resolved.
+MAX_UNRESOLVED_CONTACT_NODES = 3
+CONTACT_SOLUTION_ROUND_OFF = 5e-12  # Relative round-off error of the solved contact equations.
+# Smallest relative error that is reported; no application needs a smaller one.
+MIN_REPORTED_RELATIVE_ERROR = 1e-9
+# Smallest position error of a contact edge, in cell lengths.
+MIN_CONTACT_EDGE_ERROR_IN_CELLS = 0.012
 # Ratio of the remaining increase of a corner pressure to its change by the last refinement.
-CORNER_RISE_FACTOR = 4.0
+CORNER_PRESSURE_RISE_FACTOR = 4.0
 # Fraction of the corner pressure of a coating that cells longer than the coating thickness miss.
-CORNER_LAYER_FRACTION = 0.15
+MISSED_CORNER_PRESSURE_FRACTION = 0.15
 # Ratio of the hidden error of an extrapolated value to that of the finest mesh: 4/3 + 1/3, rounded
 # up.
-EXTRAPOLATED_ERROR_RATIO = 2.0
+HIDDEN_ERROR_EXTRAPOLATION_FACTOR = 2.0
 # Error factor for meshes that do not resolve the rounded ends of a piece.
-UNRESOLVED_ROUNDING_FACTOR = 2.0
-MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
+UNRESOLVED_ROUNDING_ERROR_FACTOR = 2.0
+MEASURES_BETWEEN_PLANE_STATES = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 # Measures without a value where the pressure is unbounded.
-PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
+PRESSURE_PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
 
 
 def estimate_static_measures(
@@ -103,8 +106,8 @@ def estimate_static_measures(
             estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest),
             tolerance,
             all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
-            max(MIN_ERROR, fine.pair.round_off_error),
-            UNRESOLVED_ROUNDING_FACTOR if missed_peak else 1.0,
+            max(MIN_REPORTED_RELATIVE_ERROR, fine.pair.round_off_error),
+            UNRESOLVED_ROUNDING_ERROR_FACTOR if missed_peak else 1.0,
         )
     else:
         error = 0.0 if coarse else None
@@ -118,7 +121,7 @@ def estimate_static_measures(
     if fine.points is not None:
         out |= _select_more_accurate_measures(out, fine.points.measures)
     reason = _reason_for_unbounded_pressure(fine)
-    for name in PEAK_MEASURES if reason else ():
+    for name in PRESSURE_PEAK_MEASURES if reason else ():
         out[name] = replace(out[name], value=None, error=None, reason=reason)
     return out
 
@@ -158,7 +161,7 @@ def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Me
     for name, measure in by_points.items():
         other = by_mesh[name]
         ratio = 1.0
-        if name in PEAK_MEASURES and measure.value and other.value:
+        if name in PRESSURE_PEAK_MEASURES and measure.value and other.value:
             ratio = other.value / measure.value
         if ratio * measure.error < other.error:
             out[name] = measure
@@ -184,7 +187,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch])
     list of Patch
         At least one solution; if it is the only one, its change determines the error.
     """
-    if not fine.model.gap.jumps:
+    if not fine.model.gap.step_edges:
         return coarse
     n_intervals = _count_contact_intervals(fine.active)
     selected = takewhile(
@@ -220,12 +223,12 @@ def _widen_errors_by_corner_pressure(
     """
     pressure = fine.pressure.sigma_n[[0, -1]].max()
     coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()
-    peak, fraction = (measures_by_name[name] for name in PEAK_MEASURES)
-    error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
+    peak, fraction = (measures_by_name[name] for name in PRESSURE_PEAK_MEASURES)
+    error = pressure + CORNER_PRESSURE_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
     if not pressure or error <= peak.error:
         return {}
     peak = replace(peak, error=float(error))
-    return dict(zip(PEAK_MEASURES, (peak, widen_fraction_error(peak, fraction))))
+    return dict(zip(PRESSURE_PEAK_MEASURES, (peak, widen_fraction_error(peak, fraction))))
 
 
 def extrapolate_static_measures(
@@ -233,13 +236,13 @@ def extrapolate_static_measures(
     hidden_errors: Values,
     tolerance: float | None,
     nested: bool = True,
-    min_relative_error: float = MIN_ERROR,
+    min_relative_error: float = MIN_REPORTED_RELATIVE_ERROR,
     error_factor: float = 1.0,
 ) -> Measures:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
-    the hidden error. For an extrapolated value the hidden error counts with EXTRAPOLATED_ERROR_RATIO.
+    the hidden error. For an extrapolated value the hidden error counts with HIDDEN_ERROR_EXTRAPOLATION_FACTOR.
 
     Parameters
     ----------
@@ -271,10 +274,10 @@ def extrapolate_static_measures(
         error = max(error_factor * limit.error, hidden)
         allowed = np.inf
         if tolerance is not None:
-            allowed = compute_allowed_error(tolerance, finest, TABLE[name].floor)
+            allowed = compute_allowed_error(tolerance, finest, PATCH_TABLE[name].floor)
         if limit.extrapolated != finest and error > allowed:
             extrapolated_error = max(
-                error_factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden
+                error_factor * limit.extrapolated_error, HIDDEN_ERROR_EXTRAPOLATION_FACTOR * hidden
             )
             if extrapolated_error < error:
                 value = limit.extrapolated
@@ -284,7 +287,7 @@ def extrapolate_static_measures(
         engine = FINEST_MESH_SOURCE if value == finest else EXTRAPOLATED_SOURCE
         out[name] = make_measure(name, value, error, engine)
 
-    out["loaded_fraction"] = widen_fraction_error(*(out[name] for name in PEAK_MEASURES))
+    out["loaded_fraction"] = widen_fraction_error(*(out[name] for name in PRESSURE_PEAK_MEASURES))
     return out
 
 
@@ -324,7 +327,7 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
         return (
             "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
         )
-    for jump in patch.model.gap.jumps:
+    for jump in patch.model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
         if is_loaded[np.abs(x - jump) <= 1.5 * cell].any():
             return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
@@ -349,7 +352,7 @@ class Resolution(NamedTuple):
     - n_nodes: nodes in contact.
     - longest_cell, edge_cells: longest cell in which the contact ends, and the sum of all such
       cells [m].
-    - edge_offset: position error of a contact edge, in cells.
+    - edge_offset: position error of a contact edge, in cells; None under a smooth asperity layer, where it has no edge.
     - can_rotate: whether the rotation is free.
     - closing: range of the gap plus the largest elastic displacement [m].
     - corner_pressure: pressure [Pa] at loaded corners of a coating that the mesh misses.
@@ -395,12 +398,12 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
         thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
         thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
         fraction = np.minimum(1.0, (all_cells[[0, -1]] / thinnest) ** 2)
-        corner_pressure = float((CORNER_LAYER_FRACTION * sigma[[0, -1]] * fraction).max())
+        corner_pressure = float((MISSED_CORNER_PRESSURE_FRACTION * sigma[[0, -1]] * fraction).max())
 
     first, last = ~active[[0, -1]]
     n_nodes = max(int(active.sum()), 1)
 
-    is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
+    is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES and cells.any()
     edge_offset = None
     if not patch.has_smooth_skin:
         edge_offset = _contact_edge_position_error(pair, longest_cell)
@@ -427,7 +430,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
     to a rounded end shorter than the cells, and to round-off. The error of the pressure peak p is
-    p/(4 n^2) for a contact of n <= MIN_RESOLVED_NODES nodes that ends inside the interface, plus the
+    p/(4 n^2) for a contact of n <= MIN_RESOLVED_CONTACT_NODES nodes that ends inside the interface, plus the
     unresolved pressure of a corner, and at least that of a wedge or what a rounded end would add to p.
 
     Parameters
@@ -447,18 +450,20 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
 
-    # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
+    # Errors add up over the edges of the contact: half of all their cells, but at least the longest one. The centre of a
+    # resolved contact is far more accurate than its edges, because their position errors are alike.
     cell = max(resolution.longest_cell, resolution.edge_cells / 2)
-    is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
+    is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES
     centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
 
     peak_error = resolution.corner_pressure
-    if cell > 0 and n_nodes <= MIN_RESOLVED_NODES:
+    if cell > 0 and n_nodes <= MIN_RESOLVED_CONTACT_NODES:
         peak_error = peak_error + peak / (4 * n_nodes**2)
     peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
 
-    # Displacements have round-off, and a wrong centre times the angle of rotation. A prescribed rotation has neither.
-    displacement = ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
+    # A nodal displacement has the round-off of its terms, and an error of the centre times the angle of rotation. A
+    # prescribed rotation has neither error.
+    displacement = CONTACT_SOLUTION_ROUND_OFF * (abs(finest["approach"]) + resolution.closing)
     displacement += abs(finest["rotation"]) * centre_error
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
 
@@ -477,10 +482,10 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
         "contact_fraction": length_error / length,
         "contact_half_width": width_error / 2,
         "loaded_fraction": peak_error * fraction_per_pressure,
-        "pressure_centre": ROUND_OFF_FRACTION * length + centre_error,
-        "moment": (ROUND_OFF_FRACTION * length + centre_error) * load,
+        "pressure_centre": CONTACT_SOLUTION_ROUND_OFF * length + centre_error,
+        "moment": (CONTACT_SOLUTION_ROUND_OFF * length + centre_error) * load,
         "rotation": displacement / length * resolution.can_rotate,
-        "approach": ROUND_OFF_FRACTION * resolution.closing,
+        "approach": CONTACT_SOLUTION_ROUND_OFF * resolution.closing,
     }
 
 
@@ -491,13 +496,13 @@ def _contact_edge_position_error(pair, cell):
     nodal pressure vanishes. cell: longest cell in which the contact ends [m].
     """
     # The first row of a mesh file has no single height, on which the offset of an edge depends.
-    out = MIN_EDGE_OFFSET if isinstance(pair.grid, TensorGrid) else 0.1
+    out = MIN_CONTACT_EDGE_ERROR_IN_CELLS if isinstance(pair.grid, TensorGrid) else 0.1
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
             cells = min(1.0, cell / grid.coating_thickness)
-            out = max(out, edges.edge_offset(cells, cells, 0.0) * contrast)
+            out = max(out, edges.compute_edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 
@@ -526,10 +531,10 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
         other_plane = "stress"
-        is_certain = ratio >= MIN_PLANE_STRAIN_RATIO
+        is_certain = ratio >= MIN_PLANE_STRAIN_WIDTH_RATIO
     else:
         other_plane = "strain"
-        is_certain = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
+        is_certain = ratio <= 1 / MIN_PLANE_STRAIN_WIDTH_RATIO
     if is_certain:
         return []
 
@@ -561,11 +566,11 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
 def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
     """Format the changes of the measures from the assumed plane state to the opposite one.
 
-    The values are the static measures in the assumed and in the opposite state, by name. Changes of up to 0.1 % are left
-    out. If the approach is given, the load is a measure that changes.
+    `values` and `other_values` are the static measures in the assumed and in the opposite state, by name. Changes of up to
+    0.1 % are left out. If the scene of `patch_model` prescribes the approach, the load is a measure that changes.
     """
     changes = []
-    names = MEASURES_WITH_BAND
+    names = MEASURES_BETWEEN_PLANE_STATES
     if patch_model.loading.approach is not None:
         names = ("normal_load", *names)
     elif approach_change := other_values["approach"] - values["approach"]:
@@ -609,7 +614,7 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures
         if measure.value is not None:
             change = value - other_values[name]
             error = measure.error + errors.convergence_error(
-                change, ratio=ratio, order=errors.MAX_ORDER
+                change, ratio=ratio, order=errors.MAX_CONVERGENCE_ORDER
             )
             out[name] = replace(measure, error=float(error))
     return out

@@ -13,7 +13,13 @@ from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, store
 from .condensed import condense, condense_once
-from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
+from .grids import (
+    COARSE_GRID_DENSITY,
+    MIN_NESTED_MESHES,
+    choose_density,
+    make_base_grids,
+    predict_condensing_seconds,
+)
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
 
@@ -22,7 +28,7 @@ MAX_COLUMNS_WITHOUT_COARSER = 8
 
 
 def solve_with_coarser(
-    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
+    patch_model, tolerance: float, with_errors: bool = True, solved: Patches = ()
 ) -> Patches:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
@@ -42,7 +48,7 @@ def solve_with_coarser(
         Patch to solve, with its mesh, shared mesh or element size.
     tolerance : float
         Relative error that the static measures have to meet.
-    estimate : bool
+    with_errors : bool
         Whether to solve the coarser meshes as well.
     solved : tuple
         Patches of an earlier pass, from fine to coarse, whose meshes are refined further.
@@ -55,8 +61,8 @@ def solve_with_coarser(
     """
     mesh = patch_model.mesh
     if mesh.shared is None and mesh.is_automatic:
-        return solve_on_refined_meshes(patch_model, tolerance, estimate, solved)
-    levels = (mesh.shared or make_given_meshes(patch_model))[: None if estimate else 1]
+        return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
+    levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
     condense_level = condense if mesh.shared is None else condense_once
 
     def solve() -> Patches:
@@ -66,7 +72,7 @@ def solve_with_coarser(
 
     if mesh.shared is None:
         return solve()
-    key = ("patches", store.content_key(patch_model), tolerance, estimate)
+    key = ("patches", store.content_key(patch_model), tolerance, with_errors)
     patches = store.get_or_compute(key, solve)
     has_profile = mesh.is_automatic and patch_model.gap.profile is not None
     if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
@@ -118,11 +124,11 @@ def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshe
 
 
 def solve_on_refined_meshes(
-    patch_model, tolerance: float, estimate: bool = True, solved: Patches = ()
+    patch_model, tolerance: float, with_errors: bool = True, solved: Patches = ()
 ) -> Patches:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
-    At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
+    At least MIN_NESTED_MESHES meshes are solved, because the error follows from the changes between them. Each
     mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
     time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
     measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
@@ -134,7 +140,7 @@ def solve_on_refined_meshes(
         Patch to solve, without a prescribed element size.
     tolerance : float
         Relative error that the static measures have to meet.
-    estimate : bool
+    with_errors : bool
         If False, only the third mesh is solved.
     solved : tuple
         Patches of an earlier pass, from fine to coarse, which are not solved again.
@@ -147,57 +153,57 @@ def solve_on_refined_meshes(
     """
     solved = tuple(patch for patch in solved if patch is not None)
     if solved:
-        grids = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
+        meshes = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
     else:
-        grids = make_base_grids(patch_model).bodies
+        meshes = make_base_grids(patch_model).bodies
     patches = ()
     points = None
     has_tried_points = False
     n_finer = patch_model.mesh.n_finer
     while True:
+        number = len(patches)
+        coarse = patches[0] if patches else None
         patch = None
-        if len(patches) < len(solved):
-            patch = solved[-1 - len(patches)]
-        elif estimate or len(patches) == MIN_LEVELS - 1:
+        if number < len(solved):
+            patch = solved[-1 - number]
+        elif with_errors or number == MIN_NESTED_MESHES - 1:
             try:
-                coarse = patches[0] if patches else None
-                pair = condense(patch_model, *grids)
+                pair = condense(patch_model, *meshes)
                 patch = solve_patch_contact(patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
-                if not patches or patches[0] is None:
+                if coarse is None:
                     raise
-                return with_static_measures((*patches, *(2 - len(patches)) * [None]), tolerance)
+                return with_static_measures((*patches, *(2 - number) * [None]), tolerance)
 
         patches = (patch, *patches)
-        grids = [grid.refine() for grid in grids]
-        if len(patches) < MIN_LEVELS:
+        meshes = [mesh.refine() for mesh in meshes]
+        if len(patches) < MIN_NESTED_MESHES:
             continue
 
         # The solution on the points of the profile is used with all finer meshes.
         patches = with_static_measures(patches, tolerance, points)
-        if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
+        if not with_errors or patch.pressure.outcome is Outcome.NO_CONTACT:
             return patches
 
-        # Points replace the next mesh if its condensation would take too long.
-        is_expensive = is_too_expensive(patch_model, grids)
+        # Points replace a mesh that would take longer than those of a rig. Where they do not converge, they would not do
+        # so beside the next mesh either.
         is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
         if (
-            not is_within
-            and predict_condensing_seconds(grids) > MAX_CONDENSING_SECONDS[False]
-            and not has_tried_points
+            not (is_within or has_tried_points)
+            and predict_condensing_seconds(meshes) > COARSE_GRID_DENSITY.max_condensing_seconds
             and profile_points.can_use_points(patch_model)
         ):
-            meets_tolerance = partial(_meets_tolerance, patches, tolerance)
-            points = solved[0].points if solved else None
-            points = points or profile_points.solve_on_points(patch_model, meets_tolerance)
-            # points that do not converge do not do so on the next mesh either
             has_tried_points = True
+            points = solved[0].points if solved else None
+            if points is None:
+                meets_tolerance = partial(_meets_tolerance, patches, tolerance)
+                points = profile_points.solve_on_points(patch_model, meets_tolerance)
             patches = with_static_measures(patches, tolerance, points)
 
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
-        if is_done or is_expensive:
+        if is_done or is_too_expensive(patch_model, meshes):
             if n_finer == 0:
                 return patches
             n_finer -= 1
@@ -214,7 +220,7 @@ def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
 
 def is_too_expensive(patch_model, bodies) -> bool:
     """Return whether condensing meshes of the pieces takes more CPU time than the finest mesh of a patch may take."""
-    return predict_condensing_seconds(bodies) > MAX_CONDENSING_SECONDS[patch_model.mesh.is_fine]
+    return predict_condensing_seconds(bodies) > choose_density(patch_model).max_condensing_seconds
 
 
 def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:

@@ -13,14 +13,14 @@ from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..results.patch_rows import Values
 from . import skin, store
-from .grids import MIN_LEVELS, make_base_grids
+from .grids import MIN_NESTED_MESHES, make_base_grids
 
 # Tolerance below which a contact that ends inside the interface or at a step needs another
 # refinement level.
-TIGHT_TOL = 2e-3
+MAX_TOL_FOR_FOURTH_MESH = 2e-3
 # Largest ratio of tilt to the opening tilt of bars at which full contact is certain. Elastic pieces
 # with height/length 0.08 to 4 open at 0.77 and above.
-MAX_FULL_CONTACT_TILT = 0.7
+MAX_FULL_CONTACT_TILT_RATIO = 0.7
 
 
 # Stiffness [N/m] of each element in series, or "rigid", by name.
@@ -38,8 +38,8 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
     if not patch_model.mesh.is_automatic:
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
-    has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
-    for _ in range(MIN_LEVELS - 1 + (has_edges and tolerance < TIGHT_TOL)):
+    has_edges = bool(patch_model.gap.step_edges or (contact is not None and contact.places))
+    for _ in range(MIN_NESTED_MESHES - 1 + (has_edges and tolerance < MAX_TOL_FOR_FOURTH_MESH)):
         bodies = [body.refine() for body in bodies]
     return bodies
 
@@ -171,7 +171,7 @@ def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
         ]
     if tilt <= 1:
         part = "the pieces touch everywhere" + ", except perhaps near an edge" * (
-            tilt > MAX_FULL_CONTACT_TILT
+            tilt > MAX_FULL_CONTACT_TILT_RATIO
         )
     else:
         part = f"the pieces touch along about {100 / sqrt(tilt):.0f} % of the length or less"

@@ -16,9 +16,9 @@ from ...contact.press import (
     StripLayout,
     StripModel,
     StripsState,
+    compute_strip_offsets,
     press_strips,
     split_into_strips,
-    strip_offsets,
 )
 from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
@@ -253,7 +253,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     node = int(np.argmax(half_steps))
     bare_fraction = 1.0 if patch.skin_fraction is None else 1 - float(patch.skin_fraction[node])
     cell = float(np.diff(x[node - 1 : node + 2]).min())
-    weight_shift = bare_fraction * edges.edge_offset(cell, cell, 0.0, pair.row) / cell
+    weight_shift = bare_fraction * edges.compute_edge_offset(cell, cell, 0.0, pair.row) / cell
 
     # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
     # node takes the worn depth of its neighbour there, and on the lower side likewise.
@@ -290,7 +290,9 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     pressure = state.pressure
     if skin is not None and skin.law != "linear":
-        pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+        pressure = np.where(
+            pressure > edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max(), pressure, 0.0
+        )
 
     # The fields of a patch are means over its strips; the gap is the smallest one.
     mean_state = ContactState(
@@ -390,7 +392,7 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
     loading = patch_model.loading
     count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
     strip = split_into_strips(pieces, count)
-    offsets = strip_offsets(patch_model.pieces.width, count)
+    offsets = compute_strip_offsets(patch_model.pieces.width, count)
 
     strips = StripModel(
         StripCompliance(strip.normal, added),
@@ -419,4 +421,4 @@ def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
     if skin.law == "linear":
         return np.broadcast_to(1 / (skin.normal_stiffness * state.layout.weight), state.force.shape)
     stiffness = np.maximum(state.stiffness * state.layout.weight, 1e-300)
-    return 1 / np.maximum(stiffness, edges.MIN_RELATIVE_PRESSURE * stiffness.max())
+    return 1 / np.maximum(stiffness, edges.MIN_CONTACT_PRESSURE_RATIO * stiffness.max())

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.active_set import patch_problem
+from ...contact.active_set import make_patch_problem
 from ...contact.conjugate_gradients import fit_motion, solve_by_gradients
 from ...contact.edges import contact_intervals
 from ...contact.half_space.layer import end_compliance, layer_compliance
@@ -32,8 +32,8 @@ from ...model.pieces import make_elastic_layers
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
 from .grids import divide_piece_into_rows
 from .measures import (
-    MIN_EDGE_OFFSET,
-    PEAK_MEASURES,
+    MIN_CONTACT_EDGE_ERROR_IN_CELLS,
+    PRESSURE_PEAK_MEASURES,
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
@@ -42,20 +42,22 @@ from .measures import (
 from .press import PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
-MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
+# Smallest number of refinement levels at which the order of convergence is known.
+MIN_POINT_LEVELS = 3
 # Largest number of points of a level; more would exceed the CPU time of a patch.
 MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
-MAX_WORK = 2.5e7
-MIN_POINTS = 500  # Smallest number of points of the coarsest level.
+MAX_POINT_ITERATIONS = 2.5e7
+MIN_COARSEST_LEVEL_POINTS = 500  # Smallest number of points of the coarsest level.
 # Ratio of the cell length at the ends to the length of the interface, on level 0.
-END_CELL_RATIO = 1e-4
-MIDDLE_CELL_RATIO = 1 / 30  # The same ratio in the middle of the interface.
-CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
-CONTACT_TOL = 3e-8  # Largest relative residual at which the contact problem counts as solved.
+END_CELL_LENGTH_RATIO = 1e-4
+MIDDLE_CELL_LENGTH_RATIO = 1 / 30  # The same ratio in the middle of the interface.
+POINT_CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
+# Largest relative residual at which the contact problem counts as solved.
+CONTACT_RESIDUAL_TOL = 3e-8
 MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
-CORNER_LENGTH_RATIO = 1e-3
+CORNER_REGION_LENGTH_RATIO = 1e-3
 # Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
 MIN_CORNER_PRESSURE_RATIO = 0.2
 # Largest ratio of overlap to elastic displacement of a solved contact.
@@ -136,28 +138,33 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     patch_model : PatchModel
         Patch with a profile, without strips.
     meets_tolerance : callable
-        Function of a PointSolution that ends the refinement. MAX_PROFILE_POINTS and MAX_WORK end it as
+        Function of a PointSolution that ends the refinement. MAX_PROFILE_POINTS and MAX_POINT_ITERATIONS end it as
         well.
 
     Returns
     -------
     PointSolution or None
-        None if fewer than MIN_LEVELS levels are solved.
+        None if fewer than MIN_POINT_LEVELS levels are solved.
     """
     count = _count_first_level_points(patch_model)
     solution = None
     with use_one_blas_thread():
         try:
             # Finer compliances of the free ends on the coarsest points, then the last of them on more and more points
-            ends = [_compute_free_end_compliance(patch_model, level) for level in range(MIN_LEVELS)]
+            ends = [
+                _compute_free_end_compliance(patch_model, level)
+                for level in range(MIN_POINT_LEVELS)
+            ]
             end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
+
+            # The points are doubled until the tolerance is met.
             point_levels = end_levels[-1:]
             while solution is None or not (
                 meets_tolerance(solution) or _is_next_level_expensive(point_levels[-1])
             ):
                 force = point_levels[-1].force
                 point_levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
-                if len(point_levels) >= MIN_LEVELS:
+                if len(point_levels) >= MIN_POINT_LEVELS:
                     estimates = _combine_refinement_series(end_levels, point_levels)
                     solution = PointSolution(
                         estimates, point_levels[-1].surface, point_levels[-1].intervals
@@ -170,13 +177,13 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 def _count_first_level_points(patch_model) -> int:
     """Return the number of points of the coarsest refinement level."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
-    return max(MIN_POINTS, min(round(n_samples / 4), MAX_PROFILE_POINTS // 4))
+    return max(MIN_COARSEST_LEVEL_POINTS, min(round(n_samples / 4), MAX_PROFILE_POINTS // 4))
 
 
 def _is_next_level_expensive(level: PointLevel) -> bool:
     """Return whether the next level would exceed the largest number of points or the largest work."""
     count = level.force.size
-    return 2 * count > MAX_PROFILE_POINTS or 3 * level.n_iterations * count > MAX_WORK
+    return 2 * count > MAX_PROFILE_POINTS or 3 * level.n_iterations * count > MAX_POINT_ITERATIONS
 
 
 def _combine_refinement_series(
@@ -184,10 +191,13 @@ def _combine_refinement_series(
 ) -> Measures:
     """Combine two series of refinements into one estimate of each measure.
 
-    The first series halves the cells at the ends. The second doubles the points, with the shortest
-    of these cells. The extrapolation of the first series and its error are added to the second.
+    The first series (`end_levels`) halves the cells by which the compliance of the free ends is computed. The second
+    (`point_levels`) doubles the points, with the shortest of these cells. With the limits p of the points and e of the
+    ends, and the value e_n of the last end level, a measure is p + (e - e_n); the errors of both limits add up. A peak
+    that may be at a free corner is left out, because the points do not resolve it.
     """
     finest = point_levels[-1]
+    # Errors that a refinement does not show, such as that of a contact of few points.
     hidden_errors = estimate_hidden_errors(finest.resolution, finest.values)
     by_points = extrapolate_static_measures(
         [level.values for level in point_levels], hidden_errors, 0.0
@@ -195,13 +205,13 @@ def _combine_refinement_series(
     by_ends = extrapolate_static_measures([level.values for level in end_levels], {}, 0.0)
     out = {}
     for name, estimate in by_points.items():
-        if name not in PEAK_MEASURES or not finest.has_corner_peak:
+        if name not in PRESSURE_PEAK_MEASURES or not finest.has_corner_peak:
             value = estimate.value + by_ends[name].value - end_levels[-1].values[name]
             error = estimate.error + by_ends[name].error
             out[name] = make_measure(name, value, error, HALF_SPACE_SOURCE)
 
     # The loaded fraction is the mean pressure divided by the peak.
-    peak_name, fraction_name = PEAK_MEASURES
+    peak_name, fraction_name = PRESSURE_PEAK_MEASURES
     peak = out.get(peak_name)
     if peak is not None and peak.value > 0:
         fraction = finest.values[fraction_name] * finest.values[peak_name] / peak.value
@@ -214,8 +224,8 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     """Compute the change of compliance due to the free ends, with the cells of a given level."""
     length = patch_model.pieces.length
     half = length / 2
-    cell = END_CELL_RATIO * length
-    middle_cell = MIDDLE_CELL_RATIO * length
+    cell = END_CELL_LENGTH_RATIO * length
+    middle_cell = MIDDLE_CELL_LENGTH_RATIO * length
 
     # Short columns only at both ends, where the compliance differs from that of infinite layers.
     bands = ((-half, -half, cell), (half, half, cell))
@@ -226,7 +236,7 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
         span=(-half, half),
         max_loaded_length=middle_cell,
         max_length=middle_cell,
-        slope=CELL_GROWTH,
+        slope=POINT_CELL_GROWTH,
     ).scale_cells(0.5**level)
     x = divide_into_columns(layout)
 
@@ -355,11 +365,11 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         n_nodes=int(active.sum()),
         longest_cell=cell * bool(contact_edges),
         edge_cells=cell * len(contact_edges),
-        edge_offset=MIN_EDGE_OFFSET,
+        edge_offset=MIN_CONTACT_EDGE_ERROR_IN_CELLS,
         can_rotate=patch_model.loading.moment is not None,
         closing=float(np.ptp(gap) + largest_deflection),
     )
-    n_corner = max(1, round(CORNER_LENGTH_RATIO * count))
+    n_corner = max(1, round(CORNER_REGION_LENGTH_RATIO * count))
     corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
 
     return PointLevel(
@@ -391,11 +401,11 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     loading = patch_model.loading
     initial_force = None if start is None else np.repeat(start, 2) / 2
     offset = float(gap.min()) if loading.approach is None else loading.approach
-    problem = patch_problem(
+    problem = make_patch_problem(
         x, gap - offset, loading.load, loading.moment, loading.rotational_stiffness
     )
     force, n_iterations = solve_by_gradients(
-        normal, problem, CONTACT_TOL, MAX_CONTACT_ITERATIONS, initial_force
+        normal, problem, CONTACT_RESIDUAL_TOL, MAX_CONTACT_ITERATIONS, initial_force
     )
 
     # Approach and rotation follow from the rigid motion of the loaded points, as far as it is free (least squares).

@@ -22,12 +22,12 @@ from .mesh_levels import solve_with_coarser
 from .values import contact_reaches_steep_end
 
 # Largest Poisson's ratio at which the error estimates are reliable despite volumetric locking.
-MAX_POISSON = 0.499
+MAX_POISSON_RATIO = 0.499
 # Largest strain at which second-order effects may be neglected.
 MAX_SMALL_STRAIN = 0.02
 
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
-MIN_COUPLING_RATIO = 0.02
+MIN_REPORTED_NORMAL_COUPLING_RATIO = 0.02
 
 
 def make_piece_meshes_of_run(model) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
@@ -116,7 +116,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
         materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
     strains = {
         "the peak pressure is {:.3g} of the lowest Young's modulus": (
-            patch.pressure.sigma_n.max(initial=0.0) / min(one.young for one in materials)
+            patch.pressure.sigma_n.max(initial=0.0) / min(material.young for material in materials)
         ),
         "the approach is {:.3g} of the total height of the two pieces": (
             patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)
@@ -138,10 +138,10 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
     # A mesh that the run chose is refined until locking is part of its error; a given mesh is not.
     poisson = max(material.poisson for material in materials)
     is_fixed = not patch_model.mesh.is_automatic
-    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and is_fixed:
+    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON_RATIO and is_fixed:
         warnings.append(
             "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
-            f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON:g}), so the true errors may be "
+            f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON_RATIO:g}), so the true errors may be "
             f"twice the estimates; {_advise_shorter_elements(patch_model)}"
         )
 
@@ -198,7 +198,7 @@ def notes_on_neglected_effects(face) -> list[str]:
         out.append(NEGLECTED_SHEAR_NOTE)
 
     # Coupling of shear and normal motion, which acts only between dissimilar pieces.
-    if patch.pair.coupling > MIN_COUPLING_RATIO:
+    if patch.pair.coupling > MIN_REPORTED_NORMAL_COUPLING_RATIO:
         out.append(
             "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "

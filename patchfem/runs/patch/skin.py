@@ -73,6 +73,6 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
         f"a stiffness of {asperity_layer_stiffness(patch_model, pressure):.3g} Pa/m; Persson's theory, which includes "
         "waves of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
-        f'decay_length = "{sum(peaks.PERSSON) / 2 * skin.rms_height * 1e6:.3g} um"',
+        f'decay_length = "{sum(peaks.DECAY_LENGTH_OVER_RMS_HEIGHT) / 2 * skin.rms_height * 1e6:.3g} um"',
         *remarks,
     ]

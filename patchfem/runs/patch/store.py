@@ -2,7 +2,7 @@
 
 In: a key of plain values, equal for equal patches of different models, and a function that computes
 the result. Out: the result, computed once. For example, all levels and frequencies of a sweep use
-the same patch. The least recently used results are discarded beyond MAX_ENTRIES.
+the same patch. The least recently used results are discarded beyond MAX_STORED_RESULTS.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 # Largest number of cached results. A patch has about seven of them with its measures and elements, and its meshes have four
 # to nine. One of the seven holds up to 300 MB on a fine mesh, most of which are factors of the stiffness.
-MAX_ENTRIES = 48
+MAX_STORED_RESULTS = 48
 
 Key = tuple[Any, ...]  # plain values, the first one naming the kind of the result
 Result = TypeVar("Result")
@@ -25,7 +25,7 @@ def get_or_compute(key: Key, make: Callable[[], Result]) -> Result:
         _RESULTS[key] = _RESULTS.pop(key)
         return _RESULTS[key]
     _RESULTS[key] = result = make()
-    if len(_RESULTS) > MAX_ENTRIES:
+    if len(_RESULTS) > MAX_STORED_RESULTS:
         del _RESULTS[next(iter(_RESULTS))]
     return result
 

@@ -20,14 +20,14 @@ from .measures import max_mesh_error_ratio
 from .store import Key
 
 # Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
-MAX_LAYOUT_CASES = 48
+MAX_SPREAD_LAYOUT_CASES = 48
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 500
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
 # are of second order in their length.
-SINGLE_CASE_TOL = 1e-3
-N_FINER_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
-MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
+SINGLE_CASE_CELLS_TOL = 1e-3
+N_FINER_MESHES_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
+MAX_CELL_LENGTH_FACTOR = 4.0  # Largest factor on the cell lengths.
 
 
 def geometry_key(patch_model) -> Key:
@@ -48,7 +48,7 @@ def geometry_key(patch_model) -> Key:
         mesh.edge_motion,
         file,
         modification_time,
-        gap.jumps,
+        gap.step_edges,
         gap.profile,
         gap.average,
     )
@@ -87,43 +87,56 @@ def choose_shared_meshes(
     cell_factor = 1.0
     is_known = are_all_patches and is_complete
     if is_known and not (patch_model.mesh.edge_motion or has_partial_slip):
-        cell_factor = np.clip((tolerance / SINGLE_CASE_TOL) ** 0.5, 1.0, MAX_CELL_FACTOR)
+        cell_factor = np.clip(
+            (tolerance / SINGLE_CASE_CELLS_TOL) ** 0.5, 1.0, MAX_CELL_LENGTH_FACTOR
+        )
     pairs = _refine_until_tolerance_is_met(
-        cases,
-        grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
-        tolerance,
+        cases, grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))), tolerance
     )
     return tuple(pair.meshes for pair in pairs)
 
 
 def select_distinct_patches(patches) -> tuple[list[PatchModel], bool]:
-    """Select patches that differ from each other by load or surface shape, and those with the extremes of every number.
+    """Select the patches that determine the meshes of a sweep: at most MAX_SPREAD_LAYOUT_CASES, and the extreme ones.
 
-    Of many patches, those at equal distances in their order by these numbers are selected. The result does not depend
-    on the order in which they are given. The second result is True if all patches are selected.
+    Each patch has a row of numbers: its load, the lengths of its surface shapes, and its asperities. Patches with equal
+    rows count once. Of many rows, sorted, equally spaced ones are selected, and those in which any of the numbers is the
+    smallest or the largest. The result does not depend on the order of the patches.
 
     Parameters
     ----------
     patches : sequence of PatchModel
         Patches of equal geometry.
+
+    Returns
+    -------
+    selected : list of PatchModel
+    are_all_patches : bool
+        Whether no row was left out.
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= MAX_LAYOUT_CASES:
+    if len(keys) <= MAX_SPREAD_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
-    even = np.linspace(0, len(keys) - 1, MAX_LAYOUT_CASES).round().astype(int)
+    even = np.linspace(0, len(keys) - 1, MAX_SPREAD_LAYOUT_CASES).round().astype(int)
     selected = np.unique([*even, *numbers.argmin(axis=0), *numbers.argmax(axis=0)])
     return [rows[keys[k]] for k in selected], False
 
 
 def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
-    """Return the load and gap parameters that may differ between patches of one mesh geometry."""
+    """Return the numbers [SI units] that may differ between patches of one mesh geometry: loads, shapes, asperities."""
     interface = patch_model.interface
     shapes = tuple(tuple(part) for _, part in patch_model.gap.shapes)
     skin = tuple(interface.skin or ())
-    own = (astuple(patch_model.loading), patch_model.mesh.slip, interface.strips, shapes, skin)
-    return tuple(_list_numbers(own))
+    parameters = (
+        astuple(patch_model.loading),
+        patch_model.mesh.slip,
+        interface.strips,
+        shapes,
+        skin,
+    )
+    return tuple(_list_numbers(parameters))
 
 
 def _list_numbers(value) -> list[float]:
@@ -158,12 +171,12 @@ def _refine_until_tolerance_is_met(
         From fine to coarse.
     """
     # Partial slip needs shorter cells than the static measures, which decide on the other meshes.
-    n_finer = N_FINER_FOR_SLIP if any(case.mesh.slip is not None for case in cases) else 0
+    n_finer = N_FINER_MESHES_FOR_SLIP if any(case.mesh.slip is not None for case in cases) else 0
     pairs = []
     while True:
         pairs.insert(0, condense_once(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
-        if len(pairs) < grids.MIN_LEVELS:
+        if len(pairs) < grids.MIN_NESTED_MESHES:
             continue
         is_too_large = bodies[0].x.size > MAX_INTERFACE_NODES
         if is_too_large or mesh_levels.is_too_expensive(cases[0], bodies):

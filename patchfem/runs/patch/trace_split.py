@@ -16,8 +16,8 @@ from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
 from ...surface.profile import Profile
-from ...surface.roughness.peaks import PERSSON, trace_moments
-from ...surface.spectrum import ELEMENTS_PER_CURVE, NEGLIGIBLE_LOST, wave_spectrum
+from ...surface.roughness.peaks import DECAY_LENGTH_OVER_RMS_HEIGHT, trace_moments
+from ...surface.spectrum import ELEMENTS_PER_CURVED_WAVE, NEGLIGIBLE_LOST_FRACTION, wave_spectrum
 
 PROFILE_KEY = "contact.profile.file"
 
@@ -103,21 +103,16 @@ def split_trace(
     modulus = patch_model.pieces.surface_modulus
 
     # A wave is resolved if its contact under the mean pressure is longer than an element.
-    is_given = cutoff is not None
-    if not is_given:
+    too_long = f"a cutoff of {format_length(cutoff or 0.0)} is not shorter than the trace; give a shorter one"
+    if cutoff is None:
         spectrum = wave_spectrum(trace)
         cutoff = float(f"{spectrum.shortest_resolved_wave(element, pressure / modulus):.3g}")
-    if is_given and not cutoff < trace.length:
-        raise PatchfemError(
-            f"{trace.source}: a cutoff of {format_length(cutoff)} is not shorter than the trace; give a shorter one",
-            PROFILE_KEY,
+        too_long = (
+            "under this load the contact on every wave is shorter than an element of "
+            f"{format_length(element, 3)}; reduce contact.element_size"
         )
     if not cutoff < trace.length:
-        raise PatchfemError(
-            f"{trace.source}: under this load the contact on every wave is shorter than an element of "
-            f"{format_length(element, 3)}; reduce contact.element_size",
-            PROFILE_KEY,
-        )
+        raise PatchfemError(f"{trace.source}: {too_long}", PROFILE_KEY)
 
     waves = trace_moments(trace, cutoff).fine
     if not waves.slope > 0:
@@ -136,7 +131,17 @@ def split_trace(
 
     # By Persson's theory the layer of the short waves is exponential, with a decay length of a
     # multiple of their rms height.
-    decay_length = sum(PERSSON) / 2 * waves.height
+    decay_length = sum(DECAY_LENGTH_OVER_RMS_HEIGHT) / 2 * waves.height
+    text = _write_layer_tables(patch_model, decay_length, cutoff)
+    return TraceSplit(cutoff, decay_length, closing_pressure, element, pressure, text)
+
+
+def _write_layer_tables(patch_model, decay_length: float, cutoff: float) -> str:
+    """Return the tables of a scene for a trace of which an asperity layer represents the waves below a cutoff.
+
+    `decay_length` [m] is that of the exponential law of the layer, and `cutoff` [m] the longest of its waves.
+    """
+    gap = patch_model.gap
     tables = [
         "[contact.profile]",
         f"file = {json.dumps(str(gap.file), ensure_ascii=False)}",
@@ -147,13 +152,10 @@ def split_trace(
         f'decay_length = "{format_length(decay_length)}"',
         f'cutoff = "{format_length(cutoff)}"',
     ]
-    if interface.has_shear:
+    if patch_model.interface.has_shear:
         # Ridges on equal half-planes are as stiff along x as across it.
         tables.append("tangential_ratio = 1.0")
-
-    return TraceSplit(
-        cutoff, decay_length, closing_pressure, element, pressure, "\n".join(tables) + "\n"
-    )
+    return "\n".join(tables) + "\n"
 
 
 def _level_trace(patch_model, element: float) -> Profile:
@@ -180,5 +182,5 @@ def advise_split(patch_model, element: float) -> list[str]:
     except PatchfemError:
         return []
     spectrum = wave_spectrum(_level_trace(patch_model, element), is_tapered=True)
-    lost = spectrum.lost_fraction(ELEMENTS_PER_CURVE * element)
-    return [split.describe_split()] if lost > NEGLIGIBLE_LOST else []
+    lost = spectrum.lost_fraction(ELEMENTS_PER_CURVED_WAVE * element)
+    return [split.describe_split()] if lost > NEGLIGIBLE_LOST_FRACTION else []

@@ -19,9 +19,9 @@ from .press import Patch
 
 # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
 # smooth.
-MAX_CURVATURE_RATIO = 2.0
+MAX_SMOOTH_PRESSURE_CURVATURE_RATIO = 2.0
 # Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
-MIN_ROUNDING_CELLS = 4
+MIN_CELLS_ON_ROUNDED_END = 4
 
 
 class EdgeValues(NamedTuple):
@@ -87,7 +87,7 @@ def _vertex_height(x, sigma, node: int) -> float:
     # At an end of the interface, the parabola itself stands in for the missing neighbour.
     neighbours = curvatures[np.clip([node - 2, node], 0, curvatures.size - 1)]
     similar = (neighbours / curvature).min()
-    fraction = np.clip(MAX_CURVATURE_RATIO * similar, 0.0, 1.0)
+    fraction = np.clip(MAX_SMOOTH_PRESSURE_CURVATURE_RATIO * similar, 0.0, 1.0)
     return float(fraction * slope**2 / (-4 * curvature))
 
 
@@ -233,7 +233,7 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
 def loaded_nodes(patch: Patch) -> np.ndarray:
     """Return whether each node of each strip carries pressure (s, m), in a smooth asperity layer a fraction of the peak."""
     pressure = patch.state.pressure
-    minimum = edges.MIN_RELATIVE_PRESSURE if patch.has_smooth_skin else 0.0
+    minimum = edges.MIN_CONTACT_PRESSURE_RATIO if patch.has_smooth_skin else 0.0
     return pressure > minimum * pressure.max()
 
 
@@ -253,7 +253,7 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
 
 
 def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
-    """Return the contact edges of one strip, with their fractions between two nodes.
+    """Return the contact edges of one strip of a solved patch, with their positions between two nodes.
 
     `strip` is the number of the strip, 0 without strips, and `pressed` the factor of its nodes in contact.
     """
@@ -263,7 +263,7 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
     # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if patch.has_smooth_skin:
         pressure = state.pressure
-        threshold = edges.MIN_RELATIVE_PRESSURE * pressure.max()
+        threshold = edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max()
         ends = edges.find_pressure_edges(x, pressure[strip], threshold)
     else:
         ends = edges.find_edges(
@@ -277,7 +277,7 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges
         )
 
     # An edge next to a step of the gap lies on the step.
-    jumps = patch.model.gap.jumps
+    jumps = patch.model.gap.step_edges
     if not jumps:
         return ends
     gap = np.broadcast_to(patch.unloaded_gap, state.gap.shape)[strip]
@@ -352,7 +352,7 @@ def unresolved_edge_rounding_pressure(patch: Patch) -> float:
             continue
         stress_intensity = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
         peak_width, peak = contact.rounded_corner_contact(stress_intensity, radius, modulus)
-        if MIN_ROUNDING_CELLS * cell > peak_width:
+        if MIN_CELLS_ON_ROUNDED_END * cell > peak_width:
             largest = max(largest, peak)
     return largest
 

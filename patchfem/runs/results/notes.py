@@ -20,11 +20,11 @@ from .result import Settings
 # warning.
 MAX_WORK_CHECK = 1e-3
 # Largest ratio of created to exchanged energy without a warning.
-MAX_CREATED_FRACTION = 1e-6
+MAX_CREATED_ENERGY_FRACTION = 1e-6
 # Largest ratio of the slip during the formation of a bond to the bond length without a warning.
-MAX_FORMING_RATIO = 0.3
+MAX_BOND_FORMING_SLIP_RATIO = 0.3
 # Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
-MIN_EXCESS_RATIO = 1e-3
+MIN_REPORTED_FORCE_EXCESS_RATIO = 1e-3
 MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
 
 
@@ -75,20 +75,20 @@ def _warn_of_infinite_traction(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
-    """Warn of the printed law if bonds slide by more than MAX_FORMING_RATIO of their length while they form."""
+    """Warn of the printed law if bonds slide by more than MAX_BOND_FORMING_SLIP_RATIO of their length while they form."""
     law = find_bonds(facts.model)
     if law is None or law.reading != "report":
         return
     ratio = parameters.growth_path_ratio(law, facts.speed)
-    if ratio > MAX_FORMING_RATIO:
-        # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
+    if ratio > MAX_BOND_FORMING_SLIP_RATIO:
+        # At this growth path, growth_path_ratio(law, speed) equals MAX_BOND_FORMING_SLIP_RATIO.
         max_growth_path = law.ratio / (
-            1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / facts.speed**2
+            1 / (MAX_BOND_FORMING_SLIP_RATIO * law.length) - law.rest_growth / facts.speed**2
         )
         yield (
             f"at the peak speed of {facts.speed:.3g} m/s a bond slides by {ratio:.2g} of its length while it forms (limit "
-            f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
-            f'friction.slip_growth = "{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
+            f"{MAX_BOND_FORMING_SLIP_RATIO:g}), so the law as printed in the report gives less friction than eqs. "
+            f'2.18-2.21; set friction.slip_growth = "{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
         )
 
 
@@ -107,11 +107,11 @@ def _warn_of_creep(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_created_energy(facts: LawFacts) -> Iterator[str]:
-    """Warn if the printed law of the 1985 report has created more than MAX_CREATED_FRACTION of the work exchanged."""
+    """Warn if the printed law of the 1985 report has created more than MAX_CREATED_ENERGY_FRACTION of the work exchanged."""
     friction = facts.model.friction
     if friction is None or friction.reading != "report":
         return
-    if facts.created > MAX_CREATED_FRACTION * facts.exchanged:
+    if facts.created > MAX_CREATED_ENERGY_FRACTION * facts.exchanged:
         percent = 100 * facts.created / facts.exchanged
         yield (
             f"the law as printed in the report created {facts.created:.3g} J, which is {percent:.2g} % of the work "
@@ -178,7 +178,7 @@ def _note_on_growth(facts: LawFacts) -> Iterator[str]:
             "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
             "friction.order <= 1 to keep friction near mu_s N"
         )
-    if (facts.force_ratio or 0.0) > 1 + MIN_EXCESS_RATIO:
+    if (facts.force_ratio or 0.0) > 1 + MIN_REPORTED_FORCE_EXCESS_RATIO:
         yield (
             f"the friction force reaches {facts.force_ratio:.3g} times mu_s N: the bond length grows during the run, and "
             "bonds that formed while the bond length was small then break later; to keep the friction force at "

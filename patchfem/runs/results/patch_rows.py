@@ -12,7 +12,7 @@ Measures = dict[str, Measure]  # by name
 Arrays = dict[str, np.ndarray]  # fields, histories or columns by name
 Values = dict[str, float]  # measures or other numbers by name, in SI units
 
-ROWS = (
+PATCH_MEASURE_ROWS = (
     MeasureDefinition(
         "normal_load",
         "N",
@@ -181,10 +181,10 @@ FINEST_MESH_SOURCE = "finite elements, finest mesh"
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
 HALF_SPACE_SOURCE = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"
-TABLE = {row.name: row for row in ROWS}
+PATCH_TABLE = {row.name: row for row in PATCH_MEASURE_ROWS}
 # Measures whose errors control the refinement of the mesh.
-MESH_MEASURES = tuple(row.name for row in ROWS if row.has("mesh"))
-POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].minimum == 0.0)
+MESH_MEASURES = tuple(row.name for row in PATCH_MEASURE_ROWS if row.has("mesh"))
+POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if PATCH_TABLE[name].minimum == 0.0)
 
 
 def make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
@@ -199,7 +199,7 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
     engine : str
         Method that computed the value.
     """
-    row = TABLE[name]
+    row = PATCH_TABLE[name]
     error = None if error is None else float(error)
     return Measure(float(value), row.unit, error, row.floor, engine=engine)
 

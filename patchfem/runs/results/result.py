@@ -19,11 +19,18 @@ from ...response import rows
 from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
 
-N_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
+N_INTERFACE_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
 # Change of slip / largest change; above it, a node without friction limit slips.
-MIN_SLIP_FRACTION = 1e-2
+MIN_SLIP_CHANGE_FRACTION = 1e-2
 TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 # Folder of an absolute path at the start of a remark.
+# Outcomes of motions without a periodic cycle.
+UNBOUNDED_OUTCOMES = (
+    Outcome.GROWS,
+    Outcome.EXCEEDS_TRAVEL,
+    Outcome.LEAVES_GROOVES,
+    Outcome.NOT_CONVERGED,
+)
 _FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
 
 
@@ -262,11 +269,11 @@ def describe_measure(name: str, numbered_kind: str = "interface") -> str:
     A numbered name such as slip_amplitude_2 belongs to the second interface, or to the second of
     the objects that `numbered_kind` names.
     """
-    if name in patch_rows.TABLE:
-        return patch_rows.TABLE[name].text
+    if name in patch_rows.PATCH_TABLE:
+        return patch_rows.PATCH_TABLE[name].text
 
     first = rows.remove_interface_number(name)
-    row = patch_rows.TABLE.get(first) or rows.find_definition(name)
+    row = patch_rows.PATCH_TABLE.get(first) or rows.find_definition(name)
     return row.text + (
         "" if first == name else f"; of {numbered_kind} {name.removeprefix(first + '_')}"
     )
@@ -314,10 +321,10 @@ class SlipRule(NamedTuple):
     starts_at_rest: bool = False
 
 
-GRADUAL_SLIP = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
+GRADUAL_SLIP_RULE = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
 
 
-def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP) -> Arrays:
+def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP_RULE) -> Arrays:
     """Return the fields of an interface in all frames of a motion, after the pressed state.
 
     Parameters
@@ -353,7 +360,7 @@ def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP)
     }
 
 
-def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
+def compute_status(active, tau, slip, rule=GRADUAL_SLIP_RULE) -> np.ndarray:
     """Return the contact status of the nodes in each frame: 0 for open, 1 for stick, 2 for slip.
 
     A node slips if its slip has changed since the previous frame. In the first frame of a motion after earlier
@@ -371,7 +378,7 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
         moved[1] = 0.0
-    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
+    min_fraction = MIN_SLIP_CHANGE_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
     slips = moved > min_fraction * max(moved.max(), 1e-300)
     if rule.limit is not None and not rule.starts_at_rest:
         slips[1] = np.abs(tau[1]) >= (1 - TRACTION_ROUND_OFF) * rule.limit

@@ -10,7 +10,7 @@ from ...core import Outcome
 from ...formatting import format_length
 
 # Largest ratio of displacement to contact length at which the unchanged pressure is accurate.
-MAX_SLIDE_FRACTION = 0.1
+MAX_SLIDE_TO_LENGTH_RATIO = 0.1
 
 
 def find_max_displacement(slide) -> float:
@@ -36,12 +36,12 @@ def warn_of_large_slide(patch, slide) -> list[str]:
     """
     largest = find_max_displacement(slide)
     contact = measure_contact_length(patch)
-    if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
+    if not contact > 0 or largest < MAX_SLIDE_TO_LENGTH_RATIO * contact:
         return []
     return [
         f"the slide amplitude, {format_length(largest, 3)}, is {largest / contact:.2g} of the "
         f"contact length {format_length(contact)} "
-        f"(limit {MAX_SLIDE_FRACTION:g}): the computation keeps the pressure unchanged and "
+        f"(limit {MAX_SLIDE_TO_LENGTH_RATIO:g}): the computation keeps the pressure unchanged and "
         "neglects that the ends of the pieces "
         "no longer overlap"
     ]

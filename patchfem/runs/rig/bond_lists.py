@@ -24,20 +24,21 @@ from ..bench import engine as bench_engine
 from .numerics import Numerics
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
-DECAYED_FRACTION = 1e-2
+DECAYED_STROKE_RATIO = 1e-2
 # Assumed ratio of the stroke of a block held by the printed law to the stroke of the drive
 # (measured: 1e-2 to 1e-4).
 STICKING_STROKE_RATIO = 1e-4
 # Smallest ratio of friction limit to drive force (D) at which a block counts as stuck. Above it 0.6
 # or more strips remain per step, compared with 0.06 at D = 1.06 and 0.28 at D = 1.4.
-MIN_STUCK_RATIO = 2.0
+MIN_STUCK_FORCE_RATIO = 2.0
 # Largest number of strips per step at which shorter steps are useful. With more strips the motion
 # reverses every few steps, and shorter steps only lengthen the list.
-MAX_STRIPS_PER_STEP = 0.1
+MAX_LISTED_STRIPS_PER_STEP = 0.1
 # Largest number of strips, at about one per step, at which steps are halved again; each halving
 # makes the run four times as expensive.
-MIN_LONG_LIST = 500
-MAX_BOND_PHASE = 2.0  # Largest phase [rad] per step of the vibration of the block on its bonds.
+MAX_HALVED_STRIPS = 500
+# Largest phase [rad] per step of the vibration of the block on its bonds.
+MAX_BOND_VIBRATION_PHASE = 2.0
 
 
 @lru_cache(maxsize=8)
@@ -47,7 +48,7 @@ def choose_bond_summation(model: Model, numerics: Numerics):
     A law that needs no bond list has the recursion, which is exact. Otherwise the method depends on
     the stroke, which is four times the amplitude that follows from the speed scale and the frequency
     of the drive, or from the stiffness of the bonds if they hold the block. If the motion decays
-    (release, step), the stroke is reduced to DECAYED_FRACTION, because a list of all bonds would need
+    (release, step), the stroke is reduced to DECAYED_STROKE_RATIO, because a list of all bonds would need
     too much memory. For a block held by the printed law it is reduced to STICKING_STROKE_RATIO.
     """
     if numerics.choice is not None:
@@ -70,9 +71,10 @@ def has_bond_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Choose the bond summation for the requested engine, which may be "auto".
+    """Choose the bond summation (`friction.bonds`) for the requested engine, which may be "auto".
 
-    `stretch` is the displacement of a block held by its bonds, in bond lengths. `numerics` has the steps per cycle.
+    The error of a summation depends on the stroke between two reversals: 4 times the displacement amplitude of the drive,
+    but at most that of a block held by its bonds (`stretch`), both in bond lengths. `numerics` has the steps per cycle.
     """
     law = model.bonds
     accuracy = model.accuracy
@@ -81,7 +83,7 @@ def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: floa
     if is_stuck_by_printed_law(model):
         ratio = STICKING_STROKE_RATIO
     elif drive.kind == "free" or drive.waveform.is_step:
-        ratio = DECAYED_FRACTION
+        ratio = DECAYED_STROKE_RATIO
     amplitude = model.speed_scale / find_drive_omega(drive.signal) / law.length
     stroke = max(4 * ratio * min(amplitude, stretch), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
@@ -93,13 +95,13 @@ def _estimate_held_displacement(model: Model) -> float:
     """Return the displacement, in bond lengths, of a driven block that sticks on its bonds.
 
     The stiffness of the bonds is mu_s N/eps_0. The result is inf if the friction limit is below
-    MIN_STUCK_RATIO times the holding force, or if the printed law gives the bonds no stiffness.
+    MIN_STUCK_FORCE_RATIO times the holding force, or if the printed law gives the bonds no stiffness.
     """
     f = model.friction
     if f.reading == "report" or model.rig.drive.kind == "free":
         return inf
     ratio = _find_holding_ratio(model)
-    return 1 / ratio if ratio >= MIN_STUCK_RATIO else inf
+    return 1 / ratio if ratio >= MIN_STUCK_FORCE_RATIO else inf
 
 
 def _find_holding_ratio(model: Model) -> float:
@@ -119,7 +121,7 @@ def is_stuck_by_printed_law(model: Model) -> bool:
         and model.friction is not None
         and law_has_trait(model.friction.law, "bonds")
         and model.friction.reading == "report"
-        and _find_holding_ratio(model) >= MIN_STUCK_RATIO
+        and _find_holding_ratio(model) >= MIN_STUCK_FORCE_RATIO
     )
 
 
@@ -166,17 +168,17 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters) -> bool:
         Counters of the run, including "strips".
     """
     strips = counters.get("strips", 0.0)
-    if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
+    if strips <= MAX_HALVED_STRIPS or model.bonds.reading != "report":
         return False
     if sum_form(model.bonds) == FORM_GROWING:
         return is_stuck_by_printed_law(model)
-    return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
+    return strips > MAX_LISTED_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
 def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     """Raise Missing if a bond list is summed and the time step does not resolve the vibration of the block on its bonds.
 
-    The condition is sqrt(k_t/m) dt <= MAX_BOND_PHASE. With a longer step the motion would be
+    The condition is sqrt(k_t/m) dt <= MAX_BOND_VIBRATION_PHASE. With a longer step the motion would be
     meaningless, and every step would leave permanent bonds, so that the CPU time would increase
     with the square of the number of steps.
     """
@@ -188,7 +190,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     mobility = float((modes.slide**2).sum()) / modes.mass
     omega = sqrt(f.static * model.nominal_load / f.bond_length * mobility)
     phase = omega * drive.period / numerics.steps
-    if phase > MAX_BOND_PHASE:
+    if phase > MAX_BOND_VIBRATION_PHASE:
         wanted = ceil(omega * drive.period)
         raise Missing(
             f"a time step of {drive.period / numerics.steps:.2g} s is too long for the vibration of the "

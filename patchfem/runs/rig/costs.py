@@ -21,21 +21,19 @@ from ...structure.drive_sizes import find_max_frequency_ratio
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
-MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
-HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
-MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
-STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
-STEPS_PER_EVENT = 3.0
-MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
-MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
-MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
+MAX_HYBRID_SECONDS_UNRESOLVED = 60.0  # The same if time steps cannot resolve the modes.
+# Steps of a run and its comparison run, relative to those of the run.
+HYBRID_COST_FACTOR = 1.7
+# Smallest number of steps of `hybrid` per shortest period of the drive.
+MIN_STEPS_PER_SHORTEST_PERIOD = 12
+HYBRID_STEPS_PER_RADIAN = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
+HYBRID_STEPS_PER_EVENT = 3.0
+# Largest stable step of `hybrid` in relaxation times of a law.
+MAX_HYBRID_STEP_RELAXATION_TIMES = 4.0
+MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
+MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 # Keys of [accuracy] that select constant time steps.
-MARCH_SETTINGS = (
-    "steps_per_cycle",
-    "tail",
-    "merge",
-    "shear_modes",
-)
+MARCH_ACCURACY_KEYS = ("steps_per_cycle", "tail", "merge", "shear_modes")
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -58,10 +56,10 @@ def required_steps_per_cycle(model: Model) -> int:
 def steps_per_cycle(model: Model) -> int:
     """Return the steps per cycle of a time integration, from the scene or else from the tolerance.
 
-    The tolerance selects between 100 and MAX_MARCH_STEPS steps.
+    The tolerance selects between 100 and MAX_MARCH_STEPS_PER_CYCLE steps.
     """
     return model.accuracy.steps_per_cycle or min(
-        max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
+        max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS_PER_CYCLE
     )
 
 
@@ -134,13 +132,14 @@ def estimate_hybrid_steps(model: Model) -> float:
 
     # The explicit method follows the fastest decay of a law.
     rate = max(
-        [_estimate_decay_rate(model, one, mobility) for one in rig.friction.interfaces] or [0.0]
+        [_estimate_decay_rate(model, interface, mobility) for interface in rig.friction.interfaces]
+        or [0.0]
     )
     rate += float(np.abs(modes.damping_matrix).sum(axis=1).max())
     return (
-        max(n_rows or MIN_STEPS * n_tones, STEPS_PER_PHASE * phase)
-        + rate * period / MAX_STEP_RELAXATION_TIMES
-        + STEPS_PER_EVENT * events
+        max(n_rows or MIN_STEPS_PER_SHORTEST_PERIOD * n_tones, HYBRID_STEPS_PER_RADIAN * phase)
+        + rate * period / MAX_HYBRID_STEP_RELAXATION_TIMES
+        + HYBRID_STEPS_PER_EVENT * events
     )
 
 
@@ -169,21 +168,21 @@ def estimate_hybrid_seconds(model: Model) -> float:
     n_interfaces = len(model.rig.modes.interfaces) if model.rig.friction.interfaces else 0
     each = (
         cost_model.HYBRID_STEP_SECONDS
-        + cost_model.HYBRID_MODES_SECONDS * n_modes**2
-        + cost_model.HYBRID_INTERFACES_SECONDS * n_interfaces**2
+        + cost_model.HYBRID_MODE_PAIR_SECONDS * n_modes**2
+        + cost_model.HYBRID_INTERFACE_PAIR_SECONDS * n_interfaces**2
     )
-    return HYBRID_RUNS * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
+    return HYBRID_COST_FACTOR * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
 
 
 def estimate_march_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
     count = estimate_elements(model).count
     n_interfaces = len(model.rig.friction.interfaces)
-    step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
+    step = cost_model.MARCH_STEP_SECONDS + cost_model.MARCH_ELEMENT_STEP_SECONDS * count
     return (
         1.75
         * model.rig.drive.cycles
-        * (cost_model.CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
+        * (cost_model.MARCH_CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
     )
 
 
@@ -198,9 +197,9 @@ def prefers_time_steps(model: Model) -> bool:
         law_has_trait(law.numbers.law, "set-valued") and not law.partial_slip
         for law in model.rig.friction.interfaces
     )
-    has_setting = any(getattr(accuracy, key) is not None for key in MARCH_SETTINGS)
+    has_setting = any(getattr(accuracy, key) is not None for key in MARCH_ACCURACY_KEYS)
     if not is_rigid and (has_setting or accuracy.quadrature not in ("auto", "recursion")):
         return True
-    is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
-    seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
+    is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS_PER_CYCLE
+    seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_HYBRID_SECONDS_UNRESOLVED
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))

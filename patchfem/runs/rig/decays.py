@@ -18,31 +18,30 @@ from ...hybrid import quasi_static
 from ...hybrid.cases import UndrivenRig
 from ...response.coarser import ComparisonRuns
 from ...response.decay_curve import (
-    MIN_HALF_CYCLE,
+    MIN_HALF_CYCLE_RATIO,
     DecayCurve,
     fit_decay_curve,
     locate_reversals,
     make_half_cycles,
 )
-from ...response.errors import MAX_ORDER, convergence_error
-from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
+from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_error
+from ...slip.mesh_correction import ERROR_TO_SPREAD_CHANGE, spread_elements
 from ..patch import faces
 from . import joints, numerics
 from .solution import Solution
 
-UNSUPPORTED_CONTACTS = (
+CONTACTS_WITHOUT_STATIC_CURVE = (
     "the contact slides on grooves",
     "the normal load changes",
     "the strips of the patch slide independently of one another",
 )
-NO_LOOP_REASON = (
+UNKNOWN_LOOP_REASON = (
     "the hysteresis loop of this friction law is not known without a computation in time"
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
-MAX_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
-MESH_AMPLITUDES_PER_DECADE = (
-    16  # Number of amplitudes per decade at which the mesh error is computed.
-)
+MAX_DECAY_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
+# Number of amplitudes per decade at which the mesh error is computed.
+MESH_AMPLITUDES_PER_DECADE = 16
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
@@ -50,14 +49,14 @@ def compute_decay_curve(solution: Solution) -> DecayCurve | None:
 
     The errors are those of the evaluation plus the changes in the coarse runs at the same
     amplitude. They are infinite outside the range of a coarse run. Points with a relative error
-    above MAX_POINT_ERROR are removed.
+    above MAX_DECAY_POINT_ERROR are removed.
     """
     curve = _measure_decay_curve(solution)
     if not curve.time.size:
         return None
     curve = _add_coarse_run_errors(curve, solution)
-    known = (curve.frequency_error <= MAX_POINT_ERROR * curve.frequency) & (
-        curve.damping_error <= MAX_POINT_ERROR * np.abs(curve.damping)
+    known = (curve.frequency_error <= MAX_DECAY_POINT_ERROR * curve.frequency) & (
+        curve.damping_error <= MAX_DECAY_POINT_ERROR * np.abs(curve.damping)
     )
     return curve.select(known) if known.any() else None
 
@@ -87,7 +86,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
     zero = np.zeros(time.size)
     ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
-    ringing = ringing.select(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
+    ringing = ringing.select(amplitude > MIN_HALF_CYCLE_RATIO * np.abs(motion.output).max())
     slipping = half_cycles.select(half_cycles.time < mode.begin)
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
@@ -198,9 +197,10 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     """
     best = compute(fine)
     changes = (compute(other) - best for other in coarse)
-    by_meshes = sum(convergence_error(change, order=MAX_ORDER) for change in changes)
+    by_meshes = sum(convergence_error(change, order=MAX_CONVERGENCE_ORDER) for change in changes)
     return np.fmax(
-        SPREAD_FACTOR * np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes
+        ERROR_TO_SPREAD_CHANGE * np.abs(compute(fine.with_elements(_spread_elements)) - best),
+        by_meshes,
     )
 
 
@@ -247,7 +247,7 @@ def estimate_decay_mesh_errors(
 
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
-        return unknown._replace(reason=UNSUPPORTED_CONTACTS[moves.index(True)])
+        return unknown._replace(reason=CONTACTS_WITHOUT_STATIC_CURVE[moves.index(True)])
 
     # Static loops on both meshes differ by what the mesh resolves, unlike decays (module docstring).
     try:
@@ -261,7 +261,7 @@ def estimate_decay_mesh_errors(
     except NotConverged as reason:
         return unknown._replace(reason=str(reason))
     except PatchfemError:
-        return unknown._replace(reason=NO_LOOP_REASON)
+        return unknown._replace(reason=UNKNOWN_LOOP_REASON)
 
     known = np.isfinite(error).all(axis=0)
     if not known.any():
@@ -333,10 +333,10 @@ def describe_unknown_mesh_error(reason: str, coarser_runs: ComparisonRuns) -> st
 
 
 def _find_nearest_mode(modes, laws, frequency: float) -> int:
-    """Return the index of the mode with stuck interfaces that is nearest in frequency.
+    """Return the index of that mode of a rig with stuck interfaces whose natural frequency is nearest to `frequency`.
 
-    Modes that do not move the output are skipped. `laws` are the friction laws of the interfaces with their stiffness in
-    stick, and `frequency` is in [Hz].
+    `modes` are those of the structure alone. Stuck modes that do not move the output are
+    skipped. `laws` are the friction laws of the interfaces with their stiffness in stick, and `frequency` is in [Hz].
     """
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):

@@ -31,11 +31,12 @@ from .costs import prefers_time_steps
 from .solution import first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
-MERGE_WIDTH_FACTOR = 0.5
+COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
+# Ratio of the neglected tail in the comparison run to that in the run itself.
+COMPARISON_TAIL_FACTOR = 0.1
 
 
 class Engine(NamedTuple):
@@ -102,8 +103,9 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
 
 
 def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
-    """List numerical settings with a coarser mesh: of the patch of [contact], or of one interface patch each.
+    """List numerical settings in which one patch of a model has a coarser mesh: that of [contact], or of an interface.
 
+    Interfaces with equal patches are coarsened together.
     `numerics` are the settings of the run, and `has_coarse_patch` tells whether the patch of [contact] matters.
     """
     meshes = [replace(numerics, coarse_patch=True)] * has_coarse_patch
@@ -199,7 +201,9 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
         finer = replace(
-            choice, merge=MERGE_WIDTH_FACTOR * choice.merge, tail=TAIL_FACTOR * choice.tail
+            choice,
+            merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
+            tail=COMPARISON_TAIL_FACTOR * choice.tail,
         )
         narrow = replace(quarter, choice=finer)
         same = replace(quarter, choice=choice)

@@ -15,12 +15,7 @@ from ...response.measures import Values, relative_gap
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
 from .levels import run_levels
-from .solution import (
-    Fields,
-    Solution,
-    first_interface_load,
-    first_mode_stiffness,
-)
+from .solution import Fields, Solution, first_interface_load, first_mode_stiffness
 
 
 class RunEvaluator:
@@ -113,7 +108,7 @@ class RunEvaluator:
         drive : optional
             Drive of the run; default: that of the model.
         ledger : (4, k), optional
-            Friction work and energies over time [J].
+            Friction work, and stored, dissipated and created energy [J] at the samples of the whole run.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -141,9 +136,9 @@ class RunEvaluator:
         # The amplitude of a decay is that of its last complete cycle, not of the whole window.
         if model.rig.drive.kind == "free":
             motion = (window.time, window.output, window.output_rate)
-            swing = measure_last_cycle_amplitude(*motion, drive.period)
-            if swing is not None:
-                values[AMPLITUDE] = swing
+            amplitude = measure_last_cycle_amplitude(*motion, drive.period)
+            if amplitude is not None:
+                values[AMPLITUDE] = amplitude
         return values
 
     def is_stuck(self, run) -> bool:

@@ -11,12 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
-from ...core import (
-    IntegratedMeasures,
-    NotConverged,
-    Outcome,
-    Response,
-)
+from ...core import IntegratedMeasures, NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -31,20 +26,13 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import MIN_SLIDE_RANGE, Values
+from ...response.measures import MAX_RESTING_SLIDE_RANGE, Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import find_definition, select_names
-from ...structure.drive_sizes import (
-    choose_samples_per_cycle,
-    is_sinusoidal,
-)
+from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import engines, strips
-from .evaluation import (
-    RunEvaluator,
-    compute_sampled_work,
-    compute_work_check,
-)
+from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
 from .solution import (
     Fields,
@@ -59,12 +47,12 @@ LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
-SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
+SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 # Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
-STRIP_GROUPS = ("curve", "run", "error")
+STRIP_MEASURE_GROUPS = ("curve", "run", "error")
 # Outcomes of motions that the engine ends early, by its status
-EARLY_ENDS = {
+EARLY_OUTCOME_BY_STATUS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
 }
@@ -159,7 +147,7 @@ def run_from_event_to_event(
     begin = perf_counter()
     joints = make_joints(model, numerics, patch)
     prepare = {"reduce": perf_counter() - begin}
-    compiled.load("hybrid.engine_kernels", say)
+    compiled.load_compiled_module("hybrid.engine_kernels", say)
     return LumpedEvaluator(model, numerics, patch, joints).solve(frames, progress, prepare)
 
 
@@ -220,7 +208,7 @@ class LumpedEvaluator(RunEvaluator):
         motion = self._run(drive, cycles, times.samples, travel, state)
 
         # Why the motion ended early, as an outcome or as an error.
-        outcome = EARLY_ENDS.get(motion.status)
+        outcome = EARLY_OUTCOME_BY_STATUS.get(motion.status)
         message = ""
         if outcome is Outcome.LEAVES_GROOVES:
             message = self.model.grooves.describe_lift(motion.time)
@@ -314,7 +302,7 @@ class LumpedEvaluator(RunEvaluator):
         else:
             # Differences of samples at nearly the same time are round-off, except at a jump of the force; the last sample
             # is kept.
-            is_late = np.diff(time) > SAME_TIME_TOL * drive.period
+            is_late = np.diff(time) > SAME_SAMPLE_TIME_TOL * drive.period
             is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
 
@@ -438,7 +426,7 @@ class LumpedEvaluator(RunEvaluator):
             return {"integrated": IntegratedMeasures(values)}
 
         names = ["slip_start_phase", "energy_stored"]
-        for group in STRIP_GROUPS:
+        for group in STRIP_MEASURE_GROUPS:
             names += select_names(group)
         # The yaw does work in addition to that of the mean displacement.
         work = np.ptp(window.extra["ledger"][0, [0, -1]])
@@ -454,7 +442,7 @@ class LumpedEvaluator(RunEvaluator):
     def _limit_loop_measures(self, run) -> dict[str, None]:
         """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
         missing = {}
-        if np.ptp(run.window.slide) <= MIN_SLIDE_RANGE:
+        if np.ptp(run.window.slide) <= MAX_RESTING_SLIDE_RANGE:
             names = ("equivalent_stiffness", "secant_stiffness", "harmonic_force_ratio")
             missing = dict.fromkeys((*names, "equivalent_damping"))
         elif not first_mode_stiffness(self.model, run.window):

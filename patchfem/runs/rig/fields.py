@@ -14,7 +14,7 @@ from ..bench import averaged_law
 from ..bench import shear as bench_shear
 from ..results.patch_rows import Arrays
 from ..results.result import (
-    N_FRAMES,
+    N_INTERFACE_FRAMES,
     SlipRule,
     collect_rest_frame,
     compute_status,
@@ -48,7 +48,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     snapshots = solution.snapshots
     n_samples = len(window.time)
     first = max(0, n_samples - 1 - n_samples // numerics.window)
-    samples = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
+    samples = np.linspace(first, n_samples - 1, N_INTERFACE_FRAMES).round().astype(int)
 
     def list_frames(name: str) -> np.ndarray:
         """Return time [s], slide [m], force [N] or slip [m] in each frame (f,)."""
@@ -71,7 +71,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         reduction = getattr(solution.contact, "reduction", None)
         length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        tau, local = fields.element_fields(patch, reduction, states, length)
+        tau, local = fields.compute_element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
         force = list_frames("force")

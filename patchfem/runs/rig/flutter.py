@@ -13,15 +13,15 @@ from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...effects import law_has_trait
 from ...formatting import format_length
 from ...hybrid import free_motions
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response.measures import Measures
-from ...response.rows import TABLE
+from ...response.rows import MOTION_TABLE
 from .engines import find_obstacle_of_map
 from .joints import make_undriven_rig
 from .solution import first_interface_load
 
 FLUTTER_MEASURE = "flutter_amplitude"
-NO_INTERFACE_NOTE = (
+NO_MOVING_INTERFACE_NOTE = (
     "no mode with negative damping moves an interface, so friction cannot dissipate the energy "
     "of such a mode"
 )
@@ -34,7 +34,7 @@ NO_SMALLER_CYCLE_NOTE = (
     "no unstable limit cycle was found at amplitudes up to "
     f"{free_motions.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), and motions below {{}} could not be followed"
 )
-UNSUPPORTED_LAW_REASON = (
+UNSUPPORTED_BOND_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
     "bond length and pieces that are rigid in shear"
 )
@@ -42,7 +42,7 @@ NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
     "gains"
 )
-RIGID_MODE_REASON = (
+RIGID_FRICTION_REASON = (
     "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz"
 )
 
@@ -59,18 +59,22 @@ class Flutter(NamedTuple):
 
 
 def compute_flutter_amplitude(run) -> Flutter:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig."""
+    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig, above which a motion grows.
+
+    `run` is the `rig.CoupledRun` of the rig, whose model has a mode of negative damping. Without an unstable cycle the
+    measure has no value, but the reason.
+    """
     model = run.model
-    unit = TABLE[FLUTTER_MEASURE].unit
-    floor = TABLE[FLUTTER_MEASURE].floor
+    unit = MOTION_TABLE[FLUTTER_MEASURE].unit
+    floor = MOTION_TABLE[FLUTTER_MEASURE].floor
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
 
     end_notes = []
     outcome = run.solution.outcome
-    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL:
+    if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
         end_time = run.solution.response.time[-1]
         end_notes.append(
-            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
+            f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_COMPUTED_DISPLACEMENT:g} m"
         )
 
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
@@ -128,13 +132,13 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     pressed patch of the interface, or None for an interface without one.
     """
     rig = model.rig
-    f = model.friction
-    if len(rig.friction.interfaces) != 1 or f is None:
+    law = model.friction
+    if len(rig.friction.interfaces) != 1 or law is None:
         return LimitCycles([], "limit cycles can be computed for one interface only")
 
     modes = rig.modes
     if not modes.interfaces[0][free_motions.find_unstable_modes(modes)].any():
-        return LimitCycles([], NO_INTERFACE_NOTE)
+        return LimitCycles([], NO_MOVING_INTERFACE_NOTE)
 
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
@@ -142,13 +146,13 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     try:
         undriven = make_undriven_rig(model, numerics, patch)
     except PatchfemError:
-        return LimitCycles([], UNSUPPORTED_LAW_REASON)
+        return LimitCycles([], UNSUPPORTED_BOND_LAW_REASON)
     is_rigid = not np.isfinite(undriven.stiffness).all()
     if is_rigid and not modes.omega.all():
-        return LimitCycles([], RIGID_MODE_REASON)
+        return LimitCycles([], RIGID_FRICTION_REASON)
     try:
         cycles, smallest = free_motions.find_limit_cycles(
-            undriven, f.static * first_interface_load(model, patch)
+            undriven, law.static * first_interface_load(model, patch)
         )
     except NotConverged as missing:
         return LimitCycles([], NO_SLIDING_NOTE if is_rigid else str(missing))

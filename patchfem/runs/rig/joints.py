@@ -15,7 +15,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import law_has_trait
 from ...friction import protocol, record
-from ...friction.laws import elastic_plastic, stretch
+from ...friction.laws import elastic_plastic
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
@@ -24,6 +24,7 @@ from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...points import contacts
+from ...points import laws as point_laws
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
@@ -35,14 +36,14 @@ NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
     "pieces that are rigid in shear; run the scene in time instead"
 )
-STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
+MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
 class Joint(NamedTuple):
     """Interface of a rig with its law and load.
 
     - law: effective keys of the friction law.
-    - load: normal load.
+    - load: normal load, which may oscillate (`hybrid.cases.Load`).
     - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
     - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips
       part by part, or None for an interface that slips as a whole.
@@ -56,22 +57,30 @@ class Joint(NamedTuple):
     yields: np.ndarray | None = None
     reduction: shear_modes.JenkinsSet | None = None
 
+    def make_law(self):
+        """Return the law of an interface that slips as a whole, per newton of load, or the parameters of its bonds."""
+        if law_has_trait(self.law.law, "bonds"):
+            return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
+        return record.make_law(self.law, self.load.mean)
+
     def make_element(self) -> protocol.Element:
         """Return the law under its mean load in the form of the march."""
         if self.stiffness is not None:
             return elastic_plastic.parallel_element(self.stiffness, self.yields)
-        load = self.load.mean
-        if law_has_trait(self.law.law, "bonds"):
-            return stretch.points_element(
-                make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED), load
-            )
-        return record.make_law(self.law, load).element(load)
+        return self.make_law().element(self.load.mean)
+
+    def make_point_law(self) -> point_laws.PointLaw:
+        """Return the law under its mean load in the form of the march."""
+        if self.stiffness is not None:
+            return point_laws.make_elements(self.stiffness, self.yields)
+        return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law in the form of the engine `hybrid`."""
         if self.stiffness is not None:
             return from_elements(self.stiffness, self.yields)
-        return hybrid_laws.make_law(self.law, self.load.mean, self.speed, varies=self.load.varies)
+        load = self.load
+        return hybrid_laws.make_law(self.law.law, self.make_law(), load.mean, varies=load.varies)
 
     def list_elements(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stiffness [N/m] and yield displacement [m] (e,) of parallel elements; empty for other laws."""
@@ -123,24 +132,26 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = _find_rigid_law(model.friction, model, patch)
+        law = _replace_averaged_law(model.friction, model, patch)
         return [Joint(law, load, speed, *parts) for load, parts in _list_patch_parts(model, patch)]
 
     joints = []
-    for k, own in enumerate(friction.interfaces):
-        load = _make_point_load(model.point) if own.load is None else Load(own.load)
+    for k, interface in enumerate(friction.interfaces):
+        load = interface.load
+        load = _make_point_load(model.point) if load is None else Load(load)
         parts = ()
-        if own.partial_slip:
-            parts = faces.make_patch_elements(own, model.accuracy.tolerance, k in meshed)
-        law = _find_rigid_law(own.numbers, model, patch)
+        if interface.partial_slip:
+            parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
+        law = _replace_averaged_law(interface.numbers, model, patch)
         joints.append(Joint(law, load, speed, *parts))
     return joints
 
 
-def _find_rigid_law(law, model: Model, patch):
-    """Return the law of an interface.
+def _replace_averaged_law(law, model: Model, patch):
+    """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
-    A law that averages the pressure is Coulomb's law on a rigid block.
+    On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
+    coefficient of `law`. `patch` is the solved patch with the pressure, or None for a single point.
     """
     if not law_has_trait(law.law, "averaged"):
         return law
@@ -163,7 +174,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     if not model.partial_slip:
         if not slide_apart:
             return [(load, ())]
-        return [(Load(float(one)), ()) for one in strips.compute_strip_loads(patch)]
+        return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
     length = record.make_law(model.friction, load.mean).element(load.mean).length
@@ -235,7 +246,7 @@ def _find_stick_tolerance(joints, laws) -> float:
             lengths.append(keys.bond_length)
         elif keys.stiffness:
             lengths.append(keys.static * joint.load.mean / keys.stiffness)
-    return STUCK_SLIP * min(lengths, default=0.0)
+    return MAX_STUCK_SLIP_RATIO * min(lengths, default=0.0)
 
 
 # ---- march, and motions without a drive
@@ -270,9 +281,10 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
             return replace(contact, point_sets=[*contact.point_sets, *springs])
 
     joints = list_joints(model, patch, numerics.meshed)
-    elements = [joint.make_element() for joint in joints]
+    laws = [joint.make_point_law() for joint in joints]
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    contact = contacts.make_contact(elements, rows[: len(joints)], springs, scale)
+    length = joints[0].make_element().length if joints else 0.0
+    contact = contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 

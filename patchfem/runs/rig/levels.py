@@ -22,18 +22,18 @@ from ...response.levels import (
     make_no_onset_reason,
     make_onset_test,
 )
-from ...response.rows import TABLE
+from ...response.rows import MOTION_TABLE
 from ...structure.drive_sizes import find_drive_omega
 from .solution import Fields
 
 # Relative error of the measures of an event-driven run, which has round-off only.
 EXACT_RELATIVE_ERROR = 1e-9
 # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
-MAX_BISECTIONS = 40
+MAX_ONSET_BISECTIONS = 40
 
 
 def add_level_errors(
-    levels: Sequence[Level], coarser_runs: ComparisonRuns, solutions
+    drive_levels: Sequence[Level], coarser_runs: ComparisonRuns, solutions
 ) -> tuple[Level, ...]:
     """Add the differences from coarse runs to the errors of each drive level.
 
@@ -41,7 +41,7 @@ def add_level_errors(
 
     Parameters
     ----------
-    levels : sequence of Level
+    drive_levels : sequence of Level
         Levels of the run, in chronological order.
     coarser_runs : list of CoarserRuns
         Settings of the coarse runs by source of error.
@@ -49,11 +49,12 @@ def add_level_errors(
         Solution of each coarse run by its Numerics.
     """
     levels_with_errors = []
-    for number, level in enumerate(levels):
+    for number, level in enumerate(drive_levels):
         # A run that ended earlier has no measures at this level.
-        none = replace(level, values={})
+        missing = replace(level, values={})
         solved = {
-            key: (*run.levels, *[none] * len(levels))[number] for key, run in solutions.items()
+            key: (*run.levels, *[missing] * len(drive_levels))[number]
+            for key, run in solutions.items()
         }
         sources = estimate_errors(None, level.values, coarser_runs, solved)
         errors = dict(level.errors)
@@ -74,7 +75,7 @@ class Onset(NamedTuple):
     error: float
 
 
-def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
+def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
     """Find the drive level [m s-2] of the onset by bisection, with its uncertainty; None if no level reaches the onset.
 
     The bisection starts between the last level before the onset and the first level after it, and
@@ -83,7 +84,7 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | No
 
     Parameters
     ----------
-    levels : sequence of Level
+    drive_levels : sequence of Level
         Levels of the run, in chronological order.
     run_level : callable
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
@@ -93,14 +94,14 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> Onset | No
     is_past_onset : callable
         Function of a Level that returns whether the onset is reached.
     """
-    bracket = bracket_onset(levels, is_past_onset)
+    bracket = bracket_onset(drive_levels, is_past_onset)
     if bracket is None:
         return None
-    before, first = bracket
-    first = levels[first]
-    low = levels[before].drive if before >= 0 else 0.0
+    before, reached = bracket
+    first = drive_levels[reached]
+    low = drive_levels[before].drive if before >= 0 else 0.0
     high = first.drive
-    for _ in range(MAX_BISECTIONS):
+    for _ in range(MAX_ONSET_BISECTIONS):
         if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
@@ -133,7 +134,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     onset = find(solution)
     if onset is None:
         reason = make_no_onset_reason(*rig.drive.levels.onset)
-        return Measure(None, unit, None, TABLE["onset_level"].floor, reason=reason)
+        return Measure(None, unit, None, MOTION_TABLE["onset_level"].floor, reason=reason)
     level, error = onset
     for run, beside in solution.coarser:
         coarse_onset = find(run)
@@ -143,10 +144,10 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
-def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:
-    """Convert drive levels [m s-2] to the unit of the scene, [m s-2] or [N]."""
+def convert_to_scene_units(rig, drive_levels) -> tuple[Level, ...]:
+    """Return the Levels with their amplitudes [m s-2] in the unit of the scene, [m s-2] or [N] for a force."""
     unit, factor = _find_level_unit(rig)
-    return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in levels)
+    return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in drive_levels)
 
 
 def _find_level_unit(rig) -> tuple[str, float]:
@@ -204,9 +205,9 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
 
     # Each level goes on from the end of the one before; a run that ends early is the last one.
     n_levels = len(amplitudes)
-    for k, amplitude in enumerate(amplitudes):
-        report = None if progress is None else partial(_report_fraction, progress, k, n_levels)
-        is_last = k + 1 == n_levels
+    report = None if progress is None else partial(_report_fraction, progress, runs, n_levels)
+    for amplitude in amplitudes:
+        is_last = len(runs) + 1 == n_levels
         run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
         runs.append(run)
         level_results.append(result)
@@ -217,12 +218,9 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 
 
-def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
-    """Report the completed fraction of all levels to the progress callback.
-
-    `level` counts the levels from 0, and `fraction` is the completed part of this level.
-    """
-    progress((level + fraction) / n_levels)
+def _report_fraction(progress, runs, n_levels: int, fraction: float) -> None:
+    """Report the completed fraction of all levels: `runs` are complete, and `fraction` of the next level."""
+    progress((len(runs) + fraction) / n_levels)
 
 
 def join_runs(runs, duration: float):

@@ -20,13 +20,7 @@ from . import strips
 from .bond_lists import choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .joints import make_contact
-from .solution import (
-    Fields,
-    Solution,
-    compute_sampled_loop,
-    describe_escape,
-    find_travel,
-)
+from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -160,20 +154,28 @@ class MarchEvaluator(RunEvaluator):
         return {
             "integrated": IntegratedMeasures(values),
             "run_energies": energies,
-            "loop": self._compute_loop(run, drive),
+            "loop": self._compute_hysteresis_loop(run, drive),
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
             "is_single_interface": self.model.rig.friction.strips_slide_apart,
         }
 
-    def _compute_loop(self, run, drive) -> CycleLoop | None:
-        """Compute the first harmonics of displacement and friction force, and the work per cycle."""
+    def _compute_hysteresis_loop(self, run, drive) -> CycleLoop | None:
+        """Return the first harmonics of slide and friction force, and the friction work per cycle; None without a window.
+
+        Parameters
+        ----------
+        run : points.time_march.Motion
+            Motion in time steps, with the friction force and work of its window.
+        drive
+            Drive of this motion.
+        """
         window = run.window
         work = run.window_work
-        # The friction of strips that yaw does more work than follows from the mean displacement.
-        slides_apart = self.model.rig.friction.strips_slide_apart
-        together = self.contact.set_valued and not slides_apart
-        # The friction work of this interface excludes other interfaces and impacts at stops.
-        if len(self.model.rig.friction.names) > 1 or together:
+        # `window_work` is that of all interfaces and of impacts at stops; that of the first interface is int F dx. The
+        # friction of strips that yaw does more work than follows from their mean displacement.
+        friction = self.model.rig.friction
+        is_rigid_block = self.contact.set_valued and not friction.strips_slide_apart
+        if len(friction.names) > 1 or is_rigid_block:
             work = float(run.step_force @ np.diff(window.slide))
 
         span = window.time[-1] - window.time[0]

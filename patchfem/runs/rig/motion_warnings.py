@@ -1,7 +1,7 @@
 """Warnings and notes of a run of a rig on its friction law, load and engine.
 
-In: a `rig.CoupledRun`. Out: sentences. WARNINGS and NOTES are the tables of conditions; each entry yields the sentences of a
-run that meets its condition. Those on the friction law are in `results.notes`.
+In: a `rig.CoupledRun`. Out: sentences. MOTION_WARNINGS and MOTION_NOTES are the tables of conditions; each entry yields
+the sentences of a run that meets its condition. Those on the friction law are in `results.notes`.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from .solution import first_interface_load
 
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
-HALF_LIMIT_SPEED = 0.5493
+HALF_LIMIT_SPEED_RATIO = 0.5493
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -49,8 +49,8 @@ def collect_remarks(run, settings: Settings) -> Remarks:
     """Return the warnings and notes of a run with its settings on its friction law, load, engine and end of motion."""
     facts = collect_law_facts(run, settings)
     structure = run.model.rig.structure
-    warnings = chain.from_iterable(find(run) for find in WARNINGS)
-    notes = chain.from_iterable(find(run) for find in NOTES)
+    warnings = chain.from_iterable(find(run) for find in MOTION_WARNINGS)
+    notes = chain.from_iterable(find(run) for find in MOTION_NOTES)
     return Remarks(
         [*structure.notes, *list_law_warnings(facts), *warnings],
         [*structure.reduction_notes, *list_law_notes(facts), *notes],
@@ -195,7 +195,7 @@ def note_on_creep(friction) -> list[str]:
         return []
     return [
         f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
-        f"creeps at {1e3 * HALF_LIMIT_SPEED * friction.reference_speed:.3g} mm/s"
+        f"creeps at {1e3 * HALF_LIMIT_SPEED_RATIO * friction.reference_speed:.3g} mm/s"
     ]
 
 
@@ -207,13 +207,13 @@ def _note_on_end(run) -> Iterator[str]:
         yield run.solution.message
 
 
-WARNINGS = (
+MOTION_WARNINGS = (
     _warn_of_single_points,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
     _warn_of_large_slides,
 )
-NOTES = (
+MOTION_NOTES = (
     _note_on_fields_of_strips,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,

@@ -20,8 +20,8 @@ from .engines import HYBRID, MARCH, choose_engine
 WHOLE_CYCLE_TOL = 1e-6
 # Number of decay times after which a transient is neglected; its mean square is then reduced to
 # e^-6.
-N_DECAY_TIMES = 3.0
-MIN_RUN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+N_TRANSIENT_DECAY_TIMES = 3.0
+MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def choose_numerics(model: Model) -> Numerics:
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * drive.signal.period
-        start = min(cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
+        start = min(cycles / 4, N_TRANSIENT_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
 
     beat_cycles = count_repeat_cycles(drive.signal) or 0.0
@@ -101,7 +101,7 @@ def choose_numerics(model: Model) -> Numerics:
 
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
+        steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / cycles)))
     numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes)
 
     if engine is HYBRID:

@@ -20,10 +20,10 @@ from .numerics import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
-RESONANT_DRIVE_TOL = 0.02
+RESONANT_FREQUENCY_TOL = 0.02
 # Smallest ratio of link stiffness to modal stiffness at which the link holds the block nearly at
 # rest.
-MIN_STIFF_LINK_RATIO = 10.0
+MIN_HOLDING_LINK_STIFFNESS_RATIO = 10.0
 Chain = dict[str, float | str]  # stiffness [N/m] of each link by name, or why it has none
 
 
@@ -168,7 +168,7 @@ def find_drive_and_knee(model: Model) -> Values:
         or rig.drive.force
         or rig.modes.omega.size != 1
         or not rig.structure.lists_modes
-        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANT_DRIVE_TOL
+        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANT_FREQUENCY_TOL
     ):
         return {}
     knee = compute_dimensionless_groups(model).get("knee")
@@ -203,7 +203,7 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
     sizes : dict
         Groups of `compute_dimensionless_groups`.
     chain : dict
-        Stiffness chain by name. A link with less than MIN_STIFF_LINK_RATIO times the stiffness of
+        Stiffness chain by name. A link with less than MIN_HOLDING_LINK_STIFFNESS_RATIO times the stiffness of
         the mode allows a stuck block to move.
     """
     friction_ratio = sizes.get("D")
@@ -215,7 +215,7 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
     ):
         return []
 
-    limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
+    limit = MIN_HOLDING_LINK_STIFFNESS_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
 

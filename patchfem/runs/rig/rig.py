@@ -10,7 +10,7 @@ from math import ceil, floor, log, log2
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...model.rig import MAX_TRAVEL
+from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response import reasons, stationary
 from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
 from ...response.decay_curve import DecayCurve
@@ -25,7 +25,7 @@ from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
 from . import bond_lists, decays, flutter, levels
-from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
+from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
@@ -36,14 +36,14 @@ from .solve import Runner
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
+MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 # Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
-MIN_RELATIVE_ERROR = 1e-9
+MIN_MOTION_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
 # takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
-MAX_OTHER_WORK = 1e6
+MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
 # Work of a step in which the pressure of a patch is solved, relative to that of another step.
-PRESSING_WORK = 40.0
+PRESSING_STEP_WORK_RATIO = 40.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,10 +183,11 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
     `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run
-    that is coarse in time, so that they need not be repeated: their errors are estimated once.
+    that is coarse in time, so that they need not be repeated: their errors are estimated once. A run with
+    automatic steps is repeated with twice the steps (`_judge`).
 
     The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
-    `response.errors.convergence_error`, plus MIN_RELATIVE_ERROR of the value (`add_errors`).
+    `response.errors.convergence_error`, plus MIN_MOTION_RELATIVE_ERROR of the value (`add_errors`).
     Afterwards `complete_measures` adds the errors that the run itself shows.
 
     Parameters
@@ -231,7 +232,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
-            solution.values, errors, min_relative_error=MIN_RELATIVE_ERROR, size=size
+            solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
         if solution.levels or model.rig.drive.kind == "free":
             coarser_runs = [*time_runs, *space_runs]
@@ -239,7 +240,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
 
     run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
-    inputs.seconds["error"] = sum(one.seconds for one in runner.solutions.values())
+    inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
     return refine.Refined(replace(run, measures=run.measures | peak), shortage)
 
@@ -263,8 +264,9 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
 def _count_slip_period_cycles(model, numerics, solution) -> int:
     """Return the number of cycles of a complete stick-slip period on a belt.
 
-    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is no period, or if the
-    run is shorter than two windows. `numerics` has the cycles of the run, and `solution` is its motion.
+    A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one. The cycles are
+    those of `drive.period`. The result is 0 if the motion has no period, or if the run is shorter than two such periods.
+    `model` has the drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
@@ -278,7 +280,8 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     """Decide whether a run is repeated with smaller steps, after runs with given excesses.
 
     It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
-    depend on the steps. Measures that are not main ones count in a run that takes little time (MAX_OTHER_WORK).
+    depend on the steps. Measures that are not main ones count in a run that takes little time
+    (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
     """
     numerics = run.numerics
     max_passes = _count_finer_passes(run)
@@ -293,11 +296,11 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     )
     work = numerics.steps * numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
-        work *= PRESSING_WORK
+        work *= PRESSING_STEP_WORK_RATIO
 
     tolerance = run.model.accuracy.tolerance
     measures = set_final_floors(complete_measures(run).measures, tolerance)
-    if work > MAX_OTHER_WORK:
+    if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if numerics.local else "steps"
@@ -310,7 +313,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
         numerics.finer(),
         axis,
         seconds=run.solution.seconds,
-        cost_ratio=refine.STEP_COST_RATIO,
+        cost_ratio=refine.DOUBLED_STEPS_COST_RATIO,
         max_passes=max_passes,
     )
 
@@ -319,7 +322,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
     """Return how many times a run can be repeated with smaller steps than before."""
     numerics = run.numerics
     if numerics.local:
-        return max(0, floor(log(numerics.local / MIN_STEP_ERROR, 100) + 1e-9))
+        return max(0, floor(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) + 1e-9))
     if (
         not ENGINES[numerics.engine].has_steps
         or run.model.accuracy.steps_per_cycle is not None
@@ -327,7 +330,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
         or run.solution.outcome in EARLY_OUTCOMES
     ):
         return 0
-    max_steps = min(MAX_MARCH_STEPS, MAX_RUN_STEPS / numerics.cycles)
+    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
     return max(0, floor(log2(max_steps / numerics.steps)))
 
 
@@ -384,7 +387,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
 
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
     # program.
-    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
+    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
         outcome = Outcome.GROWS
     # A growing motion has no final values, so the errors of its measures are unknown.
     if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:

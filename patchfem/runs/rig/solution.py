@@ -23,10 +23,10 @@ from ..results.result import Settings, SteadyData
 
 Fields = dict[str, Any]  # fields of a record by name
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
-ESCAPE_RATIO = 2.0
+ESCAPE_DISPLACEMENT_RATIO = 2.0
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
 # Safety factor on the change of a peak frequency in a coarse run.
-PEAK_SHIFT_FACTOR = 3.0
+PEAK_SHIFT_SAFETY_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -94,7 +94,7 @@ def find_travel(rig) -> float:
     if cubic is None or cubic >= 0:
         return rig.springs.travel
     stiffness = rig.modes.mass * rig.modes.omega[0] ** 2 / max(rig.modes.output[0] ** 2, 1e-300)
-    return min(rig.springs.travel, ESCAPE_RATIO * float(np.sqrt(stiffness / -cubic)))
+    return min(rig.springs.travel, ESCAPE_DISPLACEMENT_RATIO * float(np.sqrt(stiffness / -cubic)))
 
 
 def describe_escape(rig, travel: float) -> str:
@@ -215,5 +215,5 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
     peak_frequency = float(solution.drive.omega / (2 * np.pi))
     peaks = [run.drive.omega / (2 * np.pi) for run in coarser if run.drive is not None]
     shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))
-    error = solution.peak_error + PEAK_SHIFT_FACTOR * shift
+    error = solution.peak_error + PEAK_SHIFT_SAFETY_FACTOR * shift
     return {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}

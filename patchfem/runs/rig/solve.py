@@ -7,7 +7,7 @@ Each coarse run is solved only once.
 from dataclasses import replace
 
 from ...response.coarser import ComparisonRuns, SourceErrors, estimate_errors
-from ..results.result import N_FRAMES, RunInputs
+from ..results.result import N_INTERFACE_FRAMES, RunInputs
 from . import event_to_event, march
 from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
@@ -64,7 +64,11 @@ class Runner:
         """Solve the rig with the given settings, and with all fields."""
         has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
         return self._solve(
-            self.model, numerics, self.inputs.patch, N_FRAMES * has_fields, self.inputs.say
+            self.model,
+            numerics,
+            self.inputs.patch,
+            N_INTERFACE_FRAMES * has_fields,
+            self.inputs.say,
         )
 
     def _solve_coarse_run(self, numerics: Numerics) -> Solution:

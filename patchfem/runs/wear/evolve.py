@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.press import strip_offsets
+from ...contact.press import compute_strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
@@ -39,10 +39,10 @@ from .slip import (
 )
 
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
-THIN_FRACTION = 1e-6
+WORN_THROUGH_FRACTION = 1e-6
 # Smallest distance to the next row of the friction table, relative to the row spacing, at which a
 # jump ends at this row.
-MIN_RELATIVE_ROW_DISTANCE = 0.1
+MIN_FRICTION_ROW_DISTANCE_RATIO = 0.1
 
 
 class WearMoment(NamedTuple):
@@ -281,7 +281,7 @@ def find_worn_through_coating(model, depth) -> WornCoating | None:
     `depth` [m] is the worn depth of both pieces together (m,), or (s, m) for strips.
     """
     coating = _most_worn_coating(model, depth)
-    return coating if coating.fraction >= 1 - THIN_FRACTION else None
+    return coating if coating.fraction >= 1 - WORN_THROUGH_FRACTION else None
 
 
 def _most_worn_coating(model, depth) -> WornCoating:
@@ -337,15 +337,17 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
         return _most_worn_coating(model, end.depth).fraction - 1
 
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
-    if _most_worn_coating(model, next_state.depth).fraction <= 1 + THIN_FRACTION:
+    if _most_worn_coating(model, next_state.depth).fraction <= 1 + WORN_THROUGH_FRACTION:
         return next_state
 
     # scipy.optimize takes half a second to import, and most runs never wear a coating through.
     from scipy.optimize import brentq
 
-    # The wear rate changes little within a jump, so that the worn fraction is exact to THIN_FRACTION.
+    # The wear rate changes little within a jump, so that the worn fraction is exact to WORN_THROUGH_FRACTION.
     length = next_state.cycle - state.cycle
-    cycle = brentq(find_excess, state.cycle, next_state.cycle, xtol=0.1 * THIN_FRACTION * length)
+    cycle = brentq(
+        find_excess, state.cycle, next_state.cycle, xtol=0.1 * WORN_THROUGH_FRACTION * length
+    )
     return jump_to(cycle)
 
 
@@ -377,7 +379,9 @@ def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -
     rows = [row for row in wear.friction.depth if row > depth]
     if not rows:
         return np.inf
-    is_near = len(rows) > 1 and rows[0] - depth < MIN_RELATIVE_ROW_DISTANCE * (rows[1] - rows[0])
+    is_near = len(rows) > 1 and rows[0] - depth < MIN_FRICTION_ROW_DISTANCE_RATIO * (
+        rows[1] - rows[0]
+    )
     rates = wear_rates(problem.coefficient, state.path, problem.area) * state.force
     rate = float(np.vdot(rates, weight))
     if rate <= 0:
@@ -476,7 +480,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
     width = patch_model.pieces.width
-    offsets = strip_offsets(width, len(np.atleast_2d(area)))
+    offsets = compute_strip_offsets(width, len(np.atleast_2d(area)))
 
     def interpolate_path(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch.
@@ -484,7 +488,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
         Without strips there is a single row.
         """
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
-        row_offsets = strip_offsets(width, len(rows))
+        row_offsets = compute_strip_offsets(width, len(rows))
         columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
         return np.array(columns).T.reshape(area.shape)
 

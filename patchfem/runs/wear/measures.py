@@ -16,25 +16,25 @@ from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
-from ..results.result import WearHistory
+from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (
-    THIN_FRACTION,
+    WORN_THROUGH_FRACTION,
     compute_mean_worn_depth,
     compute_worn_volume_and_depth,
     find_worn_through_coating,
     list_worn_pieces,
 )
-from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
+from .slip import compute_point_slip_path
 
 N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
 # Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
 # which the stiffness of the unworn piece is valid.
-MAX_WORN_FRACTION = 0.2
+MAX_WORN_THICKNESS_FRACTION = 0.2
 WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
-HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
+MEASURE_BY_HOLDER_MOTION = {"closing": "approach", "rotation": "rotation"}
 
 
-def add_wear_measures(result, evolved, estimate: bool = True):
+def add_wear_measures(result, evolved, with_errors: bool = True):
     """Add the measures of wear to the Result of a run on a worn patch.
 
     Parameters
@@ -43,7 +43,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         Result of the run on the worn patch.
     evolved : WornPatch or None
         None for a single contact point.
-    estimate : bool
+    with_errors : bool
         Whether to estimate the errors.
     """
     model = result.plan.model
@@ -53,7 +53,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         if result.outcome in UNBOUNDED_OUTCOMES:
             warning = f"nothing was worn: {result.outcome.sentence}"
             return replace(result, warnings=[*result.warnings, warning])
-        volume = _measure_point_volume(model, result, estimate=estimate)
+        volume = _measure_point_volume(model, result, with_errors=with_errors)
         return replace(result, measures=result.measures | volume)
 
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
@@ -61,11 +61,11 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     if evolved.state is None:
         return result
 
-    worn = _measure_patch_wear(model, evolved, result.measures, estimate=estimate)
+    worn = _measure_patch_wear(model, evolved, result.measures, with_errors=with_errors)
     if model.wear.friction is not None:
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
     worn |= _measure_worn_through_cycle(model, evolved, worn["worn_depth_max"].error)
-    if estimate:
+    if with_errors:
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
 
@@ -98,7 +98,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     deepest = int(np.argmax(last.depth))
     depth = float(last.depth.flat[deepest])
     rate = (depth - float(before.depth.flat[deepest])) / (last.cycle - before.cycle)
-    cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
+    cycle_error = None if error is None else (error + WORN_THROUGH_FRACTION * depth) / rate
     name = "worn_through_cycle"
     return {name: make_measure(name, last.cycle, cycle_error)}
 
@@ -156,7 +156,7 @@ def _warn_of_worn_depth(model, evolved) -> list[str]:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
     warnings = []
     for piece, name, depth in list_worn_pieces(model, evolved.state.depth):
-        if depth > MAX_WORN_FRACTION * (piece.thickness or piece.height):
+        if depth > MAX_WORN_THICKNESS_FRACTION * (piece.thickness or piece.height):
             size = "its height" if piece.coating is None else "the thickness of its coating"
             warnings.append(
                 f"up to {format_length(depth, 3)} is worn off the {name} piece, more than 0.2 of {size}, but the "
@@ -174,7 +174,7 @@ def _relative_slip_error(measures: Measures) -> float:
     return 0.0
 
 
-def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = True) -> Measures:
+def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool = True) -> Measures:
     """Return the measures of worn volume, worn depth and groove amplitude.
 
     Their errors include those of the earlier run.
@@ -187,7 +187,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
         The worn patch with its jumps, also on the coarser meshes.
     motion : dict
         Measures of the run on the worn patch by name.
-    estimate : bool
+    with_errors : bool
         Whether to estimate the errors.
     """
     state = evolved.state
@@ -219,7 +219,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
         error = None
         worn_before = first.values[name]
         start_error = 0.0 if start is None else start.measure_error(name, worn_before)
-        if coarse and estimate and start_error is not None:
+        if coarse and with_errors and start_error is not None:
             error = (
                 jump_errors[name]
                 + slip_error * max(value - worn_before, 0.0)
@@ -327,7 +327,7 @@ def _relative_slip_change(moment, motion: Measures) -> float:
     return abs(wear_amplitude / final_amplitude.value - 1)
 
 
-def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
+def _measure_point_volume(model, result, *, with_errors: bool = True) -> Measures:
     """Return a dict with the worn volume of a single contact point under [normal].
 
     It is the wear coefficient times load times slip path, over all cycles.
@@ -338,14 +338,14 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
         Model with [wear] and [normal].
     result : Result
         Result of the motion, with the histories of its last cycles.
-    estimate : bool
+    with_errors : bool
         Whether to estimate the error.
     """
     motion = {name: measure.value for name, measure in result.measures.items()}
     path, path_error = compute_point_slip_path(model, result.window, motion)
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
-    if estimate:
+    if with_errors:
         error = (path_error + _relative_slip_error(result.measures) + WORN_ROUND_OFF) * volume
     return {"worn_volume": make_measure("worn_volume", volume, error, WORN_SOURCE)}
 
@@ -379,7 +379,7 @@ def _add_wear_frames(result, evolved):
         "time": result.fields["time"] + evolved.state.cycle * period,
         "worn_depth": np.repeat(evolved.state.depth[None], n_motion, axis=0),
     }
-    for field, name in HOLDER_MEASURES.items():
+    for field, name in MEASURE_BY_HOLDER_MOTION.items():
         wear[f"holder_{field}"] = [state.values[name] for state in states]
         motion[f"holder_{field}"] = np.full(n_motion, getattr(evolved.patch.pressure, name))
 

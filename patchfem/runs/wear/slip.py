@@ -18,20 +18,15 @@ from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
 from ..patch.press import nodal_areas
 from ..results.patch_rows import Values
+from ..results.result import UNBOUNDED_OUTCOMES
 from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve
 
-UNBOUNDED_OUTCOMES = (
-    Outcome.GROWS,
-    Outcome.EXCEEDS_TRAVEL,
-    Outcome.LEAVES_GROOVES,
-    Outcome.NOT_CONVERGED,
-)
-MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
+MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
 # Ratio of the error due to reversals between samples to the mean change of the path if only every
 # third sample is used.
-REVERSAL_ERROR_FACTOR = 1.5
+SLIP_PATH_REVERSAL_ERROR_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
@@ -134,7 +129,7 @@ class _PointSlip(NamedTuple):
         for first in range(3):
             samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
             changes.append(abs(float((path - self.integrate_path(samples)) @ force)))
-        return REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
+        return SLIP_PATH_REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
 
 
 def choose_frame_count(tolerance: float) -> int:
@@ -142,7 +137,7 @@ def choose_frame_count(tolerance: float) -> int:
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_CYCLE_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_CYCLE_FRAMES, MAX_CYCLE_FRAMES))
 
 
 def slips_uniformly(model) -> bool:
@@ -211,9 +206,10 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
 
 
 def _follow_slide(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a bench.
+    """Compute the motion of a bench, with the slip and the tractions of its nodes in the last cycle.
 
-    `frames` is the number of frames in each cycle, 0 for histories only.
+    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in each cycle; with 0
+    the nodes are None.
     """
     cycles = max(1, round(model.slide.cycles or 1))
     run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
@@ -239,9 +235,10 @@ def _follow_slide(model, patch, frames: int) -> _Motion:
 
 
 def _follow_rig(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a rig.
+    """Compute the motion of a rig, with the slip and the tractions of its nodes in the last cycle.
 
-    `frames` is the number of frames in the last cycle, 0 for histories only.
+    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in the last cycle; with
+    0 the nodes are None. The outcome is None unless the motion has no bound.
     """
     settings = numerics.choose_numerics(model)
     solution = solve.solve_rig(model, settings, patch, frames)

@@ -25,10 +25,10 @@ How to add a key
 
    A key that needs or excludes a key of another table, or is idle beside it, is a row of `rules.together`, such as
    `"contact.spacing & !structure": "needs [structure]"`. If the table always needs the key or an alternative, or if only
-   some values of a selector such as `slide.kind` use it, add it to `SELECTORS` of `choices`; the keys of friction laws
-   and waveforms stand in `effects`. A key that another key of its table needs goes into `NEEDS`. Missing keys, keys that
-   exclude one another and keys without meaning are then reported. A key whose default is not None must stand with the
-   values of a selector that use it. Otherwise `scene.resolved.toml` contains its default where it has no meaning.
+   some values of a selector such as `slide.kind` use it, add it to `KEY_SELECTORS` of `choices`; the keys of friction laws
+   and waveforms stand in `effects`. A key that another key of its table needs goes into `NEEDED_KEYS`. Missing keys,
+   keys that exclude one another and keys without meaning are then reported. A key whose default is not None must stand
+   with the values of a selector that use it. Otherwise `scene.resolved.toml` contains its default where it has no meaning.
 3. Read the value where the model is built (folder `model`). No other code reads keys of a scene. In a sweep over a key
    of `overrides.PLAIN_KEYS`, such as normal.load, these functions get arrays in place of the swept numbers
    (`model.similar_models`), so their formulas must take arrays as well.

@@ -1,7 +1,7 @@
 """Keys that a table needs, takes and excludes, for each value of its selectors such as friction.law.
 
-In the texts of SELECTORS and NEEDS, blanks separate words. A word "a" is one key, "a|b" means either of two keys, "a/b" one
-of them or both, and "a+b|c" means that `a` and `b` describe together what `c` describes alone.
+In the texts of KEY_SELECTORS and NEEDED_KEYS, blanks separate words. A word "a" is one key, "a|b" means either of two
+keys, "a/b" one of them or both, and "a+b|c" means that `a` and `b` describe together what `c` describes alone.
 """
 
 import re
@@ -37,7 +37,7 @@ _OTHER_WAVEFORM_KEYS = " ".join(
         re.findall(r"\w+", re.sub("acceleration[|]displacement|force", "", _WAVEFORM_KEYS))
     )
 )
-ALTERNATIVES = {  # keys of which a table always needs one
+ALTERNATIVE_KEYS = {  # keys of which a table always needs one
     contact.Contact: "load|approach",
     contact.LoadLine: "offset|moment",
     contact.Holder: "rotational_stiffness/tangential_stiffness",
@@ -48,8 +48,8 @@ ALTERNATIVES = {  # keys of which a table always needs one
 }
 # A selector that an earlier one of the same table leaves unused does not count, and neither do the keys that the
 # earlier one leaves unused.
-SELECTORS = (
-    *(Selector(model, "", {"": (words, "")}) for model, words in ALTERNATIVES.items()),
+KEY_SELECTORS = (
+    *(Selector(model, "", {"": (words, "")}) for model, words in ALTERNATIVE_KEYS.items()),
     Selector(contact.OnePiece, "", {"": ("", "chamfer|end_radius")}),
     Selector(
         contact.Asperities,
@@ -105,12 +105,12 @@ SELECTORS = (
         },
     ),
 )
-NEEDS = {  # keys that a key of a table needs
+NEEDED_KEYS = {  # keys that a key of a table needs
     tables.Normal: {"amplitude": "frequency", "frequency": "amplitude", "phase": "amplitude"},
     tables.Friction: {"rest_growth": "slip_growth", "slip_growth": "rest_growth"},
     tables.Structure: {"output_mass": "masses/reduced", "interface": "masses/file/reduced"},
 }
-EQUAL_LENGTHS = {  # lists that need one value for each value of another list
+EQUALLY_LONG_LISTS = {  # lists that need one value for each value of another list
     tables.Drive: {"accelerations": "frequencies", "phases": "frequencies"},
     tables.WornFriction: {"coefficient_factor": "depth", "bond_length_factor": "depth"},
 }
@@ -161,7 +161,7 @@ def find_selectors(model: type[Table]) -> tuple[Selector, ...]:
     A selector is a key whose value decides which other keys the table needs, such as `law` or `waveform`. `model` is the
     class of the table.
     """
-    return tuple(selector for selector in SELECTORS if issubclass(model, selector.model))
+    return tuple(selector for selector in KEY_SELECTORS if issubclass(model, selector.model))
 
 
 @cache

@@ -30,12 +30,12 @@ from .values import TomlValue
 
 Piece = Literal["upper", "lower"]
 LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
-MAX_PAIRS = 1_000_000  # largest number of equal patches, far more than any joint has
+MAX_EQUAL_PATCHES = 1_000_000  # largest number of equal patches, far more than any joint has
 # Largest number of strips over the width; the pressures of more strips do not fit into memory.
 MAX_STRIPS = 10_000
 # Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
-MAX_SMALL_ANGLE = 0.1
-SmallAngle = quantity("angle", ge=-MAX_SMALL_ANGLE, le=MAX_SMALL_ANGLE)
+MAX_ANGLE_BETWEEN_PIECES = 0.1
+SmallAngle = quantity("angle", ge=-MAX_ANGLE_BETWEEN_PIECES, le=MAX_ANGLE_BETWEEN_PIECES)
 # What a key for a material needs, for messages
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
@@ -329,7 +329,7 @@ class Contact(Table):
         "total normal force on the interface, weight included; [contact.approach] may be given in place of this key",
     )
     pairs: key(
-        whole_number(1, MAX_PAIRS),
+        whole_number(1, MAX_EQUAL_PATCHES),
         "number of equal patches that share the load; forces and stiffnesses are reported "
         "for all these patches together",
     ) = 1

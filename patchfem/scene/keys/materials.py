@@ -14,14 +14,15 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-SEPARATORS = r"[\s_-]"  # characters that are ignored in the name of a material
-MAX_NEAR_NAMES = 3  # largest number of materials that are proposed for an unknown name
-MIN_PREFIX_LENGTH = 3  # smallest number of characters for which the beginning of a name is compared
+IGNORED_SEPARATORS_PATTERN = r"[\s_-]"  # characters that are ignored in the name of a material
+MAX_PROPOSED_MATERIALS = 3  # largest number of materials that are proposed for an unknown name
+# Smallest number of characters for which the beginning of a name is compared
+MIN_MATERIAL_PREFIX_LENGTH = 3
 # Names with another meaning in other letter case: tin is a metal of about 50 GPa.
 CASE_SENSITIVE_NAMES = ("TiN",)
 # Smallest similarity ratio (difflib) for a proposal; below it, the
 # numbers of all steels look alike.
-MIN_SIMILARITY = 0.7
+MIN_MATERIAL_NAME_SIMILARITY = 0.7
 
 
 class YieldStrength(NamedTuple):
@@ -65,7 +66,7 @@ MATERIALS = _read_materials()
 
 def normalise_material_name(name: str) -> str:
     """Return the name of a material with case folded and separators removed, for comparisons."""
-    return re.sub(SEPARATORS, "", name.casefold())
+    return re.sub(IGNORED_SEPARATORS_PATTERN, "", name.casefold())
 
 
 @cache
@@ -82,7 +83,7 @@ def find_material_name(written_name: str) -> str | None:
     """Return the name in MATERIALS that a written name refers to, or None if it is unknown."""
     spelling = normalise_material_name(written_name)
     name = list_spellings().get(spelling)
-    if is_case_sensitive(spelling) and re.sub(SEPARATORS, "", written_name) != name:
+    if is_case_sensitive(spelling) and re.sub(IGNORED_SEPARATORS_PATTERN, "", written_name) != name:
         return None
     return name
 
@@ -99,11 +100,13 @@ def advise_on_material(written_name: str) -> str:
     """
     spellings = list_spellings()
     written = normalise_material_name(written_name)
-    near_spellings = get_close_matches(written, spellings, len(spellings), MIN_SIMILARITY)
-    if len(written) >= MIN_PREFIX_LENGTH:
+    near_spellings = get_close_matches(
+        written, spellings, len(spellings), MIN_MATERIAL_NAME_SIMILARITY
+    )
+    if len(written) >= MIN_MATERIAL_PREFIX_LENGTH:
         longer = [spelling for spelling in spellings if spelling.startswith(written)]
         near_spellings = [*longer, *near_spellings]
     near_names = list(dict.fromkeys(spellings[spelling] for spelling in near_spellings))
-    quoted_names = " or ".join(f"'{name}'" for name in near_names[:MAX_NEAR_NAMES])
+    quoted_names = " or ".join(f"'{name}'" for name in near_names[:MAX_PROPOSED_MATERIALS])
     question = f"did you mean {quoted_names}? " if near_names else ""
     return f"{question}use one of {', '.join(MATERIALS)}"

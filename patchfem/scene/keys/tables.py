@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from ...effects import LAWS, MAX_COORDINATES, WAVEFORMS
+from ...effects import LAWS, MAX_RIG_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
 from .quantities import format_si, parse_quantity
@@ -46,7 +46,7 @@ from .values import TomlValue
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
 MAX_MASS_NUMBER = 1_000_000  # largest number of a mass in a key
-MAX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
+MAX_MATRIX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
 
 
 class Normal(Table):
@@ -314,7 +314,7 @@ class Interface(Friction):
         return key.replace("contact", "structure.interface.contact", 1)
 
 
-Coordinate = whole_number(1, MAX_ROW_NUMBER) | Text
+Coordinate = whole_number(1, MAX_MATRIX_ROW_NUMBER) | Text
 
 
 class Reduced(Table):
@@ -384,7 +384,7 @@ class Structure(Table):
         Length,
         "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
     )
-    mode: array(Mode, least=0, most=MAX_COORDINATES) = ()
+    mode: array(Mode, least=0, most=MAX_RIG_COORDINATES) = ()
     measured: key(
         Literal["free", "stuck"],
         "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
@@ -399,7 +399,7 @@ class Structure(Table):
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: optional(
-        array(Mass, most=MAX_COORDINATES),
+        array(Mass, most=MAX_RIG_COORDINATES),
         "masses that are connected by springs; these masses replace the modes",
     )
     output_mass: optional(

@@ -48,7 +48,7 @@ DIVISOR_KINDS = {
     "sweep rate",
 }
 # Word of a JSON schema that names an inner table; `schema.make_schema` replaces it by a reference.
-TABLE_WORD = "$table"
+INNER_TABLE_WORD = "$table"
 # Smallest similarity ratio (difflib) for which an unknown name is taken for a misspelling.
 MIN_NAME_SIMILARITY = 0.6
 
@@ -294,7 +294,7 @@ class Table(BaseModel):
         with `handler`, which converts it.
         """
         is_inner = schema["type"] == "function-plain"
-        return {TABLE_WORD: cls.__name__} if is_inner else handler(schema)
+        return {INNER_TABLE_WORD: cls.__name__} if is_inner else handler(schema)
 
     @classmethod
     def _validate_inner(cls, value: TomlValue | Table) -> Table:

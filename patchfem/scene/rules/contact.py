@@ -6,16 +6,16 @@ from ...effects import GAP_SHAPES
 from ..keys.contact import Contact, compute_outermost_strip_distance
 from ..keys.removed import describe_removed
 from .facts import TableFacts
-from .outlines import PIECE_NAMES, check_outlines, find_flat_length
+from .outlines import PIECE_KEYS_OF_PATCH, check_outlines, find_flat_length
 from .scene_draft import SceneDraft
 from .view import TableView
 
 # Largest ratio of the height of a piece to its length; from 80 000 on, the stiffness of
 # the piece is lost to round-off.
-MAX_SLENDERNESS = 10_000
+MAX_PIECE_SLENDERNESS = 10_000
 # Largest number of elements along the interface; even with 10 000, the
 # dense matrices take gigabytes.
-MAX_ELEMENTS = 100_000
+MAX_INTERFACE_ELEMENTS = 100_000
 
 
 def find_max_load(patch: TableView) -> float:
@@ -23,7 +23,7 @@ def find_max_load(patch: TableView) -> float:
 
     It is that of the softer substrate.
     """
-    moduli = [(patch[name].substrate or patch.substrate).young for name in PIECE_NAMES]
+    moduli = [(patch[name].substrate or patch.substrate).young for name in PIECE_KEYS_OF_PATCH]
     return min(moduli) * find_flat_length(patch) * patch.width * patch.pairs
 
 
@@ -62,11 +62,11 @@ def _check_sizes(patch: TableFacts, flat_length: float) -> None:
             f"{patch.load:.3g} N is a mean pressure above Young's modulus, but the pieces are elastic and strain "
             f"little; less than {max_load:.3g} N is needed",
         )
-    max_height = MAX_SLENDERNESS * patch.length
+    max_height = MAX_PIECE_SLENDERNESS * patch.length
     if patch.height > max_height:
         patch.add_mistake(
             "height",
-            f"{patch.height:g} m is more than {MAX_SLENDERNESS} times contact.length, but the stress is noticeable "
+            f"{patch.height:g} m is more than {MAX_PIECE_SLENDERNESS} times contact.length, but the stress is noticeable "
             f"only to a depth of a few times contact.length; use at most {max_height:.3g} m, and represent the rest of "
             "the height by a spring of the structure",
         )
@@ -85,11 +85,11 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
     if size > flat_length:
         name = "contact.length =" if flat_length == patch.length else "the interface length of"
         patch.add_mistake("element_size", f"{size} m is longer than {name} {flat_length} m")
-    if patch.length > MAX_ELEMENTS * size:
+    if patch.length > MAX_INTERFACE_ELEMENTS * size:
         patch.add_mistake(
             "element_size",
-            f"elements of {size:g} m on a length of {patch.length:g} m are more than {MAX_ELEMENTS}; use at least "
-            f"{patch.length / MAX_ELEMENTS:.3g} m, or leave this key out",
+            f"elements of {size:g} m on a length of {patch.length:g} m are more than {MAX_INTERFACE_ELEMENTS}; use at least "
+            f"{patch.length / MAX_INTERFACE_ELEMENTS:.3g} m, or leave this key out",
         )
 
 
@@ -137,7 +137,7 @@ def _check_load_line(patch: TableFacts, half_length: float) -> None:
 def _check_coatings(patch: TableFacts) -> None:
     """Report coatings of a patch that are not thinner than their piece."""
     layers = [("coating.thickness", patch.coating, patch.height)]
-    for name in PIECE_NAMES:
+    for name in PIECE_KEYS_OF_PATCH:
         piece = patch[name]
         key = f"{name}.coating.thickness" if piece.coating else f"{name}.height"
         if piece:

@@ -33,7 +33,7 @@ def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
                 f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed",
             )
         elif "kinetic" in unused:
-            law.add_remark("kinetic", CONSTANT_LENGTH)
+            law.add_remark("kinetic", CONSTANT_LENGTH_REMARK)
     if law.static == 0 and law.stiffness and law_takes_key(law.table.law, "stiffness"):
         law.add_mistake(
             "static", f"must be > 0 with law '{law.law}', whose springs need a slip force"
@@ -41,7 +41,9 @@ def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
 
 
 # Remark on a key that has no effect
-CONSTANT_LENGTH = "has no effect while the bond length is constant; add rest_growth and slip_growth"
+CONSTANT_LENGTH_REMARK = (
+    "has no effect while the bond length is constant; add rest_growth and slip_growth"
+)
 
 
 def _check_bonds(law: TableFacts, unused: list[str]) -> None:
@@ -50,7 +52,7 @@ def _check_bonds(law: TableFacts, unused: list[str]) -> None:
     `unused` are the keys that have no meaning for this law.
     """
     if "rest_speed" in unused:
-        law.add_remark("rest_speed", CONSTANT_LENGTH)
+        law.add_remark("rest_speed", CONSTANT_LENGTH_REMARK)
     if "temperature" in unused:
         missing = "activation temperatures; add rest_activation, slip_activation or both"
         if not law.rest_growth:

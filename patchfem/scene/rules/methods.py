@@ -112,7 +112,7 @@ ENGINE_SUPPORT = {
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
 # Key of the engine that computes the motion
-METHOD_KEY = "accuracy.method"
+ENGINE_KEY = "accuracy.method"
 
 
 def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> str:
@@ -182,7 +182,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     return True
 
 
-def check_method(draft: SceneDraft, kind: str) -> None:
+def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
     """Report an accuracy.method that cannot solve the scene of a draft.
 
     A method that is not used in this `kind` of scene gets a remark.
@@ -190,12 +190,12 @@ def check_method(draft: SceneDraft, kind: str) -> None:
     method = draft.values.accuracy.method
     if method in list_unused_methods(kind):
         draft.add_remark(
-            METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
+            ENGINE_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
     if method and kind in ("rig", "linear"):
         reason = _find_obstacle(method, find_motion_features(draft.tables, kind))
         if reason:
-            draft.add_mistake(METHOD_KEY, reason)
+            draft.add_mistake(ENGINE_KEY, reason)
 
 
 def list_unused_methods(kind: str) -> tuple[str, ...]:

@@ -2,8 +2,8 @@
 
 from ...effects import name_laws_with_key
 from ..keys.choices import (
-    EQUAL_LENGTHS,
-    NEEDS,
+    EQUALLY_LONG_LISTS,
+    NEEDED_KEYS,
     REFUSED_KEYS,
     Need,
     find_choices,
@@ -13,7 +13,7 @@ from ..keys.choices import (
 from .facts import TableFacts
 from .scene_draft import SceneDraft
 
-HINTS = {  # what else a user should know about a missing key
+MISSING_KEY_HINTS = {  # what else a user should know about a missing key
     "mode": "a mass on a spring is a mode with the frequency sqrt(k/m)/(2 pi)",
     "rate": "such as '0.5 Hz/s', or log_rate = '1 oct/min'",
     "spectrum": "a file of a spectrum has the header frequency [Hz],level [g^2/Hz]",
@@ -25,7 +25,7 @@ HINTS = {  # what else a user should know about a missing key
 def check_needed_keys(draft: SceneDraft) -> None:
     """Report the keys that the tables of a draft lack or exclude, and add a remark on each key without meaning.
 
-    Which keys a table needs follows from its selectors, such as `law` or `waveform`, from other keys (NEEDS), and from
+    Which keys a table needs follows from its selectors, such as `law` or `waveform`, from other keys (NEEDED_KEYS), and from
     lists that must have equal lengths.
     """
     for table_key, model_table in iterate_tables(draft.tables):
@@ -36,13 +36,13 @@ def check_needed_keys(draft: SceneDraft) -> None:
         for need, is_required, reason in choices.needs:
             used = [bundle for bundle in need.bundles if bundle[0] not in choices.unused]
             _check_need(table, need._replace(bundles=used), reason, is_required=is_required)
-        for model, needed_by_key in NEEDS.items():
+        for model, needed_by_key in NEEDED_KEYS.items():
             for key, word in needed_by_key.items() if isinstance(model_table, model) else ():
                 if table.has(key):
                     _check_need(table, parse_needs(word)[0], key, is_required=True)
 
         # Lists with one value for each value of another list.
-        for key, other in EQUAL_LENGTHS.get(type(model_table), {}).items():
+        for key, other in EQUALLY_LONG_LISTS.get(type(model_table), {}).items():
             lengths = [len(tuple(table[name])) for name in (key, other)]
             if key not in choices.unused and all(lengths) and lengths[0] != lengths[1]:
                 table.add_mistake(
@@ -87,4 +87,6 @@ def _check_need(table: TableFacts, need: Need, reason: str, *, is_required: bool
             sentence = f"{reason} needs {keys}"
         for key in first:
             if not is_written(key):
-                table.add_missing(key, "; ".join(filter(None, (sentence, HINTS.get(key)))))
+                table.add_missing(
+                    key, "; ".join(filter(None, (sentence, MISSING_KEY_HINTS.get(key))))
+                )

@@ -4,9 +4,9 @@ from .facts import TableFacts
 from .view import UNKNOWN_VALUE, TableView
 
 # Keys of a patch that hold its two pieces
-PIECE_NAMES = ("upper", "lower")
+PIECE_KEYS_OF_PATCH = ("upper", "lower")
 # Keys of a piece for the lengths [m] of its shaped ends
-END_KEYS = ("chamfer", "end_radius")
+PIECE_END_KEYS = ("chamfer", "end_radius")
 # Smallest end, or difference of lengths, as a fraction of the length of a piece; a smaller
 # one is smaller than any element.
 MIN_PIECE_END_FRACTION = 1e-5
@@ -23,8 +23,8 @@ def find_flat_length(patch: TableView) -> float:
     It is UNKNOWN_VALUE if there is none.
     """
     lengths = []
-    for name in PIECE_NAMES:
-        end = max(patch[name][key] or 0.0 for key in END_KEYS)
+    for name in PIECE_KEYS_OF_PATCH:
+        end = max(patch[name][key] or 0.0 for key in PIECE_END_KEYS)
         length = find_piece_length(patch, name) - 2 * end
         if not length > 0:
             return UNKNOWN_VALUE
@@ -34,10 +34,10 @@ def find_flat_length(patch: TableView) -> float:
 
 def check_outlines(patch: TableFacts) -> None:
     """Report mistakes in the lengths and the ends of the two pieces of a patch."""
-    for name in PIECE_NAMES:
+    for name in PIECE_KEYS_OF_PATCH:
         _check_piece(patch, name)
-    lengths = [find_piece_length(patch, name) for name in PIECE_NAMES]
-    written = [name for name in PIECE_NAMES if patch.has(f"{name}.length")]
+    lengths = [find_piece_length(patch, name) for name in PIECE_KEYS_OF_PATCH]
+    written = [name for name in PIECE_KEYS_OF_PATCH if patch.has(f"{name}.length")]
     if written and 0 < abs(lengths[0] - lengths[1]) < MIN_PIECE_END_FRACTION * max(lengths):
         patch.add_mistake(
             f"{written[-1]}.length",
@@ -56,7 +56,7 @@ def _check_piece(patch: TableFacts, name: str) -> None:
     height = piece.height or patch.height
     coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0
-    for key in END_KEYS:
+    for key in PIECE_END_KEYS:
         end = piece[key]
         if 2 * end >= length:
             sentence = (

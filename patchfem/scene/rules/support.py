@@ -1,9 +1,9 @@
-"""Combinations of effects that a scene may contain but no run can compute: the table SUPPORT.
+"""Combinations of effects that a scene may contain but no run can compute: the table UNSUPPORTED_COMBINATIONS.
 
 Each row of support.toml names two or more features and says what to do instead; LIMITS.md lists the rows and defines the
-features. A feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of
-the patch of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can compute
-stands in `methods`.
+features. A feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of JOINT_FEATURES;
+keys of the patch of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can
+compute stands in `methods`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .facts import TableFacts
 from .methods import (
-    check_method,
+    check_accuracy_method,
     describe_load_change,
     find_climbed_grooves,
     find_heave_key,
@@ -44,7 +44,8 @@ from .view import ViewValue, wrap_value
 
 # Features of the whole scene: their rows are tried once, also where no law could be read.
 SCENE_FEATURES = ("wear", "structure.measured=stuck", "sensor apart from the output")
-SUMS = ("direct", "truncated", "merged")  # methods of accuracy.quadrature that sum single bonds
+# Methods of accuracy.quadrature that sum single bonds
+SINGLE_BOND_SUMS = ("direct", "truncated", "merged")
 
 
 class Joint(TableFacts):
@@ -209,7 +210,7 @@ LAW_FEATURES = {
     "law of an averaged pressure": lambda j: j.has_trait("averaged"),
     "law that sticks rigidly": lambda j: j.has_trait("set-valued") and j.supports("shear"),
 }
-FEATURES = {
+JOINT_FEATURES = {
     name: Feature(is_there, "{table_key}.law", "{law_description}")
     for name, is_there in LAW_FEATURES.items()
 } | {
@@ -263,7 +264,7 @@ FEATURES = {
     ),
     "sum by recursion": Feature(lambda j: not j.needs_list),
     "named method of the sum": Feature(
-        lambda j: j.has_trait("bonds") and j.scene.accuracy.quadrature in SUMS,
+        lambda j: j.has_trait("bonds") and j.scene.accuracy.quadrature in SINGLE_BOND_SUMS,
         "accuracy.quadrature",
         "'{scene.accuracy.quadrature}'",
     ),
@@ -301,9 +302,9 @@ FEATURES = {
 
 @cache
 def find_feature(name: str) -> Feature:
-    """Return the feature `name` of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
-    if name in FEATURES:
-        return FEATURES[name]
+    """Return the feature of this name in UNSUPPORTED_COMBINATIONS: a row of JOINT_FEATURES, a key, or a key with a value."""
+    if name in JOINT_FEATURES:
+        return JOINT_FEATURES[name]
     key, _, value = name.partition("=")
     shown_key = key.replace("patch", "{patch_key}", 1) if key.startswith("patch.") else key
     if value:
@@ -330,15 +331,15 @@ def _read_rows() -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-SUPPORT = _read_rows()
+UNSUPPORTED_COMBINATIONS = _read_rows()
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
     """Report combinations of keys in a draft that a run of this kind cannot compute yet.
 
-    The combinations are the rows of SUPPORT, which are tried on each interface.
+    The combinations are the rows of UNSUPPORTED_COMBINATIONS, which are tried on each interface.
     """
-    check_method(draft, kind)
+    check_accuracy_method(draft, kind)
     joints = [Joint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
     for index, interface in enumerate(draft.values.structure.interface if kind == "rig" else ()):
         table = interface.table
@@ -347,7 +348,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         # Many rows name the same feature, which is looked for only once.
         is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
         reported: set[str] = set()  # one mistake for each key is enough
-        for names, instead in SUPPORT:
+        for names, instead in UNSUPPORTED_COMBINATIONS:
             first, *others = names.split(", ")
             feature = find_feature(first)
             is_tried = not joint.is_interface if first in SCENE_FEATURES else joint.is_read
@@ -360,7 +361,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
 
 def describe_row(names: str, instead: str) -> str:
-    """Return the message of a row of SUPPORT, with names of properties of a `Joint` in braces.
+    """Return the message of a row of UNSUPPORTED_COMBINATIONS, with names of properties of a `Joint` in braces.
 
     `names` are the features of the row, and `instead` is what the user can do.
     """

@@ -41,24 +41,24 @@ def _list_rows(table: str) -> dict[str, str]:
     return rows
 
 
-MISTAKES = _list_rows("mistakes")
-REMARKS = _list_rows("remarks")
-MISSING_TABLES = _list_rows("missing_tables")
-MISSING = _list_rows("missing")
+MISTAKE_RULES = _list_rows("mistakes")
+REMARK_RULES = _list_rows("remarks")
+MISSING_TABLE_RULES = _list_rows("missing_tables")
+MISSING_KEY_RULES = _list_rows("missing")
 
 
 def check_together(draft: SceneDraft, kind: str) -> None:
     """Report the keys of a draft that need or exclude keys of other tables, or have no effect with them.
 
-    `kind` is the kind of scene. Each row of the tables MISTAKES, REMARKS, MISSING_TABLES and MISSING is a condition,
-    such as a key and its value, with a sentence.
+    `kind` is the kind of scene. Each row of the tables MISTAKE_RULES, REMARK_RULES, MISSING_TABLE_RULES and
+    MISSING_KEY_RULES is a condition, such as a key and its value, with a sentence.
     """
     patches = [key for key, _ in iterate_patches(draft)]
     for rows, report in (
-        (MISTAKES, draft.add_mistake),
-        (REMARKS, draft.add_remark),
-        (MISSING_TABLES, draft.add_missing_table),
-        (MISSING, draft.add_missing),
+        (MISTAKE_RULES, draft.add_mistake),
+        (REMARK_RULES, draft.add_remark),
+        (MISSING_TABLE_RULES, draft.add_missing_table),
+        (MISSING_KEY_RULES, draft.add_missing),
     ):
         for condition, sentence in rows.items():
             for patch in patches if "patch." in condition else [""]:

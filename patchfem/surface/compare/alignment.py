@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..quantity import SIDE
-from .depth_map import UNWORN_LIMIT
+from ..quantity import HALF_WIDTH_95
+from .depth_map import UNWORN_LIMIT_DEVIATIONS
 from .fit import Fit, evaluate, fit_unworn
 from .model import MAX_GAIN_CHANGE, Model
 from .place import Place, find_place, order
 from .raster import MIN_TRACE_HEIGHTS, Raster, fill_gaps
 from .statistics import (
-    TINY,
+    MIN_DIVISOR,
     find_mirror_finish,
     find_mode,
     remove_long_waves,
@@ -21,31 +21,32 @@ from .statistics import (
 
 # Largest number of points to which the place is fitted. More would hardly improve it.
 MAX_FIT_POINTS = 40_000
-# Smallest part of the own surface that both surfaces must show
-MIN_COMMON = 0.2
+# Smallest part of the sampled surface that both surfaces must show
+MIN_COMMON_PART = 0.2
 # Largest relative difference in length of two traces at the same place
-MAX_STRETCH = 0.015
-N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
+MAX_RELATIVE_STRETCH = 0.015
+TRIED_DATUM_TERM_COUNTS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
-BEND_GAIN = 0.8
+PARABOLA_NOISE_RATIO = 0.8
 # Noise about a parabola relative to that about a line below which the parabola is subtracted even if it leaves heights
 # above the first trace: then no line fits at all
-CLEAR_BEND_GAIN = 0.2
-MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
+CLEAR_PARABOLA_NOISE_RATIO = 0.2
+# Fraction of the heights above the first trace that a parabola may add
+MAX_GROWTH_FRACTION_BY_PARABOLA = 0.01
 # Significance of the correlation at a place above which the place is sure without other evidence
 SURE_SIGNIFICANCE = 12.0
 # Significance of the correlation at a place that suffices if enough heights agree, too
 LIKELY_SIGNIFICANCE = 6.0
 # Smallest fraction, of the heights that do not agree by chance, that must agree at a likely place
-MIN_EXCESS_AGREEMENT = 0.2
+MIN_EXCESS_AGREEMENT_FRACTION = 0.2
 # Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
-MIN_AGREEMENT = 3.0
-# Fraction of heights that must agree in addition to MIN_AGREEMENT times that of unrelated surfaces
-MIN_AGREEING = 0.05
-N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
-MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
-EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
-MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
+MIN_AGREEMENT_OVER_CHANCE = 3.0
+# Fraction of heights that must agree in addition to MIN_AGREEMENT_OVER_CHANCE times that of unrelated surfaces
+MIN_EXTRA_AGREEMENT = 0.05
+N_CHANCE_PLACES = 15  # number of other places that show how many heights agree by chance
+MIN_DEPTH_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
+ROUNDING_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
+CALIBRATED_GAIN_DEVIATION = 0.01  # standard deviation of the gain of two calibrated measurements
 N_GAIN_STEPS = 2  # number of steps in which the gain is found
 N_GAIN_TILES = {1: 40, 2: 8}  # number of tiles along each side that show the error of the gain
 MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in standard deviations
@@ -67,7 +68,7 @@ class Aligned:
     model: Model | None = None
     fit: Fit | None = None
     place: Place | None = None
-    gain_error: float = MAX_GAIN_ERROR
+    gain_error: float = CALIBRATED_GAIN_DEVIATION
 
 
 def align(
@@ -98,8 +99,8 @@ def align(
     if model.known.sum() < MIN_TRACE_HEIGHTS:
         return _refuse(first, second)
 
-    digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
-    digit = max(digit, MIN_NOISE)
+    digit = ROUNDING_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
+    digit = max(digit, MIN_DEPTH_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
     fit, gain_error = _fit_gain(model, fit, digit)
     aligned = Aligned("", None, model, fit, place, gain_error)
@@ -107,7 +108,7 @@ def align(
     if shift is None and not _is_same_place(aligned):
         return _refuse(first, second)
     unworn = float(fit.unworn.mean())
-    if unworn < MIN_AGREEING:
+    if unworn < MIN_EXTRA_AGREEMENT:
         return Aligned("no_datum", {"unworn": unworn})
     return _use_all_points(aligned, first, second, digit)
 
@@ -127,12 +128,12 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
     `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every axis,
     by default as many as MAX_FIT_POINTS allows.
     """
-    own, other = order(first, second.mirror() if place.mirrored else second)
+    sampled, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
-        stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
-    model = Model(own, other, place, stride)
+        stride = int(np.ceil((sampled.z.size / MAX_FIT_POINTS) ** (1 / sampled.z.ndim)))
+    model = Model(sampled, other, place, stride)
     count = model.known.sum()
-    return model if count >= max(MIN_TRACE_HEIGHTS, MIN_COMMON * model.known.size) else None
+    return model if count >= max(MIN_TRACE_HEIGHTS, MIN_COMMON_PART * model.known.size) else None
 
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
@@ -149,7 +150,7 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
     """
     fit = aligned.fit
     model = aligned.model
-    if model.own.z.shape == order(first, second)[0].z.shape:
+    if model.sampled.z.shape == order(first, second)[0].z.shape:
         return aligned
     shift = fit.state[: model.n_axes]
     place = aligned.place._replace(shift=shift, turn=float(fit.state[model.n_axes]))
@@ -165,11 +166,11 @@ def _is_same_place(aligned: Aligned) -> bool:
     """
     model = aligned.model
     fit = aligned.fit
-    own = model.own.z[model.known]
-    heights = (own, own - model.sign * fit.depth)
+    sampled = model.sampled.z[model.known]
+    heights = (sampled, sampled - model.sign * fit.depth)
     waves = [remove_long_waves(fill_gaps(model.draw(z))) for z in heights]
     noise = float(np.median(fit.noise))
-    is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_STRETCH
+    is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_RELATIVE_STRETCH
     if is_stretched or noise > min(z[model.known].std() for z in waves):
         return False
     significance = aligned.place.significance
@@ -177,10 +178,10 @@ def _is_same_place(aligned: Aligned) -> bool:
         return True
     chance_fraction = _estimate_chance(*waves, noise)
     agreeing_fraction = fit.unworn.mean()
-    min_excess = MIN_EXCESS_AGREEMENT * (1 - chance_fraction)
+    min_excess = MIN_EXCESS_AGREEMENT_FRACTION * (1 - chance_fraction)
     if significance > LIKELY_SIGNIFICANCE and agreeing_fraction - chance_fraction > min_excess:
         return True
-    return agreeing_fraction > MIN_AGREEMENT * chance_fraction + MIN_AGREEING
+    return agreeing_fraction > MIN_AGREEMENT_OVER_CHANCE * chance_fraction + MIN_EXTRA_AGREEMENT
 
 
 def _estimate_chance(first, second, noise: float) -> float:
@@ -193,10 +194,10 @@ def _estimate_chance(first, second, noise: float) -> float:
     """
     count = first.shape[-1]
     fractions = []
-    for k in range(1, N_OTHER_PLACES + 1):
-        depth = np.roll(first, k * count // (N_OTHER_PLACES + 1), axis=-1) - second
+    for k in range(1, N_CHANCE_PLACES + 1):
+        depth = np.roll(first, k * count // (N_CHANCE_PLACES + 1), axis=-1) - second
         distance = np.abs(depth - find_mode(depth.ravel()))
-        fractions.append((distance < UNWORN_LIMIT * noise).mean())
+        fractions.append((distance < UNWORN_LIMIT_DEVIATIONS * noise).mean())
     return float(np.median(fractions))
 
 
@@ -215,7 +216,7 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
         Whether only the datum with the fewest terms is fitted.
     """
     best = None
-    for n_terms in N_TERMS[model.n_axes]:
+    for n_terms in TRIED_DATUM_TERM_COUNTS[model.n_axes]:
         if best is not None and is_straight:
             break
         start = model.find_datum(state, n_terms)
@@ -228,10 +229,12 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
 def _is_bent(straight: Fit, bent: Fit) -> bool:
     """Return whether a parabolic datum, the fit `bent`, explains the depths better than a straight one."""
     gain = np.median(bent.noise) / np.median(straight.noise)
-    if gain < CLEAR_BEND_GAIN:
+    if gain < CLEAR_PARABOLA_NOISE_RATIO:
         return True
-    has_grown = bent.grown.mean() > straight.grown.mean() + MAX_NEW_GROWTH
-    return bool((gain < BEND_GAIN or bent.n_changed < straight.n_changed / 2) and not has_grown)
+    has_grown = bent.grown.mean() > straight.grown.mean() + MAX_GROWTH_FRACTION_BY_PARABOLA
+    return bool(
+        (gain < PARABOLA_NOISE_RATIO or bent.n_changed < straight.n_changed / 2) and not has_grown
+    )
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
@@ -261,10 +264,10 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
         scaled = fit_unworn(model, state, fit.free, digit)
     gain = abs(float(scaled.state[-1]))
     is_clear = MIN_GAIN_DEVIATIONS * error < gain < MAX_GAIN_CHANGE
-    error = min(error if is_clear else float(np.hypot(error, gain)), MAX_GAIN_ERROR)
+    error = min(error if is_clear else float(np.hypot(error, gain)), CALIBRATED_GAIN_DEVIATION)
 
     # With a known gain, tops that are a little deeper than the valleys are worn.
-    model.max_gain_change = SIDE * error
+    model.max_gain_change = HALF_WIDTH_95 * error
     return fit_unworn(model, scaled.state if is_clear else fit.state, fit.free, digit), error
 
 
@@ -281,11 +284,11 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
     depth, waves = (subtract_local_level(field, unworn) for field in fields)
     use = unworn & np.isfinite(depth)
     if use.sum() < MIN_TRACE_HEIGHTS:
-        return 0.0, MAX_GAIN_ERROR
+        return 0.0, CALIBRATED_GAIN_DEVIATION
     use &= waves <= np.median(waves[use])
     waves = np.where(use, waves - waves[use].mean(), 0.0)
     depth = np.where(use, depth - depth[use].mean(), 0.0)
-    power = (waves**2).sum() + TINY
+    power = (waves**2).sum() + MIN_DIVISOR
     slope = float((waves * depth).sum() / power)
 
     # The noise of the first surface, half of that of the depth, is part of its waves too.

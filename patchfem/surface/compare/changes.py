@@ -16,23 +16,23 @@ from .statistics import (
 # Sides in samples of the windows whose mean depth is tested, by number of axes
 WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
 # Side in samples of the smallest changed part of scans. A smaller one may be an error of interpolation.
-MIN_PART_SIDE = 4
+MIN_CHANGED_SCAN_SIDE = 4
 # Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
 # and one more on each side
-MIN_RUN_SAMPLES = 9
+MIN_CHANGED_TRACE_SAMPLES = 9
 # Side in samples of the smallest group of points whose own depths, not means over windows, show a change, by number of
 # axes
-MIN_SPOT_SIDE = {1: 1, 2: 3}
+MIN_CHANGED_SPOT_SIDE = {1: 1, 2: 3}
 # Standard deviations to which a single depth counts in a mean over a window, by number of axes
-MAX_PULL_DEVIATIONS = {1: 4.0, 2: 8.0}
+MAX_DEPTH_DEVIATIONS = {1: 4.0, 2: 8.0}
 # Fraction of the means above or below zero that are unchanged at least.
-UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
-N_PARTS = 60  # parts of the trace whose means show a shallow track
-SHALLOW_FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
-MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
-DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
+MIN_UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
+N_TRACE_PARTS = 60  # parts of the trace whose means show a shallow track
+MIN_SHALLOW_FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
+MIN_SHALLOW_TRACK_PARTS = 3  # smallest number of parts in a shallow track
+ADDED_DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
 # Smallest height of a shallow track in standard deviations; 2 % of random walks have a deeper one.
-MIN_TRACK_HEIGHT = 8.0
+MIN_SHALLOW_TRACK_DEVIATIONS = 8.0
 
 
 def find_changed(depth, noise) -> np.ndarray:
@@ -55,7 +55,7 @@ def find_changed(depth, noise) -> np.ndarray:
 
     # Threshold in standard deviations, so high that noise rarely exceeds it anywhere in all windows
     limit = compute_threshold(len(windows) * known.sum())
-    pull = MAX_PULL_DEVIATIONS[depth.ndim]
+    pull = MAX_DEPTH_DEVIATIONS[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
 
     # Windows from single points to wide ones. Points that have changed already do not count in wider windows.
@@ -68,36 +68,36 @@ def find_changed(depth, noise) -> np.ndarray:
         # Mean over the window of the points that count
         mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
         # Slow errors of the datum make means scatter more than those of white noise.
-        fraction = UNCHANGED_FRACTION[depth.ndim]
+        fraction = MIN_UNCHANGED_FRACTION[depth.ndim]
         scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], fraction)
         scatter = max(scatter, side ** (-depth.ndim / 2))
 
         # All points of a window whose mean is too high have changed. Single points of scans count only in groups.
         high = (mean > limit * scatter) & (weight > 0.25)
-        spot = MIN_SPOT_SIDE[depth.ndim]
+        spot = MIN_CHANGED_SPOT_SIDE[depth.ndim]
         if side == 1:
             changed |= ndimage.binary_opening(high, np.ones((spot,) * depth.ndim))
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
     # A trace may have a track too shallow for any window. Groups of points too small for a change are left out.
-    side = MIN_PART_SIDE
+    side = MIN_CHANGED_SCAN_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)
         shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
         changed[places[shallow.samples]] = True
         changed = ndimage.binary_dilation(changed)
-        side = MIN_RUN_SAMPLES
+        side = MIN_CHANGED_TRACE_SAMPLES
     return ndimage.binary_opening(changed, np.ones((side,) * depth.ndim)) & known
 
 
 class Boxes(NamedTuple):
-    """Box functions over spans of the N_PARTS parts of a trace, from which a polynomial datum is subtracted.
+    """Box functions over spans of the N_TRACE_PARTS parts of a trace, from which a polynomial datum is subtracted.
 
     - spans (k, 2): first part of each span, and the first one beyond it.
-    - shapes (k, N_PARTS): boxes over the spans without the datum, divided by their norms.
+    - shapes (k, N_TRACE_PARTS): boxes over the spans without the datum, divided by their norms.
     - sizes (k,): these norms.
-    - datum (N_PARTS, j): orthonormal polynomials of the datum.
+    - datum (N_TRACE_PARTS, j): orthonormal polynomials of the datum.
     """
 
     spans: np.ndarray
@@ -112,13 +112,13 @@ def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
 
     A polynomial datum of the given degree is subtracted from each.
     """
-    datum = make_polynomials(N_PARTS, degree)
+    datum = make_polynomials(N_TRACE_PARTS, degree)
     spans = []
-    for first in range(n_beside, N_PARTS - n_beside):
-        for stop in range(first + n_inside, N_PARTS - n_beside + 1):
+    for first in range(n_beside, N_TRACE_PARTS - n_beside):
+        for stop in range(first + n_inside, N_TRACE_PARTS - n_beside + 1):
             spans.append((first, stop))
     spans = np.array(spans)
-    parts = np.arange(N_PARTS)
+    parts = np.arange(N_TRACE_PARTS)
     shapes = ((parts >= spans[:, :1]) & (parts < spans[:, 1:])).astype(float)
     shapes -= shapes @ datum @ datum.T
     sizes = np.linalg.norm(shapes, axis=1)
@@ -140,21 +140,21 @@ def find_shallow_track(depth) -> ShallowTrack:
 
     The test is the likelihood ratio of a box beside a cubic datum.
     """
-    if depth.size < 2 * N_PARTS:
-        return ShallowTrack(slice(0), MIN_TRACK_HEIGHT * float(depth.std()))
-    edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
+    if depth.size < 2 * N_TRACE_PARTS:
+        return ShallowTrack(slice(0), MIN_SHALLOW_TRACK_DEVIATIONS * float(depth.std()))
+    edges = np.linspace(0, depth.size, N_TRACE_PARTS + 1).astype(int)
     means = np.add.reduceat(depth, edges[:-1]) / np.diff(edges)
-    boxes = make_boxes(DATUM_DEGREE, SHALLOW_FLANK_PARTS, MIN_TRACK_PARTS)
+    boxes = make_boxes(ADDED_DATUM_DEGREE, MIN_SHALLOW_FLANK_PARTS, MIN_SHALLOW_TRACK_PARTS)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
     best = int(np.argmax(heights))
     residual = means - heights[best] * boxes.shapes[best]
-    freedom = N_PARTS - DATUM_DEGREE - 4
+    freedom = N_TRACE_PARTS - ADDED_DATUM_DEGREE - 4
     spread = float(np.sqrt(residual @ residual / freedom * estimate_correlation(residual)))
-    middle = (boxes.spans == (N_PARTS // 3, 2 * N_PARTS // 3)).all(axis=1)
+    middle = (boxes.spans == (N_TRACE_PARTS // 3, 2 * N_TRACE_PARTS // 3)).all(axis=1)
     # A track of this depth is found although its own error may lower it by two deviations.
-    limit = (MIN_TRACK_HEIGHT + 2.0) * spread / float(boxes.sizes[middle][0])
-    if heights[best] < MIN_TRACK_HEIGHT * spread:
+    limit = (MIN_SHALLOW_TRACK_DEVIATIONS + 2.0) * spread / float(boxes.sizes[middle][0])
+    if heights[best] < MIN_SHALLOW_TRACK_DEVIATIONS * spread:
         return ShallowTrack(slice(0), limit)
     first, stop = boxes.spans[best]
     return ShallowTrack(slice(edges[first], edges[stop]), limit)
@@ -169,8 +169,8 @@ def find_detection_limit(depth, noise) -> float:
         return find_shallow_track(depth).limit
     side = max(side for side in WINDOW_SIDES[2] if side <= max(min(depth.shape) / 4, 1))
     mean = ndimage.uniform_filter(
-        np.clip(depth / noise, -MAX_PULL_DEVIATIONS[2], MAX_PULL_DEVIATIONS[2]), side
+        np.clip(depth / noise, -MAX_DEPTH_DEVIATIONS[2], MAX_DEPTH_DEVIATIONS[2]), side
     )
-    scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
+    scatter = max(estimate_one_sided_scale(mean.ravel(), MIN_UNCHANGED_FRACTION[2]), 1 / side)
     threshold = compute_threshold(len(WINDOW_SIDES[2]) * depth.size)
     return float(threshold * scatter * np.median(noise))

@@ -16,11 +16,11 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..files.read import read_surface
 from ..profile import Profile, measure_step, robust_deviation
-from ..quantity import SIDE, Quantity
+from ..quantity import HALF_WIDTH_95, Quantity
 from . import waves
 from .alignment import SURE_SIGNIFICANCE, Aligned, align
 from .changes import find_detection_limit
-from .depth_map import UNWORN_LIMIT, DepthMap
+from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
 from .raster import Raster, clean_surface, make_raster
@@ -39,9 +39,9 @@ from .track import find_spans, get_margin, measure_track
 from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 # Number of lines of points at an end of a surface in which growth counts as growth at this end
-END_SAMPLES = 7
+N_END_LINES = 7
 # Fraction of the points of a line near an end above which the end has grown
-MIN_GROWN_LINE = 0.5
+MIN_GROWN_LINE_FRACTION = 0.5
 # Side in samples of the square by which worn places of scans are enlarged, so that flanks count
 WORN_MARGIN_SIDE = 7
 # Width of a track relative to the common part, beyond which it may be growth at its ends.
@@ -49,10 +49,10 @@ MAX_TRACK_FRACTION = 0.8
 # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
 MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
-MIN_BOW_RATIO = 3.0
-MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
+MIN_BOW_TO_WAVES_RATIO = 3.0
+MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 # Fraction of worn heights in a track below which it consists of worn tops.
-MIN_TOPS_FRACTION = 0.6
+MIN_WORN_TRACK_FRACTION = 0.6
 
 
 class Names(NamedTuple):
@@ -72,7 +72,7 @@ class Names(NamedTuple):
 
 
 # Names of the quantities by number of axes: 1 for traces, 2 for scans
-NAMES = {
+QUANTITY_NAMES_BY_AXES = {
     1: Names(
         lost="worn_area",
         grown="grown_area",
@@ -102,7 +102,7 @@ class Options(NamedTuple):
     """What is known of two surfaces.
 
     - units: of x (and y) and of z, for files that state none.
-    - direction: "x" or "y", along which traces run, or scans are evaluated; "".
+    - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if it is not known.
     - shift: known x of the second trace minus x of the first [m].
     - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
     - keep_spikes: whether spikes, dropouts and dust count.
@@ -116,10 +116,10 @@ class Options(NamedTuple):
 
 
 # Options of a comparison for which the user gives none
-DEFAULTS = Options()
+COMPARE_DEFAULTS = Options()
 
 
-def compare_files(before: Path, after: Path, options: Options = DEFAULTS) -> Comparison:
+def compare_files(before: Path, after: Path, options: Options = COMPARE_DEFAULTS) -> Comparison:
     """Compare two files of traces or of areal scans.
 
     Parameters
@@ -134,7 +134,7 @@ def compare_files(before: Path, after: Path, options: Options = DEFAULTS) -> Com
 
 
 def compare_surfaces(
-    before: Profile | Areal, after: Profile | Areal, options: Options = DEFAULTS
+    before: Profile | Areal, after: Profile | Areal, options: Options = COMPARE_DEFAULTS
 ) -> Comparison:
     """Compare two traces of the same line, or two scans of the same region.
 
@@ -162,7 +162,7 @@ def compare_surfaces(
 
     # Equal heights would have no noise.
     first, second = (make_raster(surface) for surface in cleaned)
-    names = NAMES[first.z.ndim]
+    names = QUANTITY_NAMES_BY_AXES[first.z.ndim]
     if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
         values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
         result = Comparison(before, after, Finding("identical", {}), values)
@@ -225,7 +225,7 @@ def _measure(
         Verdict, quantities by name, tracks and findings.
     """
     is_trace = rasters[0].z.ndim == 1
-    names = NAMES[rasters[0].z.ndim]
+    names = QUANTITY_NAMES_BY_AXES[rasters[0].z.ndim]
     if not aligned.reason:
         depths = make_depths(aligned.model, aligned.fit, aligned.gain_error)
         placement = _make_placement(aligned)
@@ -247,13 +247,15 @@ def _measure(
     grown, grown_error = depths.integrate(is_grown, -1.0)
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
-    sure_loss = find_sure_loss(depths) if is_placed else SIDE
+    sure_loss = find_sure_loss(depths) if is_placed else HALF_WIDTH_95
     # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
     drift = 0.0 if sharp > 0 else error
     largest = max(area, sharp)
-    lowest = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
-    highest = max(area + SIDE * error + depths.measure_hidden(covered), sharp)
+    lowest = max(
+        area - HALF_WIDTH_95 * error, (1 - HALF_WIDTH_95 * depths.errors.model) * sharp, 0.0
+    )
+    highest = max(area + HALF_WIDTH_95 * error + depths.measure_hidden(covered), sharp)
     loss = name_quantity(names.lost, largest, lowest, highest)
     sure_area = depths.integrate(depths.worn)[0]
     code = judge_change(largest, drift, sure_loss, sure_area, grown, grown_error)
@@ -305,7 +307,9 @@ def _find_detection_limit(depths: DepthMap) -> float:
     middle = np.zeros(count, bool)
     middle[count // 3 : 2 * count // 3] = True
     # The loss is found although its own error may lower it.
-    return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
+    return max(
+        limit, 2 * HALF_WIDTH_95 * depths.integrate(middle)[1] / (middle.sum() * depths.cell)
+    )
 
 
 def _make_placement(aligned: Aligned) -> Placement:
@@ -341,13 +345,13 @@ def _collect_findings(
     scale = placement.values.get("scale")
     lengths = {}
     if is_placed and scale is not None:
-        if not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH:
+        if not scale.low - MIN_REPORTED_LENGTH_ERROR < 1 < scale.high + MIN_REPORTED_LENGTH_ERROR:
             lengths = {"scale": scale.value, "low": scale.low, "high": scale.high}
 
     # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
     bow = abs(bend)
     bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
-    has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_TOPS_FRACTION)
+    has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_WORN_TRACK_FRACTION)
     known = placement.values.get("significance")
     significance = known.value if known else np.inf
 
@@ -399,7 +403,7 @@ def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
         margin = get_margin(span)
         covered[max(span[0] - margin, 0) : span[1] + margin + 1] = True
     # New roughness that stands above the first surface is no loss, nor is a spike.
-    is_near = np.abs(depths.depth) < 2 * UNWORN_LIMIT * depths.noise
+    is_near = np.abs(depths.depth) < 2 * UNWORN_LIMIT_DEVIATIONS * depths.noise
     return covered & (depths.worn | depths.missing | is_near) & ~depths.grown
 
 
@@ -446,7 +450,7 @@ def _doubt(
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
     waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = bow > area and bend > MIN_BOW_RATIO * waves_height
+    is_bow_large = bow > area and bend > MIN_BOW_TO_WAVES_RATIO * waves_height
     if is_bow_large and (code == "no_wear" or (code.startswith("worn") and is_cut)):
         return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
     return code, {}
@@ -462,7 +466,7 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
         others = tuple(axes - {axis})
         counts = depths.inside.sum(axis=others)
         grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
-        if max(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
+        if max(grown[:N_END_LINES].max(), grown[-N_END_LINES:].max()) > MIN_GROWN_LINE_FRACTION:
             return True
     return False
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from .statistics import remove_long_waves, subtract_local_level
 
-UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
-MODEL_ERROR = 0.004  # relative standard deviation of an area or volume due to tip and interpolation
+UNWORN_LIMIT_DEVIATIONS = 2.5  # standard deviations within which a depth counts as unworn
+# Relative standard deviation of an area or volume due to tip and interpolation
+INTERPOLATION_RELATIVE_ERROR = 0.004
 # Errors relative to those that the tiles show, which are few.
-SCATTER_FACTOR = 1.3
+FEW_TILES_ERROR_FACTOR = 1.3
 
 
 class DepthErrors(NamedTuple):
@@ -29,7 +30,7 @@ class DepthErrors(NamedTuple):
     drift: float = 0.0
     freedom: float = np.inf
     correlation: float = 1.0
-    model: float = MODEL_ERROR
+    model: float = INTERPOLATION_RELATIVE_ERROR
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +88,12 @@ class DepthMap:
         `part` is the mask. With the sign -1 grown material counts as positive.
         """
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
-        error = SCATTER_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
+        error = FEW_TILES_ERROR_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
         # The line over a gap misses the tops in it, which are worn deeper, and its valleys.
         gaps = self.scatter * float((part & self.missing).sum()) * self.cell
-        return value, float(np.sqrt(error**2 + gaps**2 + (MODEL_ERROR * value) ** 2))
+        return value, float(
+            np.sqrt(error**2 + gaps**2 + (INTERPOLATION_RELATIVE_ERROR * value) ** 2)
+        )
 
     def measure_hidden(self, covered) -> float:
         """Return the area [m2] or volume [m3] that slight wear may have outside the mask `covered`.
@@ -99,7 +102,7 @@ class DepthMap:
 
         Such wear is within the noise.
         """
-        limit = 2 * UNWORN_LIMIT
+        limit = 2 * UNWORN_LIMIT_DEVIATIONS
         relative = np.clip(self.depth / self.noise, -limit, limit)
         beside = self.inside & ~covered & ~self.missing
         loss_beside = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)

@@ -5,26 +5,34 @@ from itertools import product
 import numpy as np
 from scipy import ndimage, special
 
-from ..quantity import SIDE, Quantity
-from .depth_map import MODEL_ERROR, SCATTER_FACTOR, UNWORN_LIMIT, DepthErrors, DepthMap
+from ..quantity import HALF_WIDTH_95, Quantity
+from .depth_map import (
+    FEW_TILES_ERROR_FACTOR,
+    INTERPOLATION_RELATIVE_ERROR,
+    UNWORN_LIMIT_DEVIATIONS,
+    DepthErrors,
+    DepthMap,
+)
 from .fit import Fit
 from .model import Model
 from .raster import fill_gaps
 from .records import name_quantity
 from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
 
-N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
+# Number of tiles along each side, whose means show the errors of the datum
+N_DATUM_ERROR_TILES = {1: 40, 2: 8}
 # Smallest number of tiles that show the errors of the datum
-MIN_TILES = 6
-MIN_FREEDOM = (
-    3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
-)
+MIN_DATUM_ERROR_TILES = 6
+# Smallest number of independent tiles, as the correlation of few tiles is uncertain
+MIN_INDEPENDENT_TILES = 3.0
 # Smallest number of unworn heights in a tile that shows the errors of the datum
 MIN_DATUM_TILE_HEIGHTS = 5
-MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
+# Side of the window whose median depths give the largest depth
+MAX_DEPTH_WINDOW_SIDE = {1: 5, 2: 3}
 # Variance of the median of normal errors relative to that of their mean, pi/2
-MEDIAN_VARIANCE = 1.57
-MAX_DEPTH_NOISE = 4.0  # noise relative to the median above which a depth cannot be the largest
+MEDIAN_TO_MEAN_VARIANCE = 1.57
+# Noise relative to the median above which a depth cannot be the largest
+MAX_DEPTH_NOISE_RATIO = 4.0
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
@@ -56,9 +64,9 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     masks = {
         name: model.draw(getattr(fit, name), False)[box] for name in ("unworn", "worn", "grown")
     }
-    first = fill_gaps(model.own.z)[box]
+    first = fill_gaps(model.sampled.z)[box]
     if model.n_axes == 1:
-        # The own heights are those of the second trace, with its gain.
+        # The sampled heights are those of the second trace, with its gain.
         first = first / (1 + fit.state[-1]) + depth
     base = model.datum[(terms, *box)]
     before = subtract_plane(first, base[: 1 + model.n_axes])
@@ -70,10 +78,10 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         shifts.append(_bend_datum(depth, unworn, base))
     errors = estimate_errors(depth, noise, unworn, base, shifts)
 
-    model_error = float(np.hypot(MODEL_ERROR, gain_error))
+    model_error = float(np.hypot(INTERPOLATION_RELATIVE_ERROR, gain_error))
     # Holes of missing heights belong to the common part.
     inside = ndimage.binary_fill_holes(model.common[box])
-    axes = [axis[part] for axis, part in zip(model.own.axes, box)]
+    axes = [axis[part] for axis, part in zip(model.sampled.axes, box)]
     return DepthMap(
         x=axes[-1],
         y=axes[0] if model.n_axes > 1 else None,
@@ -84,7 +92,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         **masks,
         inside=inside,
         missing=inside & ~model.known[box],
-        cell=float(np.prod(model.own.steps)),
+        cell=float(np.prod(model.sampled.steps)),
         errors=errors._replace(model=model_error),
     )
 
@@ -107,7 +115,7 @@ def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
     """
     noise = np.full(depth.size, sigma)
     nothing = np.zeros(depth.size, bool)
-    unworn = (np.abs(depth) < UNWORN_LIMIT * sigma) & ~worn
+    unworn = (np.abs(depth) < UNWORN_LIMIT_DEVIATIONS * sigma) & ~worn
     # The errors are those of the unworn heights about their line.
     base = np.array([np.ones(depth.size), np.linspace(-1, 1, depth.size)])
     return DepthMap(
@@ -150,7 +158,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     """
     # Count of unworn heights in each tile, and the means of their depths and of the functions of the datum there.
     tiles = []
-    for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
+    for tile in split_tiles(depth.shape, N_DATUM_ERROR_TILES[depth.ndim]):
         use = unworn[tile]
         if use.sum() >= MIN_DATUM_TILE_HEIGHTS:
             parts = [values[tile][use].mean() for values in (depth, *base)]
@@ -160,17 +168,19 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     root = np.sqrt(counts)
     centers = np.array(centers).T * root[:, None]
     # Where tiles are few, a tile may share a single error.
-    variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
-    freedom = MIN_FREEDOM
+    variance = float(
+        np.median(noise) ** 2 * depth.size / N_DATUM_ERROR_TILES[depth.ndim] ** depth.ndim
+    )
+    freedom = MIN_INDEPENDENT_TILES
     drift = 0.0
-    if counts.size >= MIN_TILES:
+    if counts.size >= MIN_DATUM_ERROR_TILES:
         # The scatter of the means about the datum that fits them best gives s^2.
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
         # A slow drift makes neighbouring tiles share their errors, so that fewer of them are independent.
         shared = estimate_correlation(residual)
-        freedom = max(counts.size / shared - len(base), MIN_FREEDOM)
-        student = special.stdtrit(freedom, 0.975) / SIDE
+        freedom = max(counts.size / shared - len(base), MIN_INDEPENDENT_TILES)
+        student = special.stdtrit(freedom, 0.975) / HALF_WIDTH_95
         scatter = residual @ residual / (counts.size - len(base))
         drift = float(np.sqrt(scatter / counts.mean()))
         variance = float(scatter * shared * student**2)
@@ -220,17 +230,17 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
         Mask in the shape of the depths of the places that are as deep but for the noise.
     """
     n_axes = depths.depth.ndim
-    is_sure = depths.noise < MAX_DEPTH_NOISE * depths.noise_level
+    is_sure = depths.noise < MAX_DEPTH_NOISE_RATIO * depths.noise_level
     if (is_sure & depths.worn).any():
         is_sure &= depths.worn
-    smooth = ndimage.median_filter(depths.depth, MEDIAN_SIZE[n_axes])
+    smooth = ndimage.median_filter(depths.depth, MAX_DEPTH_WINDOW_SIDE[n_axes])
     smooth = np.where(is_sure, smooth, -np.inf)
     depth = np.where(is_sure, depths.depth, -np.inf)
 
     top = np.unravel_index(np.argmax(smooth), smooth.shape)
     # Heights that share an error do not improve a median.
     correlation = depths.errors.correlation
-    factor = MEDIAN_VARIANCE * correlation / MEDIAN_SIZE[n_axes] ** n_axes
+    factor = MEDIAN_TO_MEAN_VARIANCE * correlation / MAX_DEPTH_WINDOW_SIDE[n_axes] ** n_axes
     sigma = float(depths.noise[top]) * min(np.sqrt(factor), 1.0)
     near = smooth > smooth[top] - 2 * sigma
     bias = float(np.sqrt(2 * np.log(max(near.sum() / correlation, 1.0))) / 2 * sigma)
@@ -241,10 +251,10 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     coarser = float(np.mean([depth[half].max() for half in halves]))
     unresolved = crest - coarser if np.isfinite(coarser) else 0.0
     sigma = float(np.hypot(sigma, depths.level_error))
-    scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
-    error = SIDE * float(scatter) + unresolved
+    scatter = np.hypot(FEW_TILES_ERROR_FACTOR * sigma, depths.errors.model * value)
+    error = HALF_WIDTH_95 * float(scatter) + unresolved
     # A missing height may be as much deeper as worn depths scatter about those beside them.
     if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
-        crest += SIDE * depths.scatter
+        crest += HALF_WIDTH_95 * depths.scatter
     low = max(value - bias - error, 0.0)
     return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .depth_map import UNWORN_LIMIT
+from .depth_map import UNWORN_LIMIT_DEVIATIONS
 from .model import Model
 from .statistics import (
-    TINY,
-    TRUNCATED_VARIANCE,
+    MIN_DIVISOR,
+    UNWORN_VARIANCE_RATIO,
     estimate_one_sided_scale,
     solve_biweight_step,
 )
@@ -16,10 +16,10 @@ from .statistics import (
 MAX_FIT_CYCLES = 6  # number of alternations between the fit and the choice of the worn heights
 MAX_BIWEIGHT_STEPS = 15  # number of biweight steps in a cycle
 # Change of the depths, in standard deviations, below which the steps have converged.
-STEP_TOL = 1e-3
-MIN_UNWORN = 50  # smallest number of heights that are not worn
+BIWEIGHT_STEP_TOL = 1e-3
+MIN_UNWORN_HEIGHTS = 50  # smallest number of heights that are not worn
 # Smallest noise of a height relative to the scale of all of them; a fit of the noise to the slopes may go below.
-MIN_NOISE_FRACTION = 0.3
+MIN_NOISE_OVER_SCALE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Fit:
     def errors(self) -> np.ndarray:
         """Standard deviations (j,) of the fitted parameters that the noise of the unworn heights gives."""
         weighted = self.jacobian[self.unworn] / self.noise[self.unworn, None]
-        scale = np.sqrt((weighted**2).mean(axis=0)) + TINY
+        scale = np.sqrt((weighted**2).mean(axis=0)) + MIN_DIVISOR
         weighted = weighted / scale
         return np.sqrt(np.diag(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10))) / scale
 
@@ -85,10 +85,10 @@ def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
             change = solve_biweight_step(depth, jacobian, sigma, worn)
             state = state.copy()
             state[free] += change
-            if np.abs(jacobian @ change).max() < STEP_TOL * sigma:
+            if np.abs(jacobian @ change).max() < BIWEIGHT_STEP_TOL * sigma:
                 break
         fit = evaluate(model, state, free, digit, worn)
-        if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN:
+        if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN_HEIGHTS:
             break
         worn = fit.worn
     return fit
@@ -120,7 +120,7 @@ def evaluate(model: Model, state, free: list[int], digit: float, worn=None) -> F
     jacobian = model.compute_jacobian(state)
     noise = estimate_noise(depth, model.compute_noise_terms(state, jacobian), sigma, worn)
     worn = model.find_worn(depth, noise)
-    unworn = (np.abs(depth) < UNWORN_LIMIT * noise) & ~worn
+    unworn = (np.abs(depth) < UNWORN_LIMIT_DEVIATIONS * noise) & ~worn
     grown = model.find_changed(-depth, noise) & ~worn
     return Fit(state, free, depth, noise, unworn, worn, grown, jacobian[:, free])
 
@@ -150,12 +150,12 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
 
     noise = np.full(depth.size, sigma)
     for _ in range(4):
-        use = ~worn & (np.abs(depth) < UNWORN_LIMIT * noise)
-        if use.sum() < MIN_UNWORN:
+        use = ~worn & (np.abs(depth) < UNWORN_LIMIT_DEVIATIONS * noise)
+        if use.sum() < MIN_UNWORN_HEIGHTS:
             break
         weight = 1 / noise[use] ** 2
-        scale = terms[use].max(axis=0) + TINY
-        variance = depth[use] ** 2 / TRUNCATED_VARIANCE
+        scale = terms[use].max(axis=0) + MIN_DIVISOR
+        variance = depth[use] ** 2 / UNWORN_VARIANCE_RATIO
         factors = nnls(terms[use] / scale * weight[:, None], variance * weight)[0] / scale
-        noise = np.sqrt(np.maximum(terms @ factors, (MIN_NOISE_FRACTION * sigma) ** 2))
+        noise = np.sqrt(np.maximum(terms @ factors, (MIN_NOISE_OVER_SCALE * sigma) ** 2))
     return noise

@@ -7,17 +7,17 @@ the first trace was measured at another place and shows the roughness only.
 import numpy as np
 
 from ..profile import find_runs
-from .changes import MIN_TRACK_PARTS, N_PARTS, make_boxes
+from .changes import MIN_SHALLOW_TRACK_PARTS, N_TRACE_PARTS, make_boxes
 from .depth_map import DepthMap
 from .depths import make_section
 from .raster import Raster, fill_gaps
 from .statistics import subtract_plane
 
 # Number of shifted copies of the first trace, and of copies with random phases, that show what its roughness alone does
-N_TRACES = 50
+N_SHIFTED_COPIES = 50
 # Height of a track relative to the largest one in the copies of the first trace, above which it is not chance
-MIN_CLEARANCE = 1.2
-FLANK_PARTS = 6  # smallest number of parts of each flank
+MIN_TRACK_OVER_CHANCE_HEIGHT = 1.2
+MIN_FLANK_PARTS = 6  # smallest number of parts of each flank
 MIN_PART_SAMPLES = 4  # smallest number of samples of a part
 
 
@@ -40,7 +40,7 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     z = fill_gaps(second.z)
     step = float(second.steps[0])
     count = int(first.lengths[0] / step)
-    if min(z.size, count) < MIN_PART_SAMPLES * N_PARTS:
+    if min(z.size, count) < MIN_PART_SAMPLES * N_TRACE_PARTS:
         return None
     rough = np.interp(step * np.arange(count), first.axes[0] - first.origin[0], fill_gaps(first.z))
     rough = subtract_plane(rough, np.array([np.ones(count), np.linspace(-1, 1, count)]))
@@ -48,22 +48,25 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     random = np.random.default_rng(0)
     waves = np.fft.rfft(rough)
     traces = []
-    for start in np.arange(N_TRACES) * count // N_TRACES:
+    for start in np.arange(N_SHIFTED_COPIES) * count // N_SHIFTED_COPIES:
         phases = np.exp(2j * np.pi * random.random(waves.size))
         traces.append(np.resize(np.roll(rough, start), z.size))
         traces.append(np.resize(np.fft.irfft(np.abs(waves) * phases, count), z.size))
 
-    edges = np.linspace(0, z.size, N_PARTS + 1).astype(int)
+    edges = np.linspace(0, z.size, N_TRACE_PARTS + 1).astype(int)
     means, *others = np.add.reduceat([z, *traces], edges[:-1], axis=1) / np.diff(edges)
-    boxes = make_boxes(1, FLANK_PARTS, MIN_TRACK_PARTS)
+    boxes = make_boxes(1, MIN_FLANK_PARTS, MIN_SHALLOW_TRACK_PARTS)
     heights = -boxes.shapes @ means
     best = int(np.argmax(heights))
-    if heights[best] <= MIN_CLEARANCE * np.abs(boxes.shapes @ np.array(others).T).max():
+    if (
+        heights[best]
+        <= MIN_TRACK_OVER_CHANCE_HEIGHT * np.abs(boxes.shapes @ np.array(others).T).max()
+    ):
         return None
 
     # The flanks keep a part of distance from the box, whose ends are known to one part.
     start, stop = boxes.spans[best]
-    is_flank = np.ones(N_PARTS, bool)
+    is_flank = np.ones(N_TRACE_PARTS, bool)
     is_flank[start - 1 : stop + 1] = False
     # Pile-up on the flanks does not move the line of repeated medians.
     from scipy import stats
@@ -73,7 +76,7 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     depth = np.polyval(line[:2], np.arange(z.size)) - z
     beside = np.repeat(is_flank, np.diff(edges))
     roughness = np.median(np.abs(np.array(traces)[:, beside]), axis=1)
-    if np.median(np.abs(depth[beside])) > MIN_CLEARANCE * roughness.max():
+    if np.median(np.abs(depth[beside])) > MIN_TRACK_OVER_CHANCE_HEIGHT * roughness.max():
         return None
 
     # A round track reaches beyond the best box, up to where the means of parts are those of flanks.

@@ -1,10 +1,10 @@
 """Depth of the second surface below the first one, as a function of place and datum.
 
-A point p of the own surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the other
-one, with the own middle c; M stretches a trace or rotates a scan. The depth there is z1 + datum - z2, with a straight or
-parabolic datum of traces and a plane of scans. With another gain 1 + e of the instrument, it is (z1 + e z1 + datum -
-z2)/(1 + e), with the waves of z1 about its plane in the term e z1. The state is [shift (d), turn, datum (k), e], axes in
-the order y, x.
+A point p of the sampled surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the
+other one, where c is the middle of the sampled one; M stretches a trace or rotates a scan. The depth there is z1 +
+datum - z2, with a straight or parabolic datum of traces and a plane of scans. With another gain 1 + e of the
+instrument, it is (z1 + e z1 + datum - z2)/(1 + e), with the waves of z1 about its plane in the term e z1. The state is
+[shift (d), turn, datum (k), e], axes in the order y, x.
 """
 
 from functools import cached_property
@@ -27,37 +27,39 @@ from .statistics import (
 )
 from .tops import find_worn_tops
 
-BORDER_SAMPLES = 3  # distance from the border of a surface from which on its spline is accurate
+# Distance from the border of a surface from which on its spline is accurate
+INACCURATE_BORDER_SAMPLES = 3
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
-N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
+N_DATUM_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
 # Side of a surface relative to the standard deviation of a Gaussian. The waves longer than it are not used to refine the
 # place.
-PLACE_WAVES = {1: 100, 2: 20}
+SIDE_OVER_PLACE_GAUSSIAN = {1: 100, 2: 20}
 # Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
 # place
-MIN_WAVE_SAMPLES = 10.0
+MIN_PLACE_GAUSSIAN_SAMPLES = 10.0
 # Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
-REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
+REFINING_GAUSSIAN_SAMPLES = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-N_DATUMS = 150  # number of datums that are improved by concentration steps
-MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
+N_IMPROVED_DATUMS = 150  # number of datums that are improved by concentration steps
+MAX_COMPARED_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
 # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
-MIN_DETERMINANT = 1e-3
+MIN_DATUM_DETERMINANT = 1e-3
 # Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one. Datums of larger
 # scale are not compared.
-MAX_DATUM_SCALE = 4.0
-MIN_AGREEING_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
+MAX_DATUM_SCALE_RATIO = 4.0
+# Fraction of the heights at an end that agree, if the end is unworn
+MIN_AGREEING_END_FRACTION = 0.7
 # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
-MAX_AGREEING_DISTANCE = 5.0
+MAX_AGREEING_DISTANCE_IN_SCALES = 5.0
 # Distance of a height above a datum, relative to the smallest scale, from which on it has grown
-MIN_GROWN_DISTANCE = 10.0
+MIN_GROWN_DISTANCE_IN_SCALES = 10.0
 
 
 class Model:
-    """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place.
+    """Depths (n,) at the `known` points of the sampled surface, which both surfaces show at the first place.
 
     `max_gain_change` is the largest change of the gain that is left, until it is fitted.
 
@@ -65,18 +67,18 @@ class Model:
     stretch of traces), then the k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
     [1].
 
-    The "own" surface is the one on whose points depths are known: the first of two scans, the second of two traces.
+    The sampled surface is the one on whose points depths are known: the first of two scans, the second of two traces.
     """
 
-    def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
-        """Choose the common points at a place, of each `stride`-th own point.
+    def __init__(self, sampled: Raster, other: Raster, place: Place, stride: int = 1):
+        """Choose the common points at a place, of each `stride`-th sampled point.
 
-        `own` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
+        `sampled` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
         """
-        every = (..., *(slice(None, None, stride),) * own.z.ndim)
-        self.own = Raster(own.z[every], own.origin, own.steps * stride)
-        self.n_axes = own.z.ndim
-        # Heights are known along the own surface: the depth is own minus other for scans, the reverse for traces.
+        every = (..., *(slice(None, None, stride),) * sampled.z.ndim)
+        self.sampled = Raster(sampled.z[every], sampled.origin, sampled.steps * stride)
+        self.n_axes = sampled.z.ndim
+        # Heights are known along the sampled surface: the depth is sampled minus other for scans, the reverse for traces.
         self.sign = 1.0 if self.n_axes > 1 else -1.0
         self.other = other
         filled = fill_gaps(other.z)
@@ -86,16 +88,16 @@ class Model:
         ]
         self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), KINK_SAMPLES)
 
-        self.middle = self._shape(own.middle)
-        points = np.array(np.meshgrid(*own.axes, indexing="ij")) - self.middle
-        unit = points / self._shape(own.lengths / 2)
-        columns = np.array([np.ones(own.z.shape), *unit[::-1]])
+        self.middle = self._shape(sampled.middle)
+        points = np.array(np.meshgrid(*sampled.axes, indexing="ij")) - self.middle
+        unit = points / self._shape(sampled.lengths / 2)
+        columns = np.array([np.ones(sampled.z.shape), *unit[::-1]])
         bend = unit**2 if self.n_axes == 1 else unit[:0]
         self.points = points[every]
         self.datum = np.concatenate((columns, bend))[every]
         # The gain belongs to the first surface, as a track of the second one would be its own gain.
         if self.n_axes > 1:
-            self.waves = subtract_plane(fill_gaps(own.z), columns)[every[1:]]
+            self.waves = subtract_plane(fill_gaps(sampled.z), columns)[every[1:]]
         else:
             line = np.array([np.ones(filled.size), np.linspace(-1, 1, filled.size)])
             self.waves = ndimage.spline_filter(subtract_plane(filled, line))
@@ -115,12 +117,14 @@ class Model:
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
-        self.common = np.isfinite(self.own.z) & (weights > MIN_KNOWN_WEIGHT)
-        last = self._shape(self.other.z.shape) - 1 - BORDER_SAMPLES
-        self.known = self.common & ((pixels >= BORDER_SAMPLES) & (pixels <= last)).all(axis=0)
+        self.common = np.isfinite(self.sampled.z) & (weights > MIN_KNOWN_WEIGHT)
+        last = self._shape(self.other.z.shape) - 1 - INACCURATE_BORDER_SAMPLES
+        self.known = self.common & ((pixels >= INACCURATE_BORDER_SAMPLES) & (pixels <= last)).all(
+            axis=0
+        )
 
     def _map_pixels(self, state) -> np.ndarray:
-        """Return the place (d, ...) of the own points on the other surface at a state, in samples of it."""
+        """Return the place (d, ...) of the sampled points on the other surface at a state, in samples of it."""
         turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
         start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
         return (turned + start) / self._shape(self.other.steps)
@@ -134,7 +138,7 @@ class Model:
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
         datum = state[self.n_axes + 1 : -1] @ self.datum[:, self.known]
-        depth = self.sign * (self.own.z[self.known] - other) + datum
+        depth = self.sign * (self.sampled.z[self.known] - other) + datum
         return (depth + state[-1] * self._get_waves(pixels)) / (1 + state[-1])
 
     def _get_waves(self, pixels) -> np.ndarray:
@@ -180,7 +184,7 @@ class Model:
 
         Other points of it have the value `fill`.
         """
-        image = np.full(self.own.z.shape, fill, dtype=np.asarray(values).dtype)
+        image = np.full(self.sampled.z.shape, fill, dtype=np.asarray(values).dtype)
         image[self.known] = values
         return image
 
@@ -194,7 +198,7 @@ class Model:
         `depth` and `noise` (n,) [m] are the depths and the standard deviation of an unworn one.
         """
         worn = self.find_changed(depth, noise)
-        height = (self.own.z[self.known] - self.sign * depth / 2) / np.median(noise)
+        height = (self.sampled.z[self.known] - self.sign * depth / 2) / np.median(noise)
         relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
         tops = find_worn_tops(relative, fill_gaps(self.draw(height)), self.max_gain_change)
         return worn | tops[self.known]
@@ -206,7 +210,7 @@ class Model:
         """
         state = self.start.copy()
         place = slice(0, self.n_axes + 1)
-        for width in REFINE_WIDTHS:
+        for width in REFINING_GAUSSIAN_SAMPLES:
             if 2 * width > self.smoothing.max():
                 continue
             depth = self._filter(self.compute_depth(state), width)
@@ -219,8 +223,8 @@ class Model:
     @cached_property
     def smoothing(self) -> np.ndarray:
         """Deviations (d,), in samples, of the Gaussian that removes the long waves of a refined place."""
-        sizes = np.array(self.own.z.shape) / PLACE_WAVES[self.n_axes]
-        return np.maximum(sizes, MIN_WAVE_SAMPLES) if self.n_axes == 1 else sizes
+        sizes = np.array(self.sampled.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
+        return np.maximum(sizes, MIN_PLACE_GAUSSIAN_SAMPLES) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:
         """Return values (n,) smoothed by a Gaussian and without their long waves.
@@ -236,7 +240,7 @@ class Model:
         `state` is that of `compute_depth`.
         """
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
-        parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
+        parts = [numbers[part] for part in split_tiles(numbers.shape, N_DATUM_TILES[self.n_axes])]
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
         state = state.copy()
@@ -265,12 +269,12 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     random = np.random.default_rng(0)
 
     # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
-    # MAX_DATUMS
+    # MAX_COMPARED_DATUMS
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
-    subsets = subsets[random.permutation(len(subsets))[:MAX_DATUMS]]
-    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DETERMINANT]
+    subsets = subsets[random.permutation(len(subsets))[:MAX_COMPARED_DATUMS]]
+    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DATUM_DETERMINANT]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
     # Their scale is the distance within which a fifth of some heights lie
@@ -279,7 +283,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     few = depth[thin]
     # A quarter of the heights shows which datums are worth improving.
     scales = _scale_datums(datums, few_base[::4], few[::4])
-    datums = datums[np.argsort(scales)[:N_DATUMS]]
+    datums = datums[np.argsort(scales)[:N_IMPROVED_DATUMS]]
     # Concentration step: a least-squares fit to the fifth of the heights that are nearest to the datum
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
@@ -291,14 +295,14 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
     # Of the datums with a small scale the best one is taken: with an unworn end, few heights above it, and many on it
     scales = _scale_datums(datums, few_base, few)
-    near = np.flatnonzero(scales <= MAX_DATUM_SCALE * scales.min())
+    near = np.flatnonzero(scales <= MAX_DATUM_SCALE_RATIO * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
-    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
+    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE_IN_SCALES
     has_end = np.zeros(near.size, bool)
     for end in ends:
         at_end = agrees[:, np.isin(thin, end)]
-        has_end |= at_end.sum(axis=1) > MIN_AGREEING_FRACTION * at_end.shape[1]
-    grown = np.round((relative < -MIN_GROWN_DISTANCE).mean(axis=1), 1)
+        has_end |= at_end.sum(axis=1) > MIN_AGREEING_END_FRACTION * at_end.shape[1]
+    grown = np.round((relative < -MIN_GROWN_DISTANCE_IN_SCALES).mean(axis=1), 1)
     return datums[near[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
 
 

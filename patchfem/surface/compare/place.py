@@ -8,24 +8,28 @@ from scipy import fft, ndimage
 
 from ..profile import robust_deviation
 from .raster import Raster, fill_gaps
-from .statistics import TINY, remove_long_waves, smooth
+from .statistics import MIN_DIVISOR, remove_long_waves, smooth
 
 # Rotations of a scan [rad] that are tried, also after half a turn
-ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
+TRIED_ROTATIONS = np.radians(np.arange(-6, 6.1, 0.5))
 # Turns that are tried, by number of axes: relative differences in length of traces, and rotations [rad] of scans
-TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
-MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
+TRIED_TURNS = {
+    1: np.linspace(-0.01, 0.01, 11),
+    2: np.concatenate((TRIED_ROTATIONS, TRIED_ROTATIONS + np.pi)),
+}
+# Points along the longer side of the images that are correlated
+MAX_IMAGE_SIDE_POINTS = {1: 4000, 2: 96}
 # Side of an image relative to the standard deviation of the Gaussian of its long waves, by number of axes
-IMAGE_WAVES = {1: 40, 2: 12}
+SIDE_OVER_IMAGE_GAUSSIAN = {1: 40, 2: 12}
 # Fraction of a trace, half of it at each end, over which its heights fall to zero before its spectrum is whitened
-BORDER_FRACTION = 0.1
-MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
+TAPERED_TRACE_FRACTION = 0.1
+MIN_IMAGE_OVERLAP_FRACTION = 0.33  # smallest common part relative to the smaller image
 # Significance of a place beyond which no mirrored scan is tried.
-CLEAR_SIGNIFICANCE = 9.0
+UNMIRRORED_PLACE_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
-    """Place of one surface on the other: the map from own to other points (`model`) in d dimensions.
+    """Place of one surface on the other: the map from sampled to other points (`model`) in d dimensions.
 
     - shift (d,): shift of the map [m].
     - turn: stretch of traces [1], or rotation of scans [rad].
@@ -40,7 +44,7 @@ class Place(NamedTuple):
 
 
 def make_matrix(turn: float, n_axes: int) -> np.ndarray:
-    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans.
+    """Return the matrix (d, d) of the map from sampled to other points: a stretch of traces, a rotation of scans.
 
     `turn` is the stretch [1] or the rotation [rad], and `n_axes` is 1 for traces and 2 for scans.
     """
@@ -52,9 +56,9 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
 
 
 def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
-    """Return the own and the other surface, of the surfaces before and after wear.
+    """Return the sampled and the other surface, of the surfaces before and after wear.
 
-    Depths are computed at the points of the own surface: the second of two traces, the first of two scans.
+    Depths are computed at the points of the sampled surface: the second of two traces, the first of two scans.
     """
     return (second, first) if first.z.ndim == 1 else (first, second)
 
@@ -78,14 +82,14 @@ def find_place(first: Raster, second: Raster) -> Place:
     n_axes = first.z.ndim
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
-    pixel = max(finest, longest / MAX_PIXELS[n_axes])
+    pixel = max(finest, longest / MAX_IMAGE_SIDE_POINTS[n_axes])
 
     best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
     for mirrored in (False, True):
-        own, other = order(first, second.mirror() if mirrored else second)
-        images = zip(*(_make_images(surface, pixel) for surface in (own, other)))
-        for (image, other_image), turn in product(images, TURNS[n_axes]):
-            # The other image is turned about its middle, and correlated with the own one at all lags at once.
+        sampled, other = order(first, second.mirror() if mirrored else second)
+        images = zip(*(_make_images(surface, pixel) for surface in (sampled, other)))
+        for (image, other_image), turn in product(images, TRIED_TURNS[n_axes]):
+            # The other image is turned about its middle, and correlated with the sampled one at all lags at once.
             matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
@@ -95,16 +99,16 @@ def find_place(first: Raster, second: Raster) -> Place:
             if significance[peak] <= best.significance:
                 continue
 
-            # Lags beyond the size of the own image are negative: they stand at the end of each axis.
+            # Lags beyond the size of the sampled image are negative: they stand at the end of each axis.
             lag = np.where(
                 np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
             )
-            # The middle of the own surface lies at this point of the turned image.
-            at = (own.middle - own.origin) / pixel - lag
+            # The middle of the sampled surface lies at this point of the turned image.
+            at = (sampled.middle - sampled.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
-            best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
+            best = Place(place - sampled.middle, float(turn), mirrored, float(significance[peak]))
         # Mirrored scans are tried only if this side does not fit clearly. Traces are always tried both ways.
-        if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
+        if best.significance > UNMIRRORED_PLACE_SIGNIFICANCE and n_axes > 1:
             break
     return best
 
@@ -119,7 +123,7 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
     z = ndimage.affine_transform(
         z, pixel / surface.steps, output_shape=tuple(shape), order=1, mode="nearest"
     )
-    z = remove_long_waves(z, IMAGE_WAVES[z.ndim])
+    z = remove_long_waves(z, SIDE_OVER_IMAGE_GAUSSIAN[z.ndim])
     whole = np.clip(z, -3 * z.std(), 3 * z.std())
     valleys = np.minimum(whole, np.median(z))
     valleys = valleys - valleys.mean()
@@ -135,10 +139,10 @@ def _whiten(z) -> np.ndarray:
     if z.ndim == 1:
         # Tukey's window falls to zero as half a period of a cosine at each end.
         from_end = np.minimum(np.arange(z.size), np.arange(z.size)[::-1]) / (z.size - 1)
-        z = z * np.sin(np.pi * np.minimum(from_end / BORDER_FRACTION, 0.5)) ** 2
+        z = z * np.sin(np.pi * np.minimum(from_end / TAPERED_TRACE_FRACTION, 0.5)) ** 2
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
-    return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
+    return fft.irfftn(spectrum / (size + np.median(size) + MIN_DIVISOR), z.shape)
 
 
 def correlate(first, second) -> np.ndarray:
@@ -157,9 +161,9 @@ def correlate(first, second) -> np.ndarray:
         for i, k in ((0, 0), (2, 2), (1, 2), (2, 1))
     )
     norm = np.sqrt(np.maximum(power1 * power2, 1e-12 * power1.max() * power2.max()))
-    fisher = np.arctanh(np.clip(product / (norm + TINY), -0.9999, 0.9999))
+    fisher = np.arctanh(np.clip(product / (norm + MIN_DIVISOR), -0.9999, 0.9999))
     fisher *= np.sqrt(np.maximum(count, 0.0))
-    usable = count > MIN_OVERLAP * min(first.size, second.size)
+    usable = count > MIN_IMAGE_OVERLAP_FRACTION * min(first.size, second.size)
     known = fisher[usable]
     scatter = max(robust_deviation(known - np.median(known)), 1e-12)
     return np.where(usable, fisher / scatter, -np.inf)

@@ -12,9 +12,8 @@ from ..profile import MAX_TRACE_SAMPLES, Profile, remove_spikes
 MIN_TRACE_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SCAN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
-MAX_PLACE_UNEVENNESS = (
-    0.1  # largest distance from even places, in steps, of a trace that is not resampled
-)
+# Largest distance from even places, in steps, of a trace that is not resampled
+MAX_SAMPLE_UNEVENNESS = 0.1
 
 
 class Raster(NamedTuple):
@@ -114,7 +113,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
     median = float(np.median(distances))
     step = np.ptp(x) / round(np.ptp(x) / median)
     places = (x - x[0]) / step
-    if np.abs(places - np.rint(places)).max() > MAX_PLACE_UNEVENNESS:
+    if np.abs(places - np.rint(places)).max() > MAX_SAMPLE_UNEVENNESS:
         step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_TRACE_SAMPLES)
     grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
     z = np.interp(grid, x, surface.z[known])
@@ -122,6 +121,6 @@ def make_raster(surface: Profile | Areal) -> Raster:
     after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
     nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
     is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (
-        nearest > MAX_PLACE_UNEVENNESS * step
+        nearest > MAX_SAMPLE_UNEVENNESS * step
     )
     return Raster(np.where(is_missing, np.nan, z), x[:1], np.array([step]))

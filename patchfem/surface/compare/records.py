@@ -11,13 +11,13 @@ import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import SIDE, Quantity, read_definitions
+from ..quantity import HALF_WIDTH_95, Quantity, read_definitions
 
 if TYPE_CHECKING:
     from .depth_map import DepthMap
 
 # Unit and definition of each quantity of a comparison, by name
-DEFINITIONS = read_definitions("comparison")
+COMPARISON_DEFINITIONS = read_definitions("comparison")
 
 
 class Finding(NamedTuple):
@@ -32,7 +32,7 @@ class Placement:
     """Place of the second surface on the first.
 
     - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan; significance unless the place was given.
-    - mirrored: whether the second surface was mirrored, along "x" (traces) or "x", "y" (scans); "".
+    - mirrored: axis along which the second surface was mirrored, "x" (traces) or "x", "y" (scans); "" if it was not.
     - basis: "place" if heights are compared at the same place, "flanks" if the depth is measured
       below the unworn flanks of the second trace alone, "" if there is no reference.
     """
@@ -82,7 +82,7 @@ class Comparison:
     - tracks: worn tracks of traces, the longest one first.
     - findings: what else a reader must know.
     - evidence: placement, curves and roughness.
-    - direction: "x", "y" or "".
+    - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if the user does not state it.
     """
 
     before: Profile | Areal
@@ -112,7 +112,7 @@ def name_quantity(name: str, value: float, low: float | None, high: float | None
     known.
     """
     bounds = [None if number is None else float(number) for number in (value, low, high)]
-    return Quantity(*bounds, *DEFINITIONS[name], name=name)
+    return Quantity(*bounds, *COMPARISON_DEFINITIONS[name], name=name)
 
 
 def name_estimate(name: str, value: float, error: float, least: float = -np.inf) -> Quantity:
@@ -127,9 +127,10 @@ def name_estimate(name: str, value: float, error: float, least: float = -np.inf)
     least : float, optional
         0 for a quantity that cannot be negative.
     """
-    return name_quantity(name, value, max(value - SIDE * error, least), value + SIDE * error)
+    half_width = HALF_WIDTH_95 * error
+    return name_quantity(name, value, max(value - half_width, least), value + half_width)
 
 
 def name_unknown(name: str, reason: str) -> Quantity:
     """Return the quantity of this name without a value; reason: its code."""
-    return Quantity(None, None, None, *DEFINITIONS[name], reason, name)
+    return Quantity(None, None, None, *COMPARISON_DEFINITIONS[name], reason, name)

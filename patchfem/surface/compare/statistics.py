@@ -8,18 +8,20 @@ from scipy import fft, ndimage, special
 from ..profile import robust_deviation
 
 BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight, 95 % efficient for normal noise
-MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
-MIN_SIDE_DEPTHS = 20  # smallest number of depths on one side of zero that shows their scale
+# Fraction of the values in the shortest interval, whose mean is the mode
+MODE_INTERVAL_FRACTION = 0.3
+MIN_DEPTHS_ON_ONE_SIDE = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
 FALSE_POSITIVE_RATE = 1e-3
-# Mean square of normal values of variance one that lie within UNWORN_LIMIT.
-TRUNCATED_VARIANCE = 0.911
-TINY = 1e-300  # keeps divisions by zero noise finite
-WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
-MIN_NEIGHBOUR_FRACTION = (
-    0.2  # smallest weight of the neighbours in the mask that determines the level beside a height
-)
-MAX_FINISH_RATIO = 1.5  # short waves relative to the noise, below which no place can be found
+# Mean square of normal values of variance one that lie within UNWORN_LIMIT_DEVIATIONS.
+UNWORN_VARIANCE_RATIO = 0.911
+MIN_DIVISOR = 1e-300  # keeps divisions by zero noise finite
+# Side of a surface relative to the deviation of the Gaussian of its long waves
+SIDE_OVER_LONG_WAVE_GAUSSIAN = 40
+# Smallest weight of the neighbours in the mask that determines the level beside a height
+MIN_NEIGHBOUR_WEIGHT = 0.2
+# Short waves relative to the noise, below which no place can be found
+MIN_FINISH_TO_NOISE_RATIO = 1.5
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -39,11 +41,11 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
         the sizes of normal values of variance one.
     """
     halves = (depth[depth > 0], depth[depth < 0])
-    sides = [np.abs(side) for side in halves if side.size >= MIN_SIDE_DEPTHS]
+    sides = [np.abs(side) for side in halves if side.size >= MIN_DEPTHS_ON_ONE_SIDE]
     if not sides:
-        return max(robust_deviation(depth), TINY) if depth.size else TINY
+        return max(robust_deviation(depth), MIN_DIVISOR) if depth.size else MIN_DIVISOR
     smallest = min(float(np.quantile(side, fraction)) for side in sides)
-    return max(smallest / float(special.ndtri(0.5 + fraction / 2)), TINY)
+    return max(smallest / float(special.ndtri(0.5 + fraction / 2)), MIN_DIVISOR)
 
 
 def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndarray:
@@ -63,7 +65,7 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     root = np.clip(1 - (depth / (BIWEIGHT_CONSTANT * sigma)) ** 2, 0.0, None)
     if excluded is not None:
         root = np.where(excluded, 0.0, root)
-    scale = np.sqrt((jacobian**2).mean(axis=0)) + TINY
+    scale = np.sqrt((jacobian**2).mean(axis=0)) + MIN_DIVISOR
     step = np.linalg.lstsq(jacobian / scale * root[:, None], -depth * root, rcond=1e-10)[0]
     return step / scale
 
@@ -76,7 +78,7 @@ def make_polynomials(count: int, degree: int) -> np.ndarray:
 def find_mode(values) -> float:
     """Return the mean of the shortest interval that contains 30 % of the values."""
     ordered = np.sort(values)
-    count = max(int(MODE_FRACTION * ordered.size), 2)
+    count = max(int(MODE_INTERVAL_FRACTION * ordered.size), 2)
     if ordered.size <= count:
         return float(ordered.mean())
     start = int(np.argmin(ordered[count - 1 :] - ordered[: ordered.size - count + 1]))
@@ -117,7 +119,7 @@ def smooth(z, deviations) -> np.ndarray:
     return fft.idctn(spectrum)
 
 
-def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
+def remove_long_waves(z, part: float = SIDE_OVER_LONG_WAVE_GAUSSIAN) -> np.ndarray:
     """Subtract the Gaussian mean line or surface from heights z (n,) or (m, n) without gaps.
 
     `part` is the size of the surface over the standard deviation of the Gaussian.
@@ -130,10 +132,10 @@ def subtract_local_level(values, mask) -> np.ndarray:
 
     A slow drift has no part in what is left. NaN where less than a fifth of the neighbours are in the mask.
     """
-    deviations = np.array(values.shape) / WAVES_PER_SIDE
+    deviations = np.array(values.shape) / SIDE_OVER_LONG_WAVE_GAUSSIAN
     weight = smooth(mask.astype(float), deviations)
-    level = smooth(np.where(mask, values, 0.0), deviations) / np.maximum(weight, TINY)
-    return np.where(weight > MIN_NEIGHBOUR_FRACTION, values - level, np.nan)
+    level = smooth(np.where(mask, values, 0.0), deviations) / np.maximum(weight, MIN_DIVISOR)
+    return np.where(weight > MIN_NEIGHBOUR_WEIGHT, values - level, np.nan)
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
@@ -144,7 +146,7 @@ def find_mirror_finish(surfaces) -> dict[str, float]:
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
         height = robust_deviation(remove_long_waves(z))
-        if height <= MAX_FINISH_RATIO * noise:
+        if height <= MIN_FINISH_TO_NOISE_RATIO * noise:
             return {"rq": float(height), "noise": float(noise)}
     return {}
 

@@ -6,22 +6,22 @@ import numpy as np
 from scipy import ndimage
 
 from ..profile import find_runs
-from .changes import MIN_RUN_SAMPLES, WINDOW_SIDES
-from .depth_map import UNWORN_LIMIT, DepthMap
+from .changes import MIN_CHANGED_TRACE_SAMPLES, WINDOW_SIDES
+from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .statistics import compute_threshold, remove_long_waves
 
 # Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear. Its reverse shows growth.
 LOSS_TO_GROWTH_RATIO = 3.0
-MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
-TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
-N_CLASSES = 10  # number of classes of heights whose depths are compared
+MIN_WORN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
+MIN_WORN_TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
+N_HEIGHT_CLASSES = 10  # number of classes of heights whose depths are compared
 N_VALLEY_CLASSES = 3  # number of the lowest classes, which wear last
 N_TOP_CLASSES = 6  # number of the highest classes
 # Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
-MIN_RISE = 0.2
-MIN_RISE_DEVIATIONS = 3.5
-TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
-TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
+MIN_DEPTH_RISE_DEVIATIONS = 0.2
+MIN_RISE_IN_MEDIAN_DEVIATIONS = 3.5
+MIN_TOP_HEIGHT_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
+SAMPLES_PER_TOP = 3  # number of samples whose mean depth shows whether a top is worn
 
 
 def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
@@ -50,10 +50,10 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
     # Single tops and valleys whose depth is beyond the largest one that noise alone reaches. The opening removes spikes.
     limit = compute_threshold(len(WINDOW_SIDES[height.ndim]) * height.size)
-    square = np.ones((TOP_SIDE,) * height.ndim)
+    square = np.ones((MIN_WORN_TOP_SIDE,) * height.ndim)
     worn = ndimage.binary_opening((relative > limit) & is_high, square)
     filled = ndimage.binary_opening((relative < -limit) & ~is_high, square)
-    if ndimage.label(worn)[1] < max(MIN_TOPS, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
+    if ndimage.label(worn)[1] < max(MIN_WORN_TOPS, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
         worn[:] = False
 
     # Slight wear of all tops shows in the medians of classes of heights.
@@ -79,13 +79,13 @@ def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
         Only if wear lowered most classes of tops: they are deeper than the valleys by more than another gain explains.
     """
     is_worn = np.zeros(height.size, bool)
-    if height.size < N_CLASSES * MIN_RUN_SAMPLES:
+    if height.size < N_HEIGHT_CLASSES * MIN_CHANGED_TRACE_SAMPLES:
         return is_worn
-    classes = np.array_split(np.argsort(height), N_CLASSES)
+    classes = np.array_split(np.argsort(height), N_HEIGHT_CLASSES)
     rise, above = (_subtract_valleys(values, classes) for values in (relative, height))
-    scatter = MIN_RISE_DEVIATIONS / np.sqrt(len(classes[0]))
+    scatter = MIN_RISE_IN_MEDIAN_DEVIATIONS / np.sqrt(len(classes[0]))
     gained = max_gain_change * np.median(above[-N_TOP_CLASSES:])
-    limit = MIN_RISE + scatter + gained
+    limit = MIN_DEPTH_RISE_DEVIATIONS + scatter + gained
     if np.median(rise[-N_TOP_CLASSES:]) > limit:
         for part, step in zip(classes, rise):
             is_worn[part] = step > limit
@@ -118,12 +118,12 @@ def find_tops(depths: DepthMap) -> Tops:
     """
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
-    is_deep = depths.worn & (relative > UNWORN_LIMIT)
+    is_deep = depths.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
     if not is_deep.any():
         return Tops(np.zeros(0, int), np.zeros(0), is_deep)
-    is_high = height > np.quantile(height[is_deep], TOP_QUANTILE)
+    is_high = height > np.quantile(height[is_deep], MIN_TOP_HEIGHT_QUANTILE)
     runs = find_runs(is_high)
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
     tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
-    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops], is_high)
+    return Tops(tops, ndimage.uniform_filter1d(relative, SAMPLES_PER_TOP)[tops], is_high)

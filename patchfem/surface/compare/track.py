@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..profile import find_runs
-from ..quantity import SIDE, Quantity
-from .depth_map import UNWORN_LIMIT, DepthMap
+from ..quantity import HALF_WIDTH_95, Quantity
+from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
 from .tops import find_tops
 
@@ -17,32 +17,39 @@ MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
 # Mean depth of the tops of a part of a trace, in standard deviations of a depth, from which on it belongs to a track
-MIN_TRACK_DEPTH = 0.5
+MIN_TRACK_DEPTH_DEVIATIONS = 0.5
 # Largest mean depth over the few samples of a top that is not worn, in standard deviations of a single depth
-MAX_UNWORN_TOP = 1.5
+MAX_UNWORN_TOP_DEVIATIONS = 1.5
 # Mean depth of valleys relative to that of tops below which only the tops of a part are worn
-MAX_VALLEY_DEPTH = 0.5
-MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
+MAX_VALLEY_TO_TOP_DEPTH = 0.5
+# Fraction of changed heights in a wider gap that belongs to the track
+MIN_CHANGED_GAP_FRACTION = 0.85
 # Standard deviations of a single height on a flank.
-MIN_FLANK_DEPTH = 4.0
-FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
-MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
+MIN_FLANK_DEPTH_DEVIATIONS = 4.0
+# Length of the flanks beyond the known ends of a track, relative to its width
+FLANK_OVER_TRACK_WIDTH = 0.1
+# Number of samples between a track and the end of the section that cuts it off
+MAX_SAMPLES_TO_CUT_END = 5
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
 FLANK_POWERS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
-CLEAR_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
-FLANK_HEIGHT = 25.0  # depth, in standard deviations, to which a flank is fitted
+CLEAR_FLANK_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
+FITTED_FLANK_DEVIATIONS = 25.0  # depth, in standard deviations, to which a flank is fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
-MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FLANK_HEIGHT
-SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
-MAX_CANDIDATES = 80  # number of places that are tried as an end
-END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
-MAX_SQUARED_RESIDUAL = 16.0  # squared residual of a single depth beyond which it counts no more
-RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
+# Largest number of samples in which a flank reaches FITTED_FLANK_DEVIATIONS
+MAX_FLANK_SAMPLES = 400
+SHALLOW_FLANK_SAMPLES = 60  # number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
+MAX_TRIED_ENDS = 80  # number of places that are tried as an end
+# Number of samples beyond the likely places that belong to the interval of an end
+END_INTERVAL_MARGIN_SAMPLES = 2
+# Squared residual of a single depth beyond which it counts no more
+MAX_SQUARED_DEPTH_RESIDUAL = 16.0
+# Length of the low outer flank of a ridge relative to what is found as grown
+RIDGE_TAIL_OVER_FOUND_LENGTH = 0.5
 # The floor of a track is its deepest part of the length of a fifth of it
-N_FIFTHS = 5
+TRACK_OVER_FLOOR_LENGTH = 5
 # Bias of the largest of the means over parts of a length, in standard deviations of such a mean, for each length over
 # which they are within two of these of the largest; 0.5 to 0.9 for flat, round, wedge-shaped and tilted bottoms.
-MAXIMUM_BIAS = 0.7
+BIAS_OF_LARGEST_MEAN = 0.7
 
 
 class End(NamedTuple):
@@ -74,7 +81,7 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     list of tuple
         (first, last) of each track.
     """
-    changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
+    changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT_DEVIATIONS * depths.noise)
     tops = find_tops(depths)
     spans = find_runs(depths.worn)
     k = 0
@@ -82,10 +89,10 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         (first, stop), (start, last) = spans[k : k + 2]
         gap = start - stop
         width = max(stop - first, last - start)
-        is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
+        is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_GAP_FRACTION
         between = tops.depths[slice(*np.searchsorted(tops.places, (stop, start)))]
-        n_unworn = (between < MAX_UNWORN_TOP).sum()
-        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < MIN_TRACK_DEPTH
+        n_unworn = (between < MAX_UNWORN_TOP_DEVIATIONS).sum()
+        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < MIN_TRACK_DEPTH_DEVIATIONS
         if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
@@ -97,7 +104,7 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
 
 def get_margin(span: tuple[int, int]) -> int:
     """Return the number of samples of the flanks beyond the first and last sample, `span`, of a track."""
-    return max(int(FLANK_FRACTION * (span[1] - span[0])), MIN_FLANK_SAMPLES)
+    return max(int(FLANK_OVER_TRACK_WIDTH * (span[1] - span[0])), MIN_FLANK_SAMPLES)
 
 
 def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
@@ -108,14 +115,14 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
-    relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
+    relative = np.where(depths.grown | (relative < -UNWORN_LIMIT_DEVIATIONS), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
 
     # Each end is sought in the direction from outside to the middle: positions, relative depths and which heights are tops
     # in this direction, the first worn sample, the sample after the middle, and the tops that are not worn.
     tops = find_tops(depths)
-    unworn = tops.places[tops.depths < MAX_UNWORN_TOP]
+    unworn = tops.places[tops.depths < MAX_UNWORN_TOP_DEVIATIONS]
     sides = (
         (depths.x, relative, tops.is_high, span[0], middle + 1, unworn),
         (
@@ -133,7 +140,7 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 
         # The track has begun where the depth is beyond that of unworn heights, and not yet at the last few unworn tops
         # before this place.
-        deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
+        deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT_DEVIATIONS))
         beyond = np.sort(places[places < deep])[-MIN_UNWORN_TOPS:]
         farthest = int(beyond[0]) if beyond.size else 0
 
@@ -158,7 +165,7 @@ def _has_unworn_valleys(relative, is_high) -> bool:
     """
     if is_high.all() or not is_high.any():
         return False
-    return bool(relative[~is_high].mean() < MAX_VALLEY_DEPTH * relative[is_high].mean())
+    return bool(relative[~is_high].mean() < MAX_VALLEY_TO_TOP_DEPTH * relative[is_high].mean())
 
 
 def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
@@ -182,9 +189,9 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
         return End(float(x[worn]), float(x[0] - step), float(x[worn]))
     # Above half of its depth, the floor of a shallow track begins.
     inner = relative[worn : worn + MAX_FLANK_SAMPLES]
-    height = min(FLANK_HEIGHT, np.quantile(inner, 0.9) / 2)
-    deep = np.flatnonzero(inner > max(height, MIN_FLANK_DEPTH))
-    length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
+    height = min(FITTED_FLANK_DEVIATIONS, np.quantile(inner, 0.9) / 2)
+    deep = np.flatnonzero(inner > max(height, MIN_FLANK_DEPTH_DEVIATIONS))
+    length = int(deep[0]) + 3 if deep.size else SHALLOW_FLANK_SAMPLES
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
 
@@ -195,8 +202,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
         return End(float(x[worn]), float(x[max(worn - 3, 0)] - step), float(part[-1] + step))
 
     # The level of the unworn heights is uncertain, so the change point is sought for three levels.
-    level = SIDE * depths.level_error / depths.noise_level
-    stride = max(part.size // MAX_CANDIDATES, 1)
+    level = HALF_WIDTH_95 * depths.level_error / depths.noise_level
+    stride = max(part.size // MAX_TRIED_ENDS, 1)
     # A flank begins between two samples.
     places = part[2:-1:stride] - step / 2
     levels = np.array([values, values + level, values - level])
@@ -205,11 +212,11 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     # Likely places have a deviance near the lowest of some form of flank that is itself near the best form. The interval
     # of the end reaches over all of them.
     lowest = deviance.min(axis=2, keepdims=True)
-    is_likely = deviance < lowest + SIDE**2
-    is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
+    is_likely = deviance < lowest + HALF_WIDTH_95**2
+    is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_FLANK_DEVIANCE
     ends = np.flatnonzero(is_likely.any(axis=(0, 1)))
     best = int(np.argmin(deviance[0].min(axis=0)))
-    margin = END_STEPS * stride * step
+    margin = END_INTERVAL_MARGIN_SAMPLES * stride * step
     return End(
         float(places[best]), float(places[ends[0]] - margin), float(places[ends[-1]] + margin)
     )
@@ -247,9 +254,9 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
 
-        # A large residual counts as MAX_SQUARED_RESIDUAL, so that single outliers do not decide.
+        # A large residual counts as MAX_SQUARED_DEPTH_RESIDUAL, so that single outliers do not decide.
         residual = depths.T - fitted
-        deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_RESIDUAL).sum(axis=1).T
+        deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_DEPTH_RESIDUAL).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
@@ -284,16 +291,16 @@ def measure_track(
         # The ends are uncertain by the area between the bounds of their intervals.
         for place in (start, end):
             near = depths.integrate((x >= place.low) & (x <= place.high))[0]
-            error = float(np.hypot(error, near / (2 * SIDE)))
+            error = float(np.hypot(error, near / (2 * HALF_WIDTH_95)))
         gross = name_estimate("area_gross", area, error, 0.0)
     else:
         area = lost[0]
-        error = (lost[2] - area) / SIDE
+        error = (lost[2] - area) / HALF_WIDTH_95
         gross = name_quantity("area_gross", *lost)
 
     # The mean has the errors of the area and of the width.
     mean = area / width
-    mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
+    mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / HALF_WIDTH_95 / width))
     piled, piled_error = _measure_pile_up(depths, (start, end), width)
     net = name_estimate("area_net", area - piled, float(np.hypot(error, piled_error)))
     values = {
@@ -308,7 +315,7 @@ def measure_track(
     }
 
     # Where the section cuts the track off, its end and what lies beyond are unknown.
-    cut = (span[0] < MAX_CUT_SAMPLES, span[1] >= x.size - MAX_CUT_SAMPLES)
+    cut = (span[0] < MAX_SAMPLES_TO_CUT_END, span[1] >= x.size - MAX_SAMPLES_TO_CUT_END)
     unknown = dict(zip(("from", "to"), cut)) | dict.fromkeys(("pile_up", "area_net"), any(cut))
     for name, is_unknown in unknown.items():
         if is_unknown:
@@ -327,7 +334,7 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     The track begins at `start` and has a `width` [m].
     """
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
-    count = max(inside.size // N_FIFTHS, 1)
+    count = max(inside.size // TRACK_OVER_FLOOR_LENGTH, 1)
     means = np.convolve(depths.depth[inside], np.ones(count) / count, "valid")
     best = int(np.argmax(means))
 
@@ -335,7 +342,7 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     length = count + depths.errors.correlation
     sigma = float(np.median(depths.noise[inside])) * np.sqrt(depths.errors.correlation / length)
     n_lengths = ((means > means[best] - 2 * sigma).sum() - 1) / length
-    bias = MAXIMUM_BIAS * sigma * n_lengths
+    bias = BIAS_OF_LARGEST_MEAN * sigma * n_lengths
 
     part = np.zeros(depths.x.size, bool)
     part[inside[best : best + count]] = True
@@ -359,15 +366,17 @@ def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> t
         is_beside = (distance >= 0) & (distance <= width)
         grown = distance[is_beside & depths.grown]
         if not grown.size:
-            area, error = depths.integrate(is_beside & (distance <= FLANK_FRACTION * width), -1.0)
-            variance += (error + max(area, 0.0) / SIDE) ** 2
+            area, error = depths.integrate(
+                is_beside & (distance <= FLANK_OVER_TRACK_WIDTH * width), -1.0
+            )
+            variance += (error + max(area, 0.0) / HALF_WIDTH_95) ** 2
             continue
-        tail = max(float(grown.min()), RIDGE_TAIL * float(np.ptp(grown)))
+        tail = max(float(grown.min()), RIDGE_TAIL_OVER_FOUND_LENGTH * float(np.ptp(grown)))
         inside = is_beside & (distance <= grown.max() + tail)
         # A ridge may begin anywhere in the interval of the end.
         is_end = (depths.x >= end.low) & (depths.x <= end.high) & (depths.depth < 0)
         area, error = depths.integrate(inside | is_end, -1.0)
-        beginning = depths.integrate(is_end, -1.0)[0] / (2 * SIDE)
+        beginning = depths.integrate(is_end, -1.0)[0] / (2 * HALF_WIDTH_95)
         total += max(area, 0.0)
         variance += error**2 + beginning**2
     return total, float(np.sqrt(variance))

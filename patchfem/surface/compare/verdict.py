@@ -3,15 +3,14 @@
 import numpy as np
 from scipy import special
 
-from ..quantity import SIDE
+from ..quantity import HALF_WIDTH_95
 from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
 from .tops import LOSS_TO_GROWTH_RATIO, find_worn_tops
 
 MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
-MIN_LOST_DEVIATIONS = (
-    4.0  # standard deviations of lost material that is reported beside as much growth
-)
+# Standard deviations of lost material that is reported beside as much growth
+MIN_LOST_DEVIATIONS = 4.0
 
 
 def find_sure_loss(depths: DepthMap) -> float:
@@ -25,7 +24,7 @@ def find_sure_loss(depths: DepthMap) -> float:
     n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
     freedom = depths.errors.freedom
     student = special.stdtrit(freedom, (0.975, 1 - FALSE_POSITIVE_RATE / n_places))
-    return float(SIDE * student[1] / student[0])
+    return float(HALF_WIDTH_95 * student[1] / student[0])
 
 
 def measure_sharp_loss(depths: DepthMap) -> float:
@@ -38,7 +37,7 @@ def measure_sharp_loss(depths: DepthMap) -> float:
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
     relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
     height = (depths.before + depths.after) / 2 / depths.noise_level
-    tops = find_worn_tops(relative, height, SIDE * depths.errors.model)
+    tops = find_worn_tops(relative, height, HALF_WIDTH_95 * depths.errors.model)
     return float((relative * depths.noise)[tops].sum()) * depths.cell
 
 
@@ -66,7 +65,7 @@ def judge_change(
     grown, grown_error : float
         Material above the first surface, and its standard deviation.
     """
-    if area > SIDE * error and lost > LOSS_TO_GROWTH_RATIO * grown:
+    if area > HALF_WIDTH_95 * error and lost > LOSS_TO_GROWTH_RATIO * grown:
         return "worn" if area > sure_loss * error else "scar_or_drift"
     is_grown = grown > MIN_GROWN_DEVIATIONS * grown_error
     if is_grown and grown > LOSS_TO_GROWTH_RATIO * max(lost, 0.0):

@@ -9,26 +9,30 @@ from ..profile import find_runs
 from ..quantity import Quantity
 from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
-from ..spectrum import BAND
+from ..spectrum import WAVE_BAND
 from .depth_map import DepthMap
-from .records import DEFINITIONS, name_quantity, name_unknown
+from .records import COMPARISON_DEFINITIONS, name_quantity, name_unknown
 from .statistics import make_polynomials, smooth
 from .track import get_margin
 
-MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
-MIN_BLOCKS = 4  # smallest number of blocks
-BLOCK_WAVES = 2.0  # smallest length of a block in the longest wave; shorter blocks are correlated
+MAX_RATIO_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
+MIN_RATIO_BLOCKS = 4  # smallest number of blocks
+# Smallest length of a block in the longest wave; shorter blocks are correlated
+MIN_BLOCK_WAVES = 2.0
 # Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
 CUTOFF_TO_DEVIATION = 0.187
-RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum
-MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
-MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
-MIN_WAVE_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
+# Standard deviation of a ratio due to tip, interpolation and datum
+RATIO_RELATIVE_DEVIATION = 0.004
+# Noise relative to the size of the surface above which a ratio is unknown
+MAX_NOISE_OVER_SIZE = 0.5
+# Smallest length of a trace relative to the longest wave of the band
+MIN_TRACE_WAVES = 3.0
+MIN_STEPS_PER_WAVE = 4.0  # smallest length of the shortest wave of the band in steps
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
-SIZE_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
+SECTION_MEAN_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
 # Degree of the polynomial that is the form of a part: the bottom of a track is bent.
-FORM_DEGREE = {"inside": 4, "outside": 1}
+FORM_DEGREE_BY_PART = {"inside": 4, "outside": 1}
 
 
 def compare_waves(
@@ -58,27 +62,29 @@ def compare_waves(
     """
     is_kept = np.ones(lines[0].shape[1], bool)
     for end in ends:
-        is_kept &= np.abs(np.arange(is_kept.size) - end) > BAND[1] / step
+        is_kept &= np.abs(np.arange(is_kept.size) - end) > WAVE_BAND[1] / step
     length = is_kept.sum() * step
-    if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_WAVE_STEPS:
+    if length < MIN_TRACE_WAVES * WAVE_BAND[1] or step > WAVE_BAND[0] / MIN_STEPS_PER_WAVE:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in BAND]
+    deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in WAVE_BAND]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, is_kept[1:]] for z in lines]
 
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
-    band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
-    n_blocks = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
+    band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
+    n_blocks = int(
+        np.clip(length / (MIN_BLOCK_WAVES * WAVE_BAND[1]), MIN_RATIO_BLOCKS, MAX_RATIO_BLOCKS)
+    )
     values = {}
     errors = (band_noise, noise / step)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
         blocks = [_average_squares(np.array_split(size, n_blocks, 1)) for size in sizes]
         smallest = min(block.mean() for block in blocks)
-        if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
+        if not smallest > 0 or error**2 > MAX_NOISE_OVER_SIZE * smallest:
             values[name] = name_unknown(name, "noise")
             continue
         values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
@@ -110,7 +116,7 @@ def _divide_means(before, after, power: float) -> np.ndarray:
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
     student = float(special.stdtrit(len(before) - 1, 0.975))
-    width = student * float(np.hypot(scatter, RATIO_ERROR))
+    width = student * float(np.hypot(scatter, RATIO_RELATIVE_DEVIATION))
     return (second / first) ** power * np.exp([0.0, -width, width])
 
 
@@ -158,15 +164,15 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
             sections = []
             for first, last in runs:
                 z = getattr(depths, side)[first + edge : last + 1 - edge]
-                sections += _cut_sections(z, cutoff / step, FORM_DEGREE[region])
+                sections += _cut_sections(z, cutoff / step, FORM_DEGREE_BY_PART[region])
             sizes[side] = _measure_sections(sections, step)
         table = {"before": {}, "after": {}, "ratio": {}}
-        for name, power in SIZE_POWERS.items():
+        for name, power in SECTION_MEAN_POWERS.items():
             pair = [sizes[side][name] for side in ("before", "after")]
             for side, values in zip(table, pair):
                 bounds = _divide_means(np.ones(len(values)), values, power)
                 table[side][name] = name_quantity(name, *bounds)
-            text = f"{DEFINITIONS[name][1]}, after wear divided by before"
+            text = f"{COMPARISON_DEFINITIONS[name][1]}, after wear divided by before"
             table["ratio"][name] = Quantity(*_divide_means(*pair, power).tolist(), "1", text)
         regions[region] = table
     return regions, cutoff

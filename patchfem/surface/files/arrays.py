@@ -10,20 +10,19 @@ import numpy as np
 from ...core import PatchfemError
 from ...inputs.damage import refuse_damage, shorten
 from ...inputs.matlab import read_real_arrays
-from .content import DAMAGED, Content
+from .content import DAMAGED_FILE_REMEDY, Content
 from .table import Table
 from .units import HEADER_EXAMPLE
 
-MIN_MATRIX_ROWS = (
-    8  # smallest number of rows of a matrix in a .mat file that may be a table of columns
-)
+# Smallest number of rows of a matrix in a .mat file that may be a table of columns
+MIN_TABLE_ROWS = 8
 # Names of an array of heights in a MATLAB file, the first one that it has is read
-HEIGHT_NAMES = ("z", "gap", "height", "heights")
+HEIGHT_ARRAY_NAMES = ("z", "gap", "height", "heights")
 
 
 def read_npy(content: Content) -> Table:
     """Read the content of an .npy file of two or three columns, or of as many rows."""
-    with refuse_damage(f"{content.path}: {DAMAGED}"):
+    with refuse_damage(f"{content.path}: {DAMAGED_FILE_REMEDY}"):
         array = np.load(io.BytesIO(content.data), allow_pickle=False)
     is_real = array.dtype.kind in "fiu"
     if is_real and array.ndim == 2 and array.shape[0] in (2, 3) and array.shape[1] > 3:
@@ -39,9 +38,9 @@ def read_mat(content: Content) -> Table:
     path = content.path
     arrays = read_real_arrays(path, content.data)
     by_name = {name.lower(): array for name, array in arrays.items()}
-    height = next((name for name in HEIGHT_NAMES if name in by_name), None)
+    height = next((name for name in HEIGHT_ARRAY_NAMES if name in by_name), None)
     if not height or "x" not in by_name:
-        tables = {name: array for name, array in arrays.items() if len(array) >= MIN_MATRIX_ROWS}
+        tables = {name: array for name, array in arrays.items() if len(array) >= MIN_TABLE_ROWS}
         return _read_columns(path, tables)
 
     columns = {name: by_name[name].ravel() for name in "xy" if name in by_name}

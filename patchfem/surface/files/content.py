@@ -9,10 +9,12 @@ from ...core import Missing, PatchfemError
 from ...disk.open_with_timeout import open_for_reading
 from ...inputs.damage import refuse_damage
 
-MIB = 2**20  # number of bytes in a mebibyte
-MAX_BYTES = 512 * MIB  # largest size of a file, or of its unpacked content, in bytes
-MAX_TEXT_BYTES = 64 * MIB  # largest size of a text file, in bytes: four million samples
-HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its format
+BYTES_PER_MEBIBYTE = 2**20  # number of bytes in a mebibyte
+# Largest size of a file, or of its unpacked content, in bytes
+MAX_SURFACE_FILE_BYTES = 512 * BYTES_PER_MEBIBYTE
+# Largest size of a text file, in bytes: four million samples
+MAX_TEXT_BYTES = 64 * BYTES_PER_MEBIBYTE
+N_FORMAT_BYTES = 4096  # number of bytes at the start of a file that determine its format
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
     b"\x93NUMPY": "npy",
@@ -25,7 +27,7 @@ _FIRST_BYTES = {  # format of a file by its first bytes
     b"\xfe\xff": "text",
 }
 # End of the message about a damaged file
-DAMAGED = "the file is cut off or damaged; save or export it anew"
+DAMAGED_FILE_REMEDY = "the file is cut off or damaged; save or export it anew"
 
 
 class Content(NamedTuple):
@@ -60,7 +62,10 @@ def fetch(path) -> Content:
         return content
 
     suffix = Path(file_path.stem).suffix
-    with refuse_damage(f"{path}: {DAMAGED}"), gzip.open(io.BytesIO(content.data)) as file:
+    with (
+        refuse_damage(f"{path}: {DAMAGED_FILE_REMEDY}"),
+        gzip.open(io.BytesIO(content.data)) as file,
+    ):
         content = _read_limited(file_path, suffix, file)
     if content.kind == "gzip":
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
@@ -72,15 +77,15 @@ def _read_limited(path: Path, suffix: str, file) -> Content:
 
     `path` names it in messages, and `suffix` is that of its name, such as ".CSV".
     """
-    data = bytearray(file.read(HEAD_BYTES))
+    data = bytearray(file.read(N_FORMAT_BYTES))
     # Numbers below five are control characters, which a text has only if it is damaged.
     is_binary = bool(set(data) & set(range(5))) and suffix.lower() not in (".csv", ".txt")
     kind = "instrument" if is_binary else "text"
     kind = next((name for mark, name in _FIRST_BYTES.items() if data.startswith(mark)), kind)
 
-    limit = MAX_TEXT_BYTES if kind == "text" else MAX_BYTES
+    limit = MAX_TEXT_BYTES if kind == "text" else MAX_SURFACE_FILE_BYTES
     data += file.read(limit + 1 - len(data))
     if len(data) > limit:
         remedy = " of text; thin out the samples of the profile" if kind == "text" else ""
-        raise PatchfemError(f"{path}: more than {limit // MIB} MiB{remedy}")
+        raise PatchfemError(f"{path}: more than {limit // BYTES_PER_MEBIBYTE} MiB{remedy}")
     return Content(path, kind, bytes(data))

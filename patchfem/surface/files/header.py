@@ -12,36 +12,43 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
-from .units import HEADER_EXAMPLE, ROLES_BY_NAME, parse_length_unit
+from .units import COORDINATES_BY_COLUMN_NAME, HEADER_EXAMPLE, parse_length_unit
 
-MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought
+# Largest number of characters of a line in which names of columns are sought
+MAX_COLUMN_LINE_CHARACTERS = 1000
 MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
-MAX_NAME = 80  # largest number of characters in the name of a column with its unit
-MAX_HEIGHT_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
+# Largest number of characters in the name of a column with its unit
+MAX_COLUMN_NAME_CHARACTERS = 80
+MAX_TRACE_TABLE_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
 # Signs at the start of a line of the header that is a comment
 COMMENT_SIGNS = ("#", "%", "//")
 # Pattern of a number with a decimal comma, such as -1,25e-6
-DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 # Cells that stand for a height that was not measured: nan with or without a sign, stars such as ***, bad, and an empty
 # cell. Capital letters do not matter.
-MISSING_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
+MISSING_HEIGHT_PATTERN = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)
 # Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um; a remark may follow.
-_COLUMN = re.compile(
+_COLUMN_PATTERN = re.compile(
     r"([^\W\d][\w .-]*?)\s*(?:[\[(]([^\[\]()]*)[\])]|(?:[_/]|\s(?:in\s)?)\s*(\w+)(?=\s\s|$))"
 )
 # Pattern of a cell between blanks, with its unit
-_CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
+_CELL_PATTERN = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
 # Pattern of a line that states the size or the units of a matrix
-_FACT = re.compile(
+_MATRIX_FACT_PATTERN = re.compile(
     r"(?:(width|height|lateral units|value units)\s*:|(length),(?=\s*[0-9.]+ \w+$))\s*(.*)",
     re.IGNORECASE,
 )
 
 
 class Column(NamedTuple):
-    """Role of a column ("x", "y", "z", "index", an unknown name, or "" of a unit alone), its unit and its text."""
+    """Column of the table, as the header names it.
 
-    role: str
+    - coordinate: "x", "y" or "z", "index" for row numbers, an unknown name in lower case, or "" for a unit without a name.
+    - unit: unit as written, or None if the header gives none.
+    - name: text of the header.
+    """
+
+    coordinate: str
     unit: str | None = None
     name: str = ""
 
@@ -95,29 +102,29 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         start, columns = named.get(len(cells), (number, []))
         if is_row and cells[0] and not is_comment:
             return Header(columns, facts, len(cells), start), chain([(number, line)], lines)
-        fact = _FACT.fullmatch(text[:MAX_NAME])
+        fact = _MATRIX_FACT_PATTERN.fullmatch(text[:MAX_COLUMN_NAME_CHARACTERS])
         if fact:
             facts[(fact[1] or fact[2]).lower()] = fact[3]
             continue
 
         parsed = [_parse_column(cell) for cell in cells]
-        if any(column.role for column in parsed):
+        if any(column.coordinate for column in parsed):
             is_other = any(re.search("[:=]", column.name) for column in parsed)
-            if not 1 < len(parsed) <= MAX_HEIGHT_COLUMNS or is_other:
+            if not 1 < len(parsed) <= MAX_TRACE_TABLE_COLUMNS or is_other:
                 continue
             start = number
             columns = parsed
         else:
             # A line of units belongs to the names above it, or to x, (y,) z.
-            columns = columns or [Column(role) for role in {2: "xz", 3: "xyz"}.get(len(parsed), "")]
+            columns = columns or list(map(Column, {2: "xz", 3: "xyz"}.get(len(parsed), "")))
             columns = [
                 column._replace(unit=column.unit or unit.unit)
                 for column, unit in zip(columns, parsed)
             ]
         named[len(cells)] = (start, columns)
         # Names of a comment count if one of them is known.
-        is_known = not is_comment or any(column.role in ("x", "y", "z") for column in columns)
-        units = [column.unit for column in columns if column.role != "index"]
+        is_known = not is_comment or any(column.coordinate in ("x", "y", "z") for column in columns)
+        units = [column.unit for column in columns if column.coordinate != "index"]
         if is_known and len(units) > 1 and None not in units:
             return Header(columns, facts, len(cells), start), lines
     raise PatchfemError(
@@ -133,14 +140,14 @@ def _parse_column(cell: str) -> Column:
     """
     if cell in ("", "-", "[-]", "1") or parse_length_unit(cell):
         return Column("", cell if parse_length_unit(cell) else None, cell)
-    match = _COLUMN.match(cell[:MAX_NAME])
+    match = _COLUMN_PATTERN.match(cell[:MAX_COLUMN_NAME_CHARACTERS])
     name, unit, word = match.groups() if match else (cell, None, None)
-    role = name.strip(" _").lower()
-    if word is not None and role in ROLES_BY_NAME and parse_length_unit(word):
+    coordinate = name.strip(" _").lower()
+    if word is not None and coordinate in COORDINATES_BY_COLUMN_NAME and parse_length_unit(word):
         unit = word
     elif word is not None:
-        role = cell.lower()
-    return Column(ROLES_BY_NAME.get(role, role), unit, cell)
+        coordinate = cell.lower()
+    return Column(COORDINATES_BY_COLUMN_NAME.get(coordinate, coordinate), unit, cell)
 
 
 def parse_fact(text: str) -> tuple[float | None, str | None]:
@@ -162,9 +169,9 @@ def split_cells(text: str) -> tuple[list[str], str | None]:
         if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
             return cells, delimiter
     delimiter = next((sign for sign in delimiters[:-1] if sign in text), None)
-    return _strip_cells(
-        text.split(delimiter) if delimiter else _CELL.findall(text[:MAX_LINE])
-    ), delimiter
+    line = text[:MAX_COLUMN_LINE_CHARACTERS]
+    cells = text.split(delimiter) if delimiter else _CELL_PATTERN.findall(line)
+    return _strip_cells(cells), delimiter
 
 
 def _strip_cells(cells: list[str]) -> list[str]:
@@ -180,6 +187,6 @@ def is_number(cell: str, delimiter: str | None) -> bool:
 
     A decimal comma is possible unless the delimiter is a comma.
     """
-    if NUMBER_PATTERN.fullmatch(cell) or MISSING_PATTERN.fullmatch(cell):
+    if NUMBER_PATTERN.fullmatch(cell) or MISSING_HEIGHT_PATTERN.fullmatch(cell):
         return True
-    return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None
+    return delimiter != "," and DECIMAL_COMMA_PATTERN.fullmatch(cell) is not None

@@ -8,7 +8,7 @@ from .content import fetch
 from .instruments import read_instrument
 from .table import make_surface
 from .text import read_text
-from .units import SIZE_LINES, UNIT_LIST, parse_length_unit
+from .units import LENGTH_UNIT_LIST, MISSING_SIZE_REMEDY, parse_length_unit
 
 # Reader of each kind of content
 READERS_BY_KIND = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
@@ -54,8 +54,8 @@ def _require_units(path, units) -> None:
     if is_pair and all(isinstance(unit, str) and parse_length_unit(unit) for unit in units):
         return
     raise PatchfemError(
-        f'{path}: the units {units!r} are not those of x and of z, such as ("mm", "um"): use two of {UNIT_LIST}; for the '
-        f"size of a matrix of heights, which is no unit, {SIZE_LINES} in a text"
+        f'{path}: the units {units!r} are not those of x and of z, such as ("mm", "um"): use two of {LENGTH_UNIT_LIST}; for '
+        f"the size of a matrix of heights, which is no unit, {MISSING_SIZE_REMEDY} in a text"
     )
 
 

@@ -10,26 +10,26 @@ from ...inputs.damage import shorten
 from ..areal import Areal
 from ..profile import Profile
 from .units import (
-    GIVE_UNITS,
     HEADER_EXAMPLE,
-    UNIT_LIST,
+    LENGTH_UNIT_LIST,
+    MISSING_UNITS_REMEDY,
     parse_length_unit,
 )
 
 MAX_HEIGHTS = 50_000_000  # largest number of heights
-MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
+MAX_COORDINATE = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_TRACE_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
 # Fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
-FAULT_FRACTION = 0.01
-MIN_ROUNDED = 10  # smallest number of positions that show whether they are even but for rounding
+MAX_FAULTY_HEIGHT_FRACTION = 0.01
+# Smallest number of positions that show whether they are even but for rounding
+MIN_ROUNDED_POSITIONS = 10
 # Largest distance from even positions in printed digits, half of which is rounding.
-MAX_ROUNDING = 0.75
+MAX_ROUNDING_IN_DIGITS = 0.75
 MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
-DIGIT_TOL = (
-    1e-4  # largest distance of a step from a multiple of the printed digit, relative to the digit
-)
+# Largest distance of a step from a multiple of the printed digit, relative to the digit
+STEP_DIGIT_TOL = 1e-4
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
-EVEN_TOL = 1e-6
+EVEN_POSITIONS_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.
 POSITION_ROUND_OFF = 1e-9
 MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
@@ -96,9 +96,9 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         units = None
 
     # All that follows is in metres.
-    for role in table.columns:
-        table = _convert_column(table, role, units and units[role == "z"])
-        _check_numbers(table, role)
+    for coordinate in table.columns:
+        table = _convert_column(table, coordinate, units and units[coordinate == "z"])
+        _check_numbers(table, coordinate)
     if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
 
@@ -110,14 +110,14 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
 
     # Positions of a surface increase, whatever the direction of the measurement.
     axes = []
-    for axis, role in enumerate("yx"[2 - z.ndim :]):
-        places = table.columns[role]
+    for axis, coordinate in enumerate("yx"[2 - z.ndim :]):
+        places = table.columns[coordinate]
         if places[-1] < places[0]:
             places = places[::-1]
             z = np.flip(z, axis)
             table = table._replace(lines=None if table.lines is None else table.lines[::-1])
-        table, places = _undo_rounding(table, role, places)
-        _require_increase(table, role, places)
+        table, places = _undo_rounding(table, coordinate, places)
+        _require_increase(table, coordinate, places)
         axes.append(frozen_array(places))
     has_sure_units = table.are_units_fixed or units is not None
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
@@ -133,44 +133,45 @@ def refuse_many_heights(path, count: int) -> None:
         )
 
 
-def _convert_column(table: Table, role: str, given: str | None) -> Table:
+def _convert_column(table: Table, coordinate: str, given: str | None) -> Table:
     """Convert a column of a table to metres.
 
-    `role` is "x", "y" or "z", and `given` is the unit that the user states, or None. It overrules the file, with a
+    `coordinate` is "x", "y" or "z", and `given` is the unit that the user states, or None. It overrules the file, with a
     note.
     """
-    stated = table.units.get(role)
+    stated = table.units.get(coordinate)
     unit = given or stated
     if unit is None:
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or {GIVE_UNITS}"
+            f"{table.place}: the unit of {coordinate} is not given, and units are never guessed; {table.remedy}, or "
+            f"{MISSING_UNITS_REMEDY}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
         raise PatchfemError(
-            f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
+            f"{table.place}: unknown unit '{shorten(unit)}' of {coordinate}; use one of {LENGTH_UNIT_LIST}"
         )
     if stated is not None and parse_length_unit(stated) != factor:
         table = table.add_note(
-            f"the header gives {role} in {shorten(stated)}, but {unit} is used, as given by --units"
+            f"the header gives {coordinate} in {shorten(stated)}, but {unit} is used, as given by --units"
         )
-    return table._replace(columns=table.columns | {role: table.columns[role] * factor})
+    return table._replace(columns=table.columns | {coordinate: table.columns[coordinate] * factor})
 
 
-def _check_numbers(table: Table, role: str) -> None:
+def _check_numbers(table: Table, coordinate: str) -> None:
     """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing.
 
-    `role` is the name of the column of the `table`.
+    `coordinate` is the name of the column of the `table`.
     """
-    values = table.columns[role].ravel()
-    is_bad = ~(np.abs(values) <= MAX_LENGTH)
-    if role == "z":
+    values = table.columns[coordinate].ravel()
+    is_bad = ~(np.abs(values) <= MAX_COORDINATE)
+    if coordinate == "z":
         is_bad &= ~np.isnan(values)
     if not is_bad.any():
         return
     first = int(np.argmax(is_bad))
     raise PatchfemError(
-        f"{table.locate(first)}: {role} is {values[first]:.4g} m; is the unit right? write a missing height as nan"
+        f"{table.locate(first)}: {coordinate} is {values[first]:.4g} m; is the unit right? write a missing height as nan"
     )
 
 
@@ -179,7 +180,7 @@ def _fill_raster(table: Table) -> Table:
 
     Cells of the matrix without a point are missing heights.
     """
-    x, y, z = (table.columns[role] for role in "xyz")
+    x, y, z = (table.columns[coordinate] for coordinate in "xyz")
     columns, in_column = _find_positions(x)
     rows, in_row = _find_positions(y)
     if rows.size == 1:
@@ -217,15 +218,15 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
-def _require_increase(table: Table, role: str, places) -> None:
+def _require_increase(table: Table, coordinate: str, places) -> None:
     """Raise PatchfemError if the positions of a column are equal or do not increase.
 
-    `role` is "x" or "y", and `places` (n,) [m] are the positions. The `table` tells the line of a wrong one.
+    `coordinate` is "x" or "y", and `places` (n,) [m] are the positions. The `table` tells the line of a wrong one.
     """
     if not np.ptp(places) > 0:
         raise PatchfemError(
-            f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
-            f"different {role}"
+            f"{table.path}: every sample lies at {coordinate} = {format_length(places[0])}; a surface needs at least two "
+            f"different {coordinate}"
         )
     is_rising = np.diff(places) > 0
     if is_rising.all():
@@ -236,31 +237,31 @@ def _require_increase(table: Table, role: str, places) -> None:
         pair.reverse()
     before, after = map(format_length, places[pair])
     raise PatchfemError(
-        f"{table.locate(pair[1])}: {role} is {before} and then {after}, but it must only rise or only fall; keep one trace "
-        "or scan per file, and one height at each place"
+        f"{table.locate(pair[1])}: {coordinate} is {before} and then {after}, but it must only rise or only fall; keep one "
+        "trace or scan per file, and one height at each place"
     )
 
 
-def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
+def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]:
     """Return the table and positions x (n,) [m], made even if they differ only by rounding.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
     differ by it; uneven steps, such as 1.0 and 1.4 um in turn, are no multiples of their difference.
 
-    `role` is "x" or "y". The table gets a note if positions are changed.
+    `coordinate` is "x" or "y". The table gets a note if positions are changed.
     """
-    if x.size < MIN_ROUNDED:
+    if x.size < MIN_ROUNDED_POSITIONS:
         return table, x
 
     # The printed digit is the smallest difference of two steps.
     gaps = np.diff(np.sort(np.diff(x)))
-    gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
+    gaps = gaps[gaps > EVEN_POSITIONS_TOL * np.ptp(x) / x.size]
     digit = MIN_PRINTED_DIGIT
     if gaps.size and gaps[0] > digit:
         digit = float(gaps[0])
         n_digits = np.diff(x) / digit
-        if np.abs(n_digits - np.rint(n_digits)).max() > DIGIT_TOL:
+        if np.abs(n_digits - np.rint(n_digits)).max() > STEP_DIGIT_TOL:
             return table, x
 
     # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
@@ -274,11 +275,11 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and distance <= MAX_ROUNDING * digit:
-            if distance <= EVEN_TOL * step:
+        if step > 0 and distance <= MAX_ROUNDING_IN_DIGITS * digit:
+            if distance <= EVEN_POSITIONS_TOL * step:
                 return table, x
             note = (
-                f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
+                f"{coordinate} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"
             )
             return table.add_note(note), even
@@ -299,7 +300,9 @@ def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, .
         )
 
     # A few heights that stand out, such as 999 um for no signal, are spikes and do not count.
-    low, first, last, high = np.nanquantile(z, [0.0, FAULT_FRACTION, 1 - FAULT_FRACTION, 1.0])
+    low, first, last, high = np.nanquantile(
+        z, [0.0, MAX_FAULTY_HEIGHT_FRACTION, 1 - MAX_FAULTY_HEIGHT_FRACTION, 1.0]
+    )
     if last - first <= length:
         return ()
     text = (

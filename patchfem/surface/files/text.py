@@ -22,7 +22,7 @@ from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
 from .header import (
     COMMENT_SIGNS,
-    MISSING_PATTERN,
+    MISSING_HEIGHT_PATTERN,
     Column,
     Header,
     parse_fact,
@@ -30,14 +30,14 @@ from .header import (
     split_cells,
 )
 from .table import Table
-from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit
+from .units import HEADER_EXAMPLE, MISSING_SIZE_REMEDY, parse_length_unit
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
-MAX_STEP_UNEVENNESS = 1e-6
+COORDINATE_STEP_TOL = 1e-6
 # Pattern of a number in quotes with a decimal comma
-_QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+_QUOTED_NUMBER_PATTERN = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 # Pattern of a control character, which no text contains
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL_CHARACTER_PATTERN = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
@@ -52,16 +52,16 @@ def read_text(content: Content, *, has_units: bool = False) -> Table:
     if not header.columns and (header.count > 3 or is_sized):
         return _make_matrix(path, facts, _read_rows(path, lines, ["z"] * header.count)[0])
     place = f"{path}:{header.number}"
-    columns, notes = _find_roles(place, header, has_units=has_units)
-    numbers, row_lines = _read_rows(path, lines, [column.role for column in columns])
+    columns, notes = _find_coordinates(place, header, has_units=has_units)
+    numbers, row_lines = _read_rows(path, lines, [column.coordinate for column in columns])
 
     values = {}
     units = {}
     for column, column_numbers in zip(columns, numbers.T):
-        if column.role != "index":
-            values[column.role] = column_numbers
-            fact = facts.get("value units" if column.role == "z" else "lateral units")
-            units[column.role] = fact if column.unit is None else column.unit
+        if column.coordinate != "index":
+            values[column.coordinate] = column_numbers
+            fact = facts.get("value units" if column.coordinate == "z" else "lateral units")
+            units[column.coordinate] = fact if column.unit is None else column.unit
     length, unit = parse_fact(facts.get("length", ""))
     length = length and length * (parse_length_unit(unit) or 0.0)
     return Table(path, values, units, place, row_lines, notes, length=length or None)
@@ -77,15 +77,15 @@ def _decode(content: Content) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    if _CONTROL.search(text):
+    if _CONTROL_CHARACTER_PATTERN.search(text):
         raise PatchfemError(
             f"{content.path}: not a text file; export the profile as text with two columns and {HEADER_EXAMPLE}"
         )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return _QUOTED_NUMBER.sub(r"\1.\2", text).replace('"', "")
+    return _QUOTED_NUMBER_PATTERN.sub(r"\1.\2", text).replace('"', "")
 
 
-def _find_roles(
+def _find_coordinates(
     place: str, header: Header, *, has_units: bool
 ) -> tuple[list[Column], tuple[str, ...]]:
     """Find which columns of a text file are x, y and z.
@@ -97,44 +97,44 @@ def _find_roles(
     header : Header
         What stands above the numbers.
     has_units : bool
-        Whether the user states the units. Then columns of unknown names have their roles in their order.
+        Whether the user states the units. Then columns of unknown names have their coordinates in their order.
 
     Returns
     -------
     columns : list of Column
-        The columns with their roles.
+        The columns with their coordinates.
     notes : tuple of str
-        A note if the roles follow from the order.
+        A note if the coordinates follow from the order.
     """
-    default_roles = {2: "xz", 3: "xyz"}.get(header.count, "z")
-    columns = header.columns or [Column(role) for role in default_roles]
-    data = [column for column in columns if column.role != "index"]
+    default_coordinates = {2: "xz", 3: "xyz"}.get(header.count, "z")
+    columns = header.columns or list(map(Column, default_coordinates))
+    data = [column for column in columns if column.coordinate != "index"]
     if len(data) not in (2, 3):
         raise PatchfemError(
             f"{place}: {len(data)} columns of numbers, but x and z, or x, y and z, are needed; keep one trace of two "
             f"columns and {HEADER_EXAMPLE}"
         )
 
-    # Roles by name, or in their order where the user knows the units.
+    # Coordinates by the names of the columns, or in the order of the columns where the user states the units.
     known = ["x", "z"] if len(data) == 2 else ["x", "y", "z"]
-    roles = [column.role for column in data]
-    if sorted(roles) == ["x", "y"]:
+    coordinates = [column.coordinate for column in data]
+    if sorted(coordinates) == ["x", "y"]:
         # Columns x and y are a trace whose heights are named y.
-        roles = [role.replace("y", "z") for role in roles]
+        coordinates = [coordinate.replace("y", "z") for coordinate in coordinates]
 
     notes = ()
-    if sorted(roles) != known:
+    if sorted(coordinates) != known:
         listed = ", ".join(f"'{shorten(column.name)}'" for column in data)
         if not has_units:
             raise PatchfemError(
                 f"{place}: the columns {listed} are not {', '.join(known)}, which are needed; {HEADER_EXAMPLE}"
             )
         notes = (f"{place}: columns {listed} are taken as {', '.join(known)} in this order",)
-        roles = known
+        coordinates = known
 
-    named = iter(roles)
+    named = iter(coordinates)
     return [
-        column if column.role == "index" else column._replace(role=next(named))
+        column if column.coordinate == "index" else column._replace(coordinate=next(named))
         for column in columns
     ], notes
 
@@ -166,26 +166,26 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     axes = (("x", "width", z.shape[1]), ("y", "height", z.shape[0]))
     columns = {}
     units = {"z": facts.get("value units")}
-    for role, name, count in axes if z.shape[0] > 1 else axes[:1]:
-        size, units[role] = parse_fact(facts.get(name, ""))
+    for coordinate, name, count in axes if z.shape[0] > 1 else axes[:1]:
+        size, units[coordinate] = parse_fact(facts.get(name, ""))
         if size is None or not 0 < size < np.inf:
             raise PatchfemError(
                 f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
-                f"row), but the {name} of the scan is not given as a length above zero; {SIZE_LINES}"
+                f"row), but the {name} of the scan is not given as a length above zero; {MISSING_SIZE_REMEDY}"
             )
-        columns[role] = np.arange(count) * size / count
+        columns[coordinate] = np.arange(count) * size / count
     columns["z"] = z if z.shape[0] > 1 else z[0]
-    return Table(path, columns, units, str(path), remedy=SIZE_LINES)
+    return Table(path, columns, units, str(path), remedy=MISSING_SIZE_REMEDY)
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether values (n,) increase by equal steps, within MAX_STEP_UNEVENNESS of the first step."""
+    """Return whether values (n,) increase by equal steps, within COORDINATE_STEP_TOL of the first step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < MAX_STEP_UNEVENNESS * steps[0])
+    return bool(steps[0] > 0 and np.ptp(steps) < COORDINATE_STEP_TOL * steps[0])
 
 
 def _read_rows(
-    path, lines: Iterator[tuple[int, str]], roles: list[str]
+    path, lines: Iterator[tuple[int, str]], coordinates: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read all rows of numbers of a text file.
 
@@ -197,7 +197,7 @@ def _read_rows(
         For messages.
     lines : iterator of (int, str)
         Numbers and texts of the lines below the header. The first row shows the delimiter of all.
-    roles : list of str
+    coordinates : list of str
         Role of each column. A height "z" may be missing, and an "index" is not read.
 
     Returns
@@ -206,7 +206,7 @@ def _read_rows(
     row_lines : (m,) array
         Line of each row.
     """
-    is_matrix = set(roles) == {"z"}
+    is_matrix = set(coordinates) == {"z"}
     numbers = array("d")
     row_lines = array("q")
     delimiter = None
@@ -234,28 +234,28 @@ def _read_rows(
             )
         cells = (line.replace(",", ".") if has_comma else line).split(delimiter)
         cells = [cell.strip() for cell in cells]
-        while len(cells) > len(roles) and not cells[-1]:
+        while len(cells) > len(coordinates) and not cells[-1]:
             cells.pop()
-        if len(cells) != len(roles):
-            is_decimal = delimiter == "," and len(cells) == 2 * len(roles)
+        if len(cells) != len(coordinates):
+            is_decimal = delimiter == "," and len(cells) == 2 * len(coordinates)
             remedy = "with a decimal comma, separate the columns by semicolons or tabs"
             remedy = remedy if is_decimal else "write nan for a missing height"
-            raise PatchfemError(f"{place}: {len(roles)} numbers are needed; {remedy}")
-        numbers.extend([_parse_cell(f"{path}:{number}", *pair) for pair in zip(roles, cells)])
+            raise PatchfemError(f"{place}: {len(coordinates)} numbers are needed; {remedy}")
+        numbers.extend([_parse_cell(f"{path}:{number}", *pair) for pair in zip(coordinates, cells)])
         row_lines.append(number)
-    return np.array(numbers).reshape(-1, len(roles)), np.array(row_lines)
+    return np.array(numbers).reshape(-1, len(coordinates)), np.array(row_lines)
 
 
-def _parse_cell(place: str, role: str, cell: str) -> float:
+def _parse_cell(place: str, coordinate: str, cell: str) -> float:
     """Return the number in a cell, or NaN for a missing height.
 
-    PatchfemError is raised for other text. `place` is file and line for the message, and `role` is the name of the
+    PatchfemError is raised for other text. `place` is file and line for the message, and `coordinate` is the name of the
     column.
     """
     if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
-    if role == "index" or (role == "z" and MISSING_PATTERN.fullmatch(cell)):
+    if coordinate == "index" or (coordinate == "z" and MISSING_HEIGHT_PATTERN.fullmatch(cell)):
         return np.nan
     raise PatchfemError(
-        f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"
+        f"{place}: '{shorten(cell)}' is not a number for {coordinate}; correct the line, or write a missing height as nan"
     )

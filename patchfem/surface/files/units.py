@@ -2,10 +2,10 @@
 
 from ...inputs.units import UNIT_FACTORS, normalize_unit
 
-UNITS = UNIT_FACTORS["length"]
-UNIT_LIST = ", ".join(UNITS)
+LENGTH_UNITS = UNIT_FACTORS["length"]
+LENGTH_UNIT_LIST = ", ".join(LENGTH_UNITS)
 # Longer words for units of length, in lower case.
-UNIT_WORDS = {
+LENGTH_UNIT_WORDS = {
     **dict.fromkeys(("a", "å", "angstrom", "ångström"), 1e-10),
     **dict.fromkeys(("inch", "inches"), 0.0254),
     **dict.fromkeys(("micron", "microns", "mikron"), 1e-6),
@@ -30,14 +30,20 @@ _COLUMN_NAMES = {
     "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil, raw",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
 }
-ROLES_BY_NAME = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
+COORDINATES_BY_COLUMN_NAME = {
+    name: coordinate for coordinate, names in _COLUMN_NAMES.items() for name in names.split(", ")
+}
 
-GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
+MISSING_UNITS_REMEDY = (
+    'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
+)
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
-SIZE_LINES = "write `# Width: 1.2 mm` and `# Height: 0.8 mm` and `# Value units: um` above its rows"
+MISSING_SIZE_REMEDY = (
+    "write `# Width: 1.2 mm` and `# Height: 0.8 mm` and `# Value units: um` above its rows"
+)
 
 
 def parse_length_unit(word: str) -> float | None:
     """Return the factor to metres of a word such as um, µm, [mm] or Mikrometer, or None for others."""
     word = normalize_unit(word.strip("[]() "))
-    return UNITS.get(word) or UNIT_WORDS.get(word.lower())
+    return LENGTH_UNITS.get(word) or LENGTH_UNIT_WORDS.get(word.lower())

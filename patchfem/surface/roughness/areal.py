@@ -8,17 +8,17 @@ import numpy as np
 from ..quantity import read_definitions
 from .parameters import compute_core, compute_moments
 
-DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
+AUTOCORRELATION_AT_SAL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
 # Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
-MIN_LENGTH_STEPS = 2.0
-N_RAYS = 360  # number of directions in which the autocorrelation is followed
-RAY_POINTS = 4  # number of points on a ray per raster step
+MIN_AUTOCORRELATION_STEPS = 2.0
+N_AUTOCORRELATION_DIRECTIONS = 360  # number of directions in which the autocorrelation is followed
+RAY_POINTS_PER_STEP = 4  # number of points on a ray per raster step
 # Unit and definition of each parameter of a scan, by name
-AREAL = read_definitions("areal")
+AREAL_DEFINITIONS = read_definitions("areal")
 
 
 def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float | str]:
-    """Compute the parameters of a scan, by the names in AREAL; a code of the reason where there is none.
+    """Compute the parameters of a scan, by the names in AREAL_DEFINITIONS; a code of the reason where there is none.
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     if values["Sq"] > 0:
         distances = _find_decay_lengths(autocorrelation(z), steps)
     shortest = float(distances.min())
-    if shortest < MIN_LENGTH_STEPS * max(steps):
+    if shortest < MIN_AUTOCORRELATION_STEPS * max(steps):
         values |= {"Sal": "unresolved", "Str": "unresolved"}
     elif np.isfinite(shortest):
         values["Sal"] = shortest
         if np.isfinite(distances).all():
             values["Str"] = shortest / float(distances.max())
     unknown = "flat" if values["Sq"] == 0 else "undetermined"
-    return {name: unknown if values[name] is None else values[name] for name in AREAL}
+    return {name: unknown if values[name] is None else values[name] for name in AREAL_DEFINITIONS}
 
 
 def _compute_area_ratio(along_y, along_x) -> float:
@@ -103,14 +103,14 @@ def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
     from scipy import ndimage
 
     sizes = (np.array(rho.shape) // 2) * steps
-    radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / RAY_POINTS)
-    angle = np.linspace(0.0, np.pi, N_RAYS, endpoint=False)
+    radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / RAY_POINTS_PER_STEP)
+    angle = np.linspace(0.0, np.pi, N_AUTOCORRELATION_DIRECTIONS, endpoint=False)
     rays = np.array([np.sin(angle), np.cos(angle)])[..., None] * radius
     pixels = rays / np.reshape(steps, (2, 1, 1)) + np.reshape(rho.shape, (2, 1, 1)) // 2
     along = ndimage.map_coordinates(rho, pixels, order=1, cval=np.nan)
-    is_low = along < DECAY_LEVEL
+    is_low = along < AUTOCORRELATION_AT_SAL
     first = is_low.argmax(axis=1)
-    rows = np.arange(N_RAYS)
+    rows = np.arange(N_AUTOCORRELATION_DIRECTIONS)
     last_high, first_low = along[rows, first - 1], along[rows, first]
-    part = (last_high - DECAY_LEVEL) / (last_high - first_low)
+    part = (last_high - AUTOCORRELATION_AT_SAL) / (last_high - first_low)
     return np.where(is_low.any(axis=1), (first - 1 + part) * radius[1], np.inf)

@@ -9,17 +9,17 @@ from ...formatting import format_length
 from ..areal import Areal, level
 from ..profile import Profile
 
-CIRCLE = "circle"
+CIRCLE_FORM = "circle"
 MIN_CIRCLE_HEIGHTS = 10  # smallest number of heights that determine a circle
 
 
 def parse_form_option(text: str) -> int | str:
     """Parse the text of the option that names the form to subtract: 1 (line or plane), or circle."""
-    form = {"1": 1, CIRCLE: CIRCLE}.get(text.strip())
+    form = {"1": 1, CIRCLE_FORM: CIRCLE_FORM}.get(text.strip())
     if form is not None:
         return form
     raise PatchfemError(
-        f"the form '{text}' is not possible; use 1 (a line or a plane) or {CIRCLE} (of a trace); polynomials "
+        f"the form '{text}' is not possible; use 1 (a line or a plane) or {CIRCLE_FORM} (of a trace); polynomials "
         "were removed in patchfem 1.2"
     )
 
@@ -43,7 +43,7 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
         Name of the form, for the user.
     """
     is_scan = isinstance(surface, Areal)
-    if form != CIRCLE:
+    if form != CIRCLE_FORM:
         return level(surface), "plane" if is_scan else "line"
     if is_scan:
         raise PatchfemError(

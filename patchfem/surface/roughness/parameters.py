@@ -10,25 +10,25 @@ from ..quantity import read_definitions
 
 # Smallest number of samples in a trace; fewer give neither a spectrum nor a curvature.
 MIN_TRACE_SAMPLES = 16
-HEIGHT_ROUND_OFF = (
-    1e-12  # largest heights of a straight line after levelling, relative to those before
-)
-MIN_HEIGHT_FRACTION = 0.10  # smallest height of hills and dales that count, relative to Rz
-MIN_WIDTH_FRACTION = 0.01  # smallest width of hills and dales that count, relative to the section
+# Largest heights of a straight line after levelling, relative to those before
+HEIGHT_ROUND_OFF = 1e-12
+MIN_HILL_HEIGHT_OVER_RZ = 0.10  # smallest height of hills and dales that count, relative to Rz
+# Smallest width of hills and dales that count, relative to the section
+MIN_HILL_WIDTH_FRACTION = 0.01
 MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 # Parameters without an interval: extremes and high moments of a whole trace depend on single heights, so that the
 # scatter of sections does not show their errors.
-WITHOUT_INTERVAL = ("t", "sk", "ku")
-CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
+PARAMETERS_WITHOUT_INTERVAL = ("t", "sk", "ku")
+CORE_LENGTH_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
 # Unit and definition of each parameter of a trace, by name
-PROFILE = read_definitions("profile")
+PROFILE_DEFINITIONS = read_definitions("profile")
 # Unit and definition of each amplitude of waves, by name
-WAVES = read_definitions("waves")
+WAVES_DEFINITIONS = read_definitions("waves")
 
 
 def compute_parameters(z, step: float, section: float | None = None) -> dict[str, float | None]:
-    """Compute the parameters of a profile, by the names in PROFILE.
+    """Compute the parameters of a profile, by the names in PROFILE_DEFINITIONS.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def compute_parameters(z, step: float, section: float | None = None) -> dict[str
     """
     size = z.size if section is None else round(section / step)
     sections = z[: z.size // size * size].reshape(-1, size)
-    values = dict.fromkeys(PROFILE) | compute_moments(z) | compute_core(z)
+    values = dict.fromkeys(PROFILE_DEFINITIONS) | compute_moments(z) | compute_core(z)
     if len(sections):
         peaks = sections.max(axis=1)
         valleys = sections.min(axis=1)
@@ -80,9 +80,9 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     step : float
         Sampling interval [m].
     rough : float
-        Rz [m], of which a hill or dale must have the fraction MIN_HEIGHT_FRACTION.
+        Rz [m], of which a hill or dale must have the fraction MIN_HILL_HEIGHT_OVER_RZ.
     section : float
-        Length of a section [m], of which a hill or dale must have the fraction MIN_WIDTH_FRACTION.
+        Length of a section [m], of which a hill or dale must have the fraction MIN_HILL_WIDTH_FRACTION.
     """
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing
@@ -92,7 +92,9 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     first = np.append(0, starts + 1)
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
-    is_kept = (extent >= MIN_HEIGHT_FRACTION * rough) & (width >= MIN_WIDTH_FRACTION * section)
+    is_kept = (extent >= MIN_HILL_HEIGHT_OVER_RZ * rough) & (
+        width >= MIN_HILL_WIDTH_FRACTION * section
+    )
     kept_indices = np.flatnonzero(is_kept)
     # A hill or dale begins at the crossing before it.
     ends = places[kept_indices[1:][np.diff(above[first[kept_indices]])] - 1]
@@ -111,7 +113,7 @@ def compute_core(z) -> dict[str, float | None]:
         return dict.fromkeys(("k", "pk", "vk", "Mr1", "Mr2"))
 
     # The flattest 40 % of the curve, and the line through it.
-    size = max(round(CORE_FRACTION * n), 2)
+    size = max(round(CORE_LENGTH_FRACTION * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
     ratio = (np.arange(start, start + size) + 0.5) / n
@@ -153,8 +155,8 @@ def estimate_errors(z, step: float, section: float) -> dict[str, float]:
         compute_parameters(np.delete(sections, k, 0).ravel(), step, section) for k in range(count)
     ]
     errors = {}
-    for name in PROFILE:
+    for name in PROFILE_DEFINITIONS:
         values = [values[name] for values in remainders]
-        if None not in values and name not in WITHOUT_INTERVAL:
+        if None not in values and name not in PARAMETERS_WITHOUT_INTERVAL:
             errors[name] = float(np.sqrt((count - 1) * np.var(values)))
     return errors

@@ -20,21 +20,24 @@ from ..profile import Profile, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
-SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
+# Coefficient of 1/alpha in the variance of summit heights (Bush 1976)
+SUMMIT_VARIANCE_COEFFICIENT = 0.8968
 # Nayak's spectral width alpha of an isotropic surface whose waves all have the same length. No surface has less.
-MIN_ALPHA = 1.5
+MIN_SPECTRAL_WIDTH_ALPHA = 1.5
 # Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
-PERSSON = (0.4, 0.5)
+DECAY_LENGTH_OVER_RMS_HEIGHT = (0.4, 0.5)
 # Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
-MAX_SPIKE_FRACTION = 0.1
+MAX_SPIKE_SAMPLE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
-MAX_SKEWNESS = 0.5
+MAX_HEIGHT_SKEWNESS = 0.5
 # Largest kurtosis minus 3 whose effect on the stiffness is below the uncertainty of the theory
 MAX_EXCESS_KURTOSIS = 1.0
 # Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
-SHARPEST_FRACTION = 0.005
-MAX_SHARPEST_POWER = 0.5  # largest fraction of m_4 in the sharpest heights; more may be due to dust
-MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian traces reach
+SHARPEST_HEIGHT_FRACTION = 0.005
+# Largest fraction of m_4 in the sharpest heights; more may be due to dust
+MAX_SHARPEST_M4_FRACTION = 0.5
+# Standard deviations that skewness and kurtosis of Gaussian traces reach
+MAX_GAUSSIAN_MOMENT_DEVIATIONS = 3
 
 
 class Moments(NamedTuple):
@@ -81,7 +84,7 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     clean = remove_spikes(trace)
     is_removed = clean.missing & ~trace.missing
     dust = ()
-    if is_removed.mean() > MAX_SPIKE_FRACTION:
+    if is_removed.mean() > MAX_SPIKE_SAMPLE_FRACTION:
         # So many apparent spikes belong to the surface.
         clean = trace
     elif is_removed.any():
@@ -102,8 +105,8 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
 
     # A few heights, such as those of wide dust, may make up most of m_4.
     bend = np.diff(flat.z, 2) ** 2
-    order = np.argsort(bend)[::-1][: max(int(SHARPEST_FRACTION * bend.size), 1)]
-    if bend[order].sum() > MAX_SHARPEST_POWER * bend.sum():
+    order = np.argsort(bend)[::-1][: max(int(SHARPEST_HEIGHT_FRACTION * bend.size), 1)]
+    if bend[order].sum() > MAX_SHARPEST_M4_FRACTION * bend.sum():
         dust += (
             f"{order.size} of {flat.z.size} heights, the sharpest at x = {format_length(flat.x[order[0] + 1])}, make up "
             "most of the mean square curvature, as dust does; if they are dust, write nan for them",
@@ -140,14 +143,14 @@ def _describe_skew(z, moments: Moments, length: float) -> str:
     skewness = float(np.mean(unit**3))
     excess = float(np.mean(unit**4)) - 3
     count = max(moments.slope * length / (np.pi * moments.height), 1.0)
-    max_skewness = max(MAX_SKEWNESS, MAX_DEVIATIONS * np.sqrt(6 / count))
-    max_excess = max(MAX_EXCESS_KURTOSIS, MAX_DEVIATIONS * np.sqrt(24 / count))
+    max_skewness = max(MAX_HEIGHT_SKEWNESS, MAX_GAUSSIAN_MOMENT_DEVIATIONS * np.sqrt(6 / count))
+    max_excess = max(MAX_EXCESS_KURTOSIS, MAX_GAUSSIAN_MOMENT_DEVIATIONS * np.sqrt(24 / count))
     if abs(skewness) <= max_skewness and abs(excess) <= max_excess:
         return ""
     effect = "the stiffness from the theory is only a guess"
-    if skewness < -MAX_SKEWNESS:
+    if skewness < -MAX_HEIGHT_SKEWNESS:
         effect = "tops that were cut off by wear are stiffer than the theory predicts"
-    elif skewness > MAX_SKEWNESS:
+    elif skewness > MAX_HEIGHT_SKEWNESS:
         effect = "single high peaks are softer than the theory predicts"
     return (
         f"the heights have skewness {skewness:.2g} and kurtosis {excess + 3:.2g}, but the theory "
@@ -160,18 +163,18 @@ def gaussian_peaks(moments: Moments) -> Peaks:
 
     Raises PatchfemError if no isotropic surface of Gaussian heights has them.
     """
-    if not moments.alpha >= MIN_ALPHA * (1 - 1e-9):
+    if not moments.alpha >= MIN_SPECTRAL_WIDTH_ALPHA * (1 - 1e-9):
         raise PatchfemError(
             f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but on an "
             "isotropic surface of Gaussian heights this number is at least "
-            f"{np.sqrt(MIN_ALPHA):.3g}; take all three from one trace across the lay, or give "
+            f"{np.sqrt(MIN_SPECTRAL_WIDTH_ALPHA):.3g}; take all three from one trace across the lay, or give "
             "radius, density and height_deviation of the peaks"
         )
     m0, m2, m4 = (moment**2 for moment in moments)
     return Peaks(
         radius=3 / 8 * float(np.sqrt(np.pi / m4)),
         density=float(m4 / (6 * np.pi * np.sqrt(3) * m2)),
-        deviation=float(np.sqrt(m0 * (1 - SUMMIT_FACTOR / moments.alpha))),
+        deviation=float(np.sqrt(m0 * (1 - SUMMIT_VARIANCE_COEFFICIENT / moments.alpha))),
     )
 
 
@@ -182,5 +185,5 @@ def persson_stiffness(pressure: float, height: float) -> tuple[float, float]:
     stiffness p/u_0 does not depend on the shortest waves. The theory holds while little of the area
     touches.
     """
-    low, high = PERSSON
+    low, high = DECAY_LENGTH_OVER_RMS_HEIGHT
     return pressure / (high * height), pressure / (low * height)

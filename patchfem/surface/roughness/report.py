@@ -11,17 +11,17 @@ from ...formatting import format_length
 from ..areal import Areal, find_scan_spikes
 from ..profile import Profile, find_spikes, measure_step, resample_evenly
 from ..quantity import Quantity
-from ..spectrum import BAND, WaveSpectrum, wave_spectrum
-from .areal import AREAL, compute_areal_parameters
+from ..spectrum import WAVE_BAND, WaveSpectrum, wave_spectrum
+from .areal import AREAL_DEFINITIONS, compute_areal_parameters
 from .filter import filter_surface
 from .form import subtract_form
 from .parameters import (
     HEIGHT_ROUND_OFF,
     MIN_SECTIONS,
     MIN_TRACE_SAMPLES,
-    PROFILE,
-    WAVES,
-    WITHOUT_INTERVAL,
+    PARAMETERS_WITHOUT_INTERVAL,
+    PROFILE_DEFINITIONS,
+    WAVES_DEFINITIONS,
     compute_parameters,
     estimate_errors,
 )
@@ -29,8 +29,9 @@ from .parameters import (
 # Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
 STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)
 # Smallest length of a trace in cut-offs: five are evaluated, and the filter trims one in total.
-SECTIONS_PER_TRACE = 6
-CONFIDENCE_TAIL = 0.05  # probability of a true value below, and above, the interval of a parameter
+MIN_TRACE_CUTOFFS = 6
+# Probability of a true value below, and above, the interval of a parameter
+CONFIDENCE_TAIL_PROBABILITY = 0.05
 
 
 class Sampling(NamedTuple):
@@ -169,14 +170,14 @@ def _measure_trace(
     values = compute_parameters(primary.z, primary.step)
     del values["z"]  # of one section, which is Pt
     quantities = [
-        _name_value(f"P{name}", value, *PROFILE[name], "levelled trace")
+        _name_value(f"P{name}", value, *PROFILE_DEFINITIONS[name], "levelled trace")
         for name, value in values.items()
     ]
-    has_band = 2 * BAND[1] <= primary.length and BAND[0] >= 2 * primary.step
+    has_band = 2 * WAVE_BAND[1] <= primary.length and WAVE_BAND[0] >= 2 * primary.step
     amplitude = parts.spectrum.measure_band() if has_band else None
     name = "band_amplitude"
     reason = "" if has_band else "band"
-    quantities.append(Quantity(amplitude, None, None, *WAVES[name], reason, name))
+    quantities.append(Quantity(amplitude, None, None, *WAVES_DEFINITIONS[name], reason, name))
     rough = parts.roughness
     if rough is None:
         return quantities, ()
@@ -184,16 +185,20 @@ def _measure_trace(
     # The interval is that of a mean over sections by Student's t of its logarithm.
     errors = estimate_errors(rough.z, primary.step, cutoff)
     n_sections = rough.z.size // round(cutoff / primary.step)
-    student = special.stdtrit(max(n_sections - 1, 1), 1 - CONFIDENCE_TAIL)
+    student = special.stdtrit(max(n_sections - 1, 1), 1 - CONFIDENCE_TAIL_PROBABILITY)
     for name, value in compute_parameters(rough.z, primary.step, cutoff).items():
         long_name = name if name.startswith("Mr") else f"R{name}"
-        quantity = _name_value(long_name, value, *PROFILE[name], "roughness profile")
+        quantity = _name_value(long_name, value, *PROFILE_DEFINITIONS[name], "roughness profile")
         if value and errors.get(name):
             factor = float(np.exp(student * errors[name] / value))
             # A material ratio is at most 1.
             high = min(value * factor, 1.0) if name.startswith("Mr") else value * factor
             quantity = quantity._replace(low=value / factor, high=high)
-        elif value is not None and n_sections < MIN_SECTIONS and name not in WITHOUT_INTERVAL:
+        elif (
+            value is not None
+            and n_sections < MIN_SECTIONS
+            and name not in PARAMETERS_WITHOUT_INTERVAL
+        ):
             quantity = quantity._replace(reason="sections")
         quantities.append(quantity)
     if n_sections >= MIN_SECTIONS:
@@ -217,7 +222,7 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
     quantities = []
     for name, value in compute_areal_parameters(scan.z, steps).items():
         number, reason = (None, value) if isinstance(value, str) else (value, "")
-        quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
+        quantities.append(Quantity(number, None, None, *AREAL_DEFINITIONS[name], reason, name))
     note = f"{scan.source}: {count} of {scan.z.size} heights are missing and are left out"
     return quantities, (note,) if count else ()
 
@@ -234,7 +239,7 @@ def _name_value(name: str, value: float | None, unit: str, text: str, profile: s
 
 def fitting_cutoff(length: float, step: float) -> float | None:
     """Return the longest standard cut-off [m] that a trace of this length and step [m] allows."""
-    longest = length * (1 + 1e-9) / SECTIONS_PER_TRACE
+    longest = length * (1 + 1e-9) / MIN_TRACE_CUTOFFS
     return max((each for each in STANDARD_CUTOFFS if 4 * step <= each <= longest), default=None)
 
 

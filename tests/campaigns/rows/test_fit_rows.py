@@ -13,7 +13,7 @@ from patchfem.campaigns.rows.fit import fit_rows, make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
-from patchfem.scene import BOUNDS, load, loads, read_assignments
+from patchfem.scene import BOUNDS_FORM, load, loads, read_assignments
 
 LINEAR = """
 [structure]
@@ -63,7 +63,7 @@ def write_and_load(tmp_path, text, *sets):
 
 def read_free_keys(*texts):
     """Return the ranges of the free keys."""
-    found, wrong = read_assignments(texts, BOUNDS)
+    found, wrong = read_assignments(texts, BOUNDS_FORM)
     assert not wrong
     return found
 

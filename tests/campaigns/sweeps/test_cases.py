@@ -7,7 +7,7 @@ import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem import SceneError
-from patchfem.campaigns import Cases, Request, SweepScene, read_cases
+from patchfem.campaigns import CaseRequest, Cases, SweepScene, read_cases
 from patchfem.scene import read_assignments
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
@@ -98,7 +98,7 @@ def test_exact_common_mistake_is_reported_once():
     text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
     with pytest.raises(SceneError) as refused:
         read_cases(
-            SweepScene(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100)
+            SweepScene(Path("a.toml"), text), CaseRequest(("friction.static=0.2..0.25",), None, 100)
         )
     assert str(refused.value).count("is larger than static") == 1 and "more" not in str(
         refused.value

@@ -132,13 +132,13 @@ KILLED = """\
 import os, signal, sys
 from pathlib import Path
 from typing import ClassVar
-from patchfem.campaigns.sweeps.parse_request import Request, read_sweep
+from patchfem.campaigns.sweeps.parse_request import CaseRequest, read_sweep
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
 def kill(done, total, *_):
     if done > 3:
         os.kill(os.getpid(), signal.SIGKILL)
-sweep, cases = read_sweep(Path(sys.argv[1]), (), Request(sys.argv[3:]))
+sweep, cases = read_sweep(Path(sys.argv[1]), (), CaseRequest(sys.argv[3:]))
 sweep_into(sweep, cases, SweepTarget(Path(sys.argv[2])), Pool(2), report_progress=kill)
 """
 

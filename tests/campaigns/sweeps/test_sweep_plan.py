@@ -6,7 +6,7 @@ import pytest
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns import (
-    Request,
+    CaseRequest,
     SweepScene,
     read_cases,
 )
@@ -35,7 +35,7 @@ def test_exact_contradiction_in_part_of_range_is_reported(more, count, of, helps
     scene = SweepScene(Path("a.toml"), POINT + COULOMB + more + SHORT)
     cases = read_cases(
         scene,
-        Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
+        CaseRequest(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
     )
     message = cases.warning
     assert message.startswith(f"{of} will fail: a.toml:" if of else "")

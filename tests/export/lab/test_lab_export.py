@@ -77,7 +77,7 @@ def test_refuses_non_finite_values_in_universal_file(tmp_path):
         )
     }
     details = {"outcome": "done"}
-    store.write(Answer("fit", "", ("fitted",), data=columns, details=details), tmp_path)
+    store.write_answer(Answer("fit", "", ("fitted",), data=columns, details=details), tmp_path)
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
         export_histories(tmp_path, tmp_path / "a.uff")
     assert not (tmp_path / "a.uff").exists()

@@ -34,8 +34,8 @@ def written(request, tmp_path_factory):
     """Return the answer of a comparison and the folder with its files and page."""
     answer = compare.make_answer(compare_pair(request.param == "scans"))
     folder = tmp_path_factory.mktemp(request.param)
-    store.write(answer, folder)
-    page.write_page(folder)
+    store.write_answer(answer, folder)
+    page.write_report(folder)
     return answer, folder
 
 
@@ -72,7 +72,7 @@ def test_exact_each_finding_has_a_sentence_with_its_numbers(code):
         digits = f"{number:.4e}".rstrip("0") if isinstance(number, float) else str(number)
         mantissa = digits.partition("e")[0].rstrip("0").rstrip(".").replace(".", "")
         assert mantissa in sentence.replace(".", ""), (name, sentence)
-    assert "{" not in sentence and sentences.NO_LIMIT not in sentence
+    assert "{" not in sentence and sentences.MISSING_NUMBER_TEXT not in sentence
 
 
 def test_exact_compare_json_has_the_keys_of_the_contract(written):
@@ -90,12 +90,12 @@ def test_exact_compare_json_has_the_keys_of_the_contract(written):
     for name in names:
         assert {"value", "low", "high", "unit"} <= data[name].keys()
         assert (data[name]["value"] is None) == ("reason" in data[name])
-    assert data["hidden_wear"]["reason"] == sentences.REASONS["no_limit"]
+    assert data["hidden_wear"]["reason"] == sentences.MISSING_VALUE_REASONS["no_limit"]
     place = data["registration"]
     if "worn_volume" in data:
         assert place.keys() >= {"shift_x", "shift_y", "rotation", "mirrored"}
         assert place["mirrored"] is True and data["track"] is None
-        assert data["roughness"]["reason"] == sentences.REASONS["scans"]
+        assert data["roughness"]["reason"] == sentences.MISSING_VALUE_REASONS["scans"]
     else:
         sizes = {"from", "to", "depth_mean", "depth_floor", "area_net", "area_gross", "pile_up"}
         assert sizes <= data["track"].keys()
@@ -142,7 +142,7 @@ def test_exact_curves_are_in_csv_and_netcdf():
     assert ends == pytest.approx([1.5e-3, 2.5e-3], abs=5e-6)
     band = float((data.depth_high - data.depth).mean())
     assert band == pytest.approx(1.96 * curves.noise.mean(), rel=1e-3)
-    worn = data.state.values == compare.STATES.index("worn")
+    worn = data.state.values == compare.WEAR_STATES.index("worn")
     assert (worn == curves.worn).all()
     # a fifth of the heights lie below the material ratio of 80 %
     for side, heights in (("before", curves.before), ("after", curves.after)):
@@ -154,7 +154,7 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
     """The page is made again byte for byte; its verdict and its tiles are the texts of the numbers in summary.json."""
     _, folder = written
     text = read_page(folder)
-    page.write_page(folder)
+    page.write_report(folder)
     assert read_page(folder) == text
     summary = read_json(folder / "summary.json")
     for sentence in summary["verdict"]:
@@ -164,4 +164,4 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
     for label, shown in tiles.items():
         name = label.replace(" ", "_")
         assert quantities.format_quantity(name, parse(summary["measures"][name])) == shown
-        assert f'<div title="{quantities.describe(name, "compare")}">' in text
+        assert f'<div title="{quantities.describe_quantity(name, "compare")}">' in text

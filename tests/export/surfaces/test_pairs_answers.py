@@ -29,12 +29,12 @@ def test_exact_files_of_pairs(tmp_path):
     answer = pairs.make_answer(make_rows(), "pairs.csv")
     assert answer.verdict == ("5 pairs: 4 worn, 0 not, 1 failed.",)
 
-    store.write(answer, tmp_path)
-    page.write_page(tmp_path)
+    store.write_answer(answer, tmp_path)
+    page.write_report(tmp_path)
     rows = list(csv.DictReader((tmp_path / "pairs.csv").read_text("utf-8").splitlines()))
     assert [float(row["worn_depth_mean [m]"] or 0) for row in rows] == [*DEPTHS, 2e-6, 0]
     assert rows[4]["message"] == "x.csv: there is no such file" and rows[0]["part"] == "no. 2"
     html = read_page(tmp_path)
     assert "Worn depth of the pairs" in html and "x.csv: there is no such file" in html
-    page.write_page(tmp_path)
+    page.write_report(tmp_path)
     assert html == read_page(tmp_path)

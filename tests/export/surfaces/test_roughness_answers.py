@@ -30,8 +30,8 @@ def sine_folder(tmp_path_factory):
     """Return the answer on a sine with a cut-off, and the folder with its files and page."""
     answer = roughness.make_answer([make_report(make_sine(), cutoff=8e-4)])
     folder = tmp_path_factory.mktemp("sine")
-    store.write(answer, folder)
-    page.write_page(folder)
+    store.write_answer(answer, folder)
+    page.write_report(folder)
     return answer, folder
 
 
@@ -97,4 +97,4 @@ def test_exact_scan_has_areal_parameters_and_a_map():
     assert answer.verdict[0].startswith("Sa ") and "no L-filter" in answer.verdict[1]
     assert answer.data["height_map"].values.shape == (90, 160) and "primary" not in answer.data
     for name in answer.quantities:
-        assert quantities.describe(name, "profile")
+        assert quantities.describe_quantity(name, "profile")

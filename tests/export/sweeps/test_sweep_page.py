@@ -68,7 +68,7 @@ def read_menu(path) -> dict[str, list]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_verdict_is_short(folders, kind):
     """The headline has at most 30 words, the verdict at most four sentences, and both are those of sweep.json."""
-    answer = store.read(folders[kind])
+    answer = store.read_answer(folders[kind])
     assert len(answer.verdict[0].split()) <= 30
     assert 2 <= len(answer.verdict) <= 4
     assert answer.details["sentences"] == list(answer.verdict)
@@ -80,7 +80,7 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
     """The values that the menu of the page draws are those of sweep.csv for every measure, in single precision."""
     with open(folders[kind] / "sweep.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    answer = store.read(folders[kind])
+    answer = store.read_answer(folders[kind])
     n_checked = 0
     for label, traces in read_menu(folders[kind] / "report.html").items():
         name = label.replace(" ", "_")
@@ -101,7 +101,7 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
 
 def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     """The headline of a patch has its values, and the limit of the tilt is in sentence, table and quantities."""
-    answer = store.read(folders["patch"])
+    answer = store.read_answer(folders["patch"])
     limits = {row["measure"]: row for row in answer.details["limits"]}
     row = limits["contact_fraction"]
     assert row["low"] < row["value"] < row["high"] and row["unit"] == "rad"
@@ -139,7 +139,7 @@ def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):
     scene = folders["one key"].parent / "rig.toml"
     out = tmp_path / "out"
     run_successfully("sweep", scene, "--over", "friction.static=0.35", "-o", out)
-    assert store.read(out).verdict == (
+    assert store.read_answer(out).verdict == (
         "Only one case has a result, so that no change is known.",
         "The only case settled and meets the tolerance.",
     )

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from law_runs import LOAD, run_bench_along_path
 
-from patchfem.friction import max_yield_displacement
-from patchfem.friction.laws.iwan import slider_cells
+from patchfem.friction.laws.iwan import max_yield_displacement, slider_cells
 
 LAW = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
 FORCE, STIFFNESS, CHI, BETA = 0.31 * LOAD, 1.3e7, -0.4, 0.3

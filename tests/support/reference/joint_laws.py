@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from patchfem.scene import KNOWLEDGE, WISHES
+from patchfem.scene import KNOWLEDGE_OF_JOINT, WISHES_FOR_LAW
 from patchfem.scene.joint_laws import JOINT_LAWS
 
 from .keys import FOLDER, format_table
@@ -17,7 +17,7 @@ def text() -> str:
     """Return the page of the guide with its table of joint laws generated again."""
     before, _, rest = FILE.read_text("utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    words = f"{_format_definitions('know', KNOWLEDGE)}\n{_format_definitions('want', WISHES)}"
+    words = f"{_format_definitions('know', KNOWLEDGE_OF_JOINT)}\n{_format_definitions('want', WISHES_FOR_LAW)}"
     return f"{before}{BEGIN}{words}\n\n{format_table(HEAD, _list_rows())}\n\n{END}{after}"
 
 

@@ -6,7 +6,13 @@ from typing import Literal, get_args, get_origin
 
 from patchfem.effects import EFFECTS
 from patchfem.scene import UNIT_FACTORS, Coating, Material, Tables
-from patchfem.scene.keys.choices import NEEDS, SELECTORS, find_selectors, format_keys, parse_needs
+from patchfem.scene.keys.choices import (
+    KEY_SELECTORS,
+    NEEDED_KEYS,
+    find_selectors,
+    format_keys,
+    parse_needs,
+)
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.keys.tables import Interface
 from patchfem.scene.keys.types import Key, list_keys
@@ -21,7 +27,7 @@ TABLE_NAMES = {
 }
 CHOICES = {
     f"{TABLE_NAMES.get(one.model.__name__)}.{one.key}": one.choices
-    for one in SELECTORS
+    for one in KEY_SELECTORS
     if one.key != "kind" or one.model.__name__ == "Slide"
 }
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -134,7 +140,7 @@ def _format_condition(model: type, key: str) -> str:
             condition = f"with {selector.key} {', '.join(names)}" if selector.key else ""
             condition += f"{', ' if condition else ''}unless {others} is given" if others else ""
             conditions.append(condition)
-    for name, needed in NEEDS.get(model, {}).items():
+    for name, needed in NEEDED_KEYS.get(model, {}).items():
         if needed == key:
             conditions.append(f"with `{name}`")
     return "; ".join(dict.fromkeys(conditions))

@@ -3,7 +3,7 @@
 from importlib import import_module
 
 from patchfem.effects import LAWS, REMEDIES, join_words, name_laws_with_key
-from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
+from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_REPORTED_NORMAL_COUPLING_RATIO
 from patchfem.scene import loads
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
@@ -33,19 +33,21 @@ names the line, the key and an alternative; `patchfem check SCENE` prints it. Th
 neglect.
 """
 SIZES = {  # Constant -> description of the quantity that it bounds.
-    "scene.toml_text.MAX_BYTES": "bytes of a scene file",
-    "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
-    "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
+    "scene.toml_text.MAX_SCENE_FILE_BYTES": "bytes of a scene file",
+    "scene.rules.contact.MAX_INTERFACE_ELEMENTS": "number of elements along an interface that has element_size",
+    "effects.MAX_RIG_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_SWEEP_CASES": "number of cases of a sweep",
-    "inputs.tables.MAX_BYTES": "bytes of a text file with a table",
-    "inputs.records.MAX_BYTES": "bytes of a laboratory file or a .mat file",
+    "inputs.tables.MAX_TABLE_BYTES": "bytes of a text file with a table",
+    "inputs.records.MAX_RECORD_FILE_BYTES": "bytes of a laboratory file or a .mat file",
     "inputs.packed.MAX_UNPACKED_BYTES": "bytes of the content of a .npz, .mat or zip file after decompression",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
-    "surface.files.content.MAX_BYTES": "bytes of the file of a scan, also after decompression",
-    "surface.files.table.MAX_LENGTH": "length of a trace [m]",
+    "surface.files.content.MAX_SURFACE_FILE_BYTES": "bytes of the file of a scan, also after decompression",
+    "surface.files.table.MAX_COORDINATE": "length of a trace [m]",
     "model.slide.MAX_BENCH_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
-    "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
+    "runs.rig.costs.MAX_MARCH_STEPS_PER_CYCLE": (
+        "steps per cycle of a time integration, if the tolerance determines the steps"
+    ),
     "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
@@ -67,7 +69,7 @@ The line of action of the load is assumed not to shift along x when a tall piece
 **No friction in the static patch.** The pressure is computed without shear stress at the interface. If both pieces have
 the same elastic constants, shear stress does not change the pressure. For pieces of different materials, the effect of
 shear stress on the pressure is neglected in runs with motion; a note appears if this coupling exceeds
-{100 * MIN_COUPLING_RATIO:g} % of the compliance.
+{100 * MIN_REPORTED_NORMAL_COUPLING_RATIO:g} % of the compliance.
 
 **Quasi-static pieces.** The pieces have no mass, so waves in the pieces are neglected. Only the modes of the rig have
 inertia.
@@ -149,7 +151,7 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "sum over all bonds": "law nonlocal with reading 'report', or with an `order` other than 1",
     "sum over all stretched bonds": "law nonlocal with reading 'stretch' and an `order` other than 1",
     "sum by recursion": "law nonlocal with reading 'stretch' and order 1",
-    "named method of the sum": "law nonlocal with `accuracy.quadrature` one of " + ", ".join(support.SUMS),
+    "named method of the sum": "law nonlocal with `accuracy.quadrature` one of " + ", ".join(support.SINGLE_BOND_SUMS),
     "patch that slips as a whole": "no partial slip",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
@@ -244,9 +246,9 @@ def _format_compatibility(columns: tuple) -> str:
 def _format_combinations() -> str:
     """Return the table of the features that no run supports together."""
     rows = []
-    for names, instead in support.SUPPORT:
+    for names, instead in support.UNSUPPORTED_COMBINATIONS:
         features = [
-            name if name in support.FEATURES else f"`{name.replace('=', ' = ')}`"
+            name if name in support.JOINT_FEATURES else f"`{name.replace('=', ' = ')}`"
             for name in names.split(", ")
         ]
         advice = REMEDIES.get(instead, instead)
@@ -258,8 +260,10 @@ def _format_combinations() -> str:
 
 def _format_features() -> str:
     """Return the table that defines the features of combinations that are not keys."""
-    names = {name: None for row, _ in support.SUPPORT for name in row.split(", ")}
-    rows = [(name, define_feature(name)) for name in sorted(names) if name in support.FEATURES]
+    names = {name: None for row, _ in support.UNSUPPORTED_COMBINATIONS for name in row.split(", ")}
+    rows = [
+        (name, define_feature(name)) for name in sorted(names) if name in support.JOINT_FEATURES
+    ]
     return format_table(("feature", "keys"), rows)
 
 

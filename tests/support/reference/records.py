@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 from patchfem.export import quantities
 from patchfem.export import surface_definitions as definitions
-from patchfem.response.rows import ROWS as MOTION
-from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.response.rows import MOTION_MEASURE_ROWS as MOTION
+from patchfem.runs.results.patch_rows import PATCH_MEASURE_ROWS as STATIC
 from patchfem.scene import MATERIALS
 
 from .keys import FOLDER, format_table

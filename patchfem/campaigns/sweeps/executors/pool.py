@@ -24,7 +24,7 @@ WORKER_ENVIRONMENT = {
     "NUMBA_NUM_THREADS": "1",
 }
 # Names of the errors of a worker process that ended.
-DEATHS = ("BrokenProcessPool", "KilledWorker")
+WORKER_DEATH_ERRORS = ("BrokenProcessPool", "KilledWorker")
 
 
 class FutureExecutor:
@@ -95,7 +95,7 @@ class FutureExecutor:
             raise self.make_connection_error() from None
         except Exception as error:
             kind = type(error).__name__
-            if kind in DEATHS:
+            if kind in WORKER_DEATH_ERRORS:
                 return 0.0, WorkerDeath(
                     "its worker process died (killed by a user, or for lack of memory)"
                 )

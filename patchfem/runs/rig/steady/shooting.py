@@ -50,9 +50,8 @@ STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, rela
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
-FULL_SLIP_TOL = (
-    1e-9  # relative distance from its friction limit at which an interface slips as a whole
-)
+# Relative distance from its friction limit at which an interface slips as a whole
+FULL_SLIP_TOL = 1e-9
 # Steps along a response curve over frequency
 FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 # Weakest and strongest drive between which the motions are followed that coexist under a drive, relative to it, and the
@@ -73,7 +72,7 @@ class ShootingFinder:
         self.numerics = replace(
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
-        compiled.load("hybrid.engine_kernels", say)
+        compiled.load_compiled_module("hybrid.engine_kernels", say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
