@@ -22,16 +22,15 @@ Read the package in this order. A module imports only from its own entry of the 
 18. `structure`    modes and drive of the rig
 19. `hybrid`       motion from event to event by steps of order 8
 20. `points`       steps of order 2: many contact points, and sweeps over many cases
-21. `dynamics`     engines: event-driven solution, time stepping, harmonic balance
-22. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-23. `response`     measures of a run: outcome, events, levels and free vibration
-24. `wear`         wear depth over many cycles
-25. `runs`         patch, bench and rig: static contact, friction and dynamics combined
-26. `identify`     parameters from measurements, with confidence intervals
-27. `campaigns`    studies with many runs: fits, error against cost, sweeps
-28. `export`       summary, netCDF, VTK, report
-29. `api`          Python interface: load, build, plan and run
-30. `commands`     verbs of the command line
+21. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
+22. `response`     measures of a run: outcome, events, levels and free vibration
+23. `wear`         wear depth over many cycles
+24. `runs`         patch, bench and rig: static contact, friction and motion combined
+25. `identify`     parameters from measurements, with confidence intervals
+26. `campaigns`    studies with many runs: fits, error against cost, sweeps
+27. `export`       summary, netCDF, VTK, report
+28. `api`          Python interface: load, build, plan and run
+29. `commands`     verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. All imports are lazy: a module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded on first use (`lazy_imports`).

@@ -39,7 +39,7 @@ def write_scene(tmp_path):
 
 
 PHYSICS = set(
-    "closed_forms contact dynamics elasticity friction hybrid identify inputs mesh response slip structure surface wear "
+    "closed_forms contact elasticity friction hybrid identify inputs mesh response slip structure surface wear "
     "runs.bench runs.batch runs.patch runs.rig runs.wear".split()
 )
 PIECES = "contact elasticity mesh runs.patch "  # folders needed to solve a static patch
@@ -93,7 +93,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
-        "dynamics.harmonic.equations hybrid.continuation hybrid.periodic_curves "
+        "hybrid.free_motions hybrid.continuation hybrid.periodic_curves "
         "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{

@@ -46,7 +46,7 @@ OUTSIDE = {
     "meshio": ("mesh.files", "export.*"),
 }
 # folders of the physics in their reading order
-PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "hybrid", "dynamics", "runs"]
+PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "hybrid", "runs"]
 ORDERED = ("dynamics", "hybrid", "runs", "export")  # folders with a reading order of their own
 FUNCTION_LINES = 120  # the longest functions are commands with one line per option
 # syntax nodes that can name an object

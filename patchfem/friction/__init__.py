@@ -61,7 +61,6 @@ PUBLIC = {
         "rate_equation",
         "relaxation_length",
     ),
-    "laws.stretch_kernels": ("relax_stretch",),
     "path_work": (
         "mean_slip_phase",
         "sampled_work",

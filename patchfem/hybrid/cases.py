@@ -1,6 +1,6 @@
 """Arrays of a case from modes, interfaces and a drive, and a whole case from the records of a rig or bench."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from ..core import MIN_LOAD, ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
 from .drives import Signal, make_signal
-from .laws import LAWS, is_rigid
+from .laws import LAWS, is_rigid, masing
 from .laws.springs import make_cubic, make_interlocking
 from .records import (
     N_INTEGRALS,
@@ -94,6 +94,43 @@ class Case:
     samples: np.ndarray
     n_friction: int
     first_stiffness: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class UndrivenRig:
+    """Rig without its drive.
+
+    - modes: modes of the structure without the contact
+    - interfaces: friction interfaces, then nonlinear springs
+    - n_friction: number of friction interfaces
+    """
+
+    modes: ModalBasis
+    interfaces: tuple[Interface, ...]
+    n_friction: int
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Slides (i, n) of interfaces and springs per unit of the modes."""
+        return np.array([one.slide for one in self.interfaces])
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Tangent stiffness at rest (i,) [N/m] of interfaces and springs; 0 for a law that creeps, inf for a rigid one."""
+        return np.array([one.law.stiffness for one in self.interfaces])
+
+    def with_elements(self, change) -> "UndrivenRig":
+        """Return a rig in which a function has changed the elastic-plastic elements of every interface.
+
+        `change` takes stiffness [N/m] and yield displacement [m] (t,) of the elements and returns both.
+        """
+        interfaces = []
+        for one in self.interfaces:
+            if masing.has_stick(one.law):
+                elements = change(*masing.list_elements(one.law))
+                one = one._replace(law=masing.from_elements(*elements))
+            interfaces.append(one)
+        return replace(self, interfaces=tuple(interfaces))
 
 
 class Options(NamedTuple):
@@ -251,6 +288,27 @@ def make_schedule(cycles: float, period: float, window: int) -> tuple[np.ndarray
     return ends, windows
 
 
+def list_interfaces(rig, joints) -> list[Interface]:
+    """Return the friction interfaces of the records of a rig, then its nonlinear springs.
+
+    Parameters
+    ----------
+    rig : model.rig.Rig
+        Structure and springs.
+    joints : sequence of (LawNumbers, Load)
+        Law and load of each interface.
+    """
+    rows = rig.modes.interfaces
+    interfaces = [Interface(*joint, row) for joint, row in zip(joints, rows)]
+    # Springs act before rigid friction on grooves, which needs the acceleration without it.
+    if rig.springs.cubic is not None:
+        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), rig.modes.output))
+    if rig.springs.interlock is not None:
+        spring = make_interlocking(*rig.springs.interlock)
+        interfaces.append(Interface(spring, Load(1.0), rows[0]))
+    return interfaces
+
+
 class Schedule(NamedTuple):
     """Cycles of a run.
 
@@ -289,15 +347,7 @@ def make_rig_case(
     modes = rig.modes
     drive = rig.drive.signal if signal is None else signal
     signal = make_signal(drive)
-    interfaces = [Interface(*joint, row) for joint, row in zip(joints, modes.interfaces)]
-    n_friction = len(interfaces)
-
-    # Springs act before rigid friction on grooves, which needs the acceleration without it.
-    if rig.springs.cubic is not None:
-        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), modes.output))
-    if rig.springs.interlock is not None:
-        spring = make_interlocking(*rig.springs.interlock)
-        interfaces.append(Interface(spring, Load(1.0), modes.interfaces[0]))
+    interfaces = list_interfaces(rig, joints)
 
     max_steps = MAX_STEPS + MAX_CYCLE_STEPS * schedule.cycles
     options = Options(drive.moving, schedule.travel, rtol, max_steps, n_steps)
@@ -307,7 +357,7 @@ def make_rig_case(
     ends = make_schedule(schedule.cycles, signal.period, schedule.window)
     return Case(
         arrays, make_start(arrays, interfaces, rig.start), *ends, np.asarray(schedule.samples, float),
-        n_friction, rig.first_mode.stiffness,
+        len(joints), rig.first_mode.stiffness,
     )  # fmt: skip
 
 

@@ -449,6 +449,18 @@ class _Map(NamedTuple):
     slopes: np.ndarray
     scale: np.ndarray
 
+    def update(self, step, change) -> "_Map":
+        """Return the map that gives a step of the unknowns the change of the residual that was found (Broyden 1965).
+
+        Parameters
+        ----------
+        step, change : (n,) array
+            Step in the packed state, and change of the difference between end and start of the period.
+        """
+        step = step[self.columns] / self.scale
+        missing = change[self.columns] / self.scale + step - self.slopes @ step
+        return self._replace(slopes=self.slopes + np.outer(missing, step) / (step @ step))
+
 
 def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
     """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).

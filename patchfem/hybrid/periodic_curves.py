@@ -50,7 +50,7 @@ class CurveStart(NamedTuple):
     parameter: float
 
 
-class _LoopShooting(Shooting):
+class LoopShooting(Shooting):
     """Map of a period after which the laws remember the loop of this period alone.
 
     Larger motions of the past would otherwise shift the loop for ever, and the map would have a kink at each periodic
@@ -185,14 +185,14 @@ class PeriodEquations:
         """Equations for the continuation."""
         return Curve(self.find_residual, self.differentiate, self.restart)
 
-    def _make_shooting(self, parameter: float) -> _LoopShooting:
+    def _make_shooting(self, parameter: float) -> LoopShooting:
         """Return the map of a period at a value of the parameter."""
-        shooting = _LoopShooting(self.make_case(float(parameter)))
+        shooting = LoopShooting(self.make_case(float(parameter)))
         shooting.limit_steps(MAX_STEPS)
         shooting.n_steps = self.n_steps
         return shooting
 
-    def _advance(self, x, parameter: float) -> tuple[_LoopShooting, State]:
+    def _advance(self, x, parameter: float) -> tuple[LoopShooting, State]:
         """Return the map with the state after a period, and the state before it, with the memory that belongs to it.
 
         `x` (N,) are the unknowns, divided by their scale, and `parameter` is that of the drive.
@@ -273,7 +273,7 @@ class PeriodEquations:
         memory = (self.before, self.reversals)
         return PathEquations(jacobian, slope, motion, motion.change, memory)
 
-    def _describe(self, shooting: _LoopShooting, before: State, change) -> PeriodicMotion:
+    def _describe(self, shooting: LoopShooting, before: State, change) -> PeriodicMotion:
         """Return the motion of a point, with its multipliers.
 
         Parameters

@@ -10,10 +10,10 @@ from drawing import BLUE, GREY, ORANGE, drawing
 
 
 def backbone(rows: list, path: Path) -> Path:
-    """Plot frequency and damping against amplitude; lines are nine harmonics, markers are the bench."""
+    """Plot frequency and damping against amplitude; lines are free motions, markers are the bench."""
     with drawing(path, (8.5, 3.4), 1, 2) as (_, axes):
         for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
-            for axis, line, mark in zip(axes, r.many, r.bench):
+            for axis, line, mark in zip(axes, r.free, r.bench):
                 axis.loglog(1e6 * r.amplitude, line, "-", color=colour, label=r.case)
                 axis.loglog(1e6 * r.amplitude, mark, "o", color=colour, ms=3.5)
         for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
@@ -24,7 +24,7 @@ def backbone(rows: list, path: Path) -> Path:
         )
         axes[0].legend(
             fontsize=9,
-            title="lines: free balance, marks: bench",
+            title="lines: free motion, marks: bench",
             title_fontsize=9,
             loc="upper right",
         )

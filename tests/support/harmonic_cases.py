@@ -1,32 +1,8 @@
-"""Structures for tests of harmonic balance."""
+"""Structures for tests of periodic motions."""
 
 import numpy as np
 from modal_bases import make_modal_basis
 from scipy.linalg import expm
-
-from patchfem.dynamics.harmonic.laws import FlowLaw
-from patchfem.friction import Bonds, LuGre
-from patchfem.friction.laws.tanh import TanhLaw
-
-
-def make_speed_law(limit, speed):
-    """Return the law limit tanh(v/speed)."""
-    return FlowLaw(TanhLaw(limit, speed).element(1.0))
-
-
-def make_bond_law(limit, length):
-    """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
-    return FlowLaw(Bonds(limit, length).element(1.0))
-
-
-def make_lugre_law():
-    """Return a LuGre law with Stribeck effect and damping, whose memory depends on time."""
-    return FlowLaw(LuGre(0.8, 0.6, 8.0, 0.5, 0.02, 0.01).element(1.0))
-
-
-def make_sdof(xi=0.003):
-    """Return a modal basis with a single mode."""
-    return make_modal_basis(1.0, xi)
 
 
 def make_five_modes(damping=None):

@@ -8,10 +8,10 @@ interface rows B, friction and joint forces f of the history of the relative dis
 ============== ============================= ======================== ========================= ==========
 module         equation                      what it neglects         where it holds            CPU s
 ============== ============================= ======================== ========================= ==========
-`balance`      period 2 pi/omega with a      change of the amplitude  laws whose steady loops   0.06..0.17
-               negative damping -g q' that   within a cycle           have a closed form; rigid
-               keeps the motion up; the                               friction, for motion that
-               damping ratio is g/(2 omega)                           never sticks
+`balance`      period 2 pi/omega with a      change of the amplitude  laws with steady loops;   0.02..0.1
+               negative damping -g q' that   within a cycle           rigid friction, for
+               keeps the motion up; the                               motion that never sticks
+               damping ratio is g/(2 omega)
 `quasi_static` Omega^2 q + B^T f[B q] = P s, the bending of the force laws of finite stiffness; 0.0001..
                s the shape of the sticking   by friction, harmonics   closest in micro-slip     0.003
                mode; secant and loop area

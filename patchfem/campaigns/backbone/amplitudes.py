@@ -1,12 +1,10 @@
 """Amplitudes of a backbone: a default range, those of given forces, and more points where the damping changes fast."""
 
-from functools import partial
-
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...formatting import format_length, format_quantity
-from . import balance
+from .balance import compute_balance_curve
 from .joint import MIN_AMPLITUDE_OVER_GROSS_SLIP, JointMode
 from .quasi_static import compute_static_curve
 from .records import Curve
@@ -91,15 +89,10 @@ def _max_amplitude(joint: JointMode) -> float:
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
     """Return the curve of a joint by the first method that has one, without errors, or None without one.
 
-    `amplitudes` (k,) [m] are those at the output. The methods are harmonic balance with few harmonics, then
-    quasi-static loops.
+    `amplitudes` (k,) [m] are those at the output. The methods are periodic motions, then quasi-static loops.
     """
     joint = joint._replace(has_errors=False)
-    few_harmonics = balance.HARMONIC_COUNTS[:1]
-    for compute in (
-        partial(balance.compute_balance_curve, counts=few_harmonics),
-        compute_static_curve,
-    ):
+    for compute in (compute_balance_curve, compute_static_curve):
         try:
             return compute(joint, amplitudes)
         except (NotConverged, PatchfemError):

@@ -1,23 +1,20 @@
 """Backbone of a mode from periodic motions that a negative damping or a force at the output sustains.
 
-The motion is found by harmonic balance; under rigid friction it is exact from reversal to reversal, and without
-friction it is an eigenvector. A negative damping of all coordinates gives frequency and damping ratio (extended
-periodic motion: Krack, Comput. Struct. 154, 59, 2015). A force at the output in phase with the velocity there gives
-the force of a test in phase resonance.
+The motion is found by shooting (`hybrid.free_motions`), and without friction it is an eigenvector. A negative damping of
+all coordinates gives frequency and damping ratio (extended periodic motion: Krack, Comput. Struct. 154, 59, 2015). A
+force at the output in phase with the velocity there gives the force of a test in phase resonance.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...dynamics import limit_cycles
-from ...dynamics.harmonic.backbone import FreeSolution, find_free_motions, make_free_balance
-from ...dynamics.harmonic.forces import LawGroup
-from ...response.errors import convergence_error
-from .joint import MIN_AMPLITUDE_OVER_GROSS_SLIP, JointMode
+from ...hybrid.cases import UndrivenRig
+from ...hybrid.free_motions import ROUGH, FreeMotion, FreeMotions, estimate_errors
+from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 
-# Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
-HARMONIC_COUNTS = (9, 19, 39)
 # Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
 # the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1 or changes without end.
 N_DAMPING_ITERATIONS = 200
@@ -28,13 +25,16 @@ MIN_MODE_ENERGY_FRACTION = 0.5
 MAX_OUTPUT_MOTION_DEVIATION = 0.6
 # Reason why a mode has no curve
 NO_FREE_MOTION = "no free motion of these amplitudes was found"
+# Reason why a mode under rigid friction has no curve
+NO_SLIDING = (
+    "at these amplitudes rigid friction stops the motion in each cycle, and only a motion that always slides can be "
+    "computed; give larger amplitudes"
+)
 # Reason why an overdamped mode has no curve
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
 
-def compute_balance_curve(
-    joint: JointMode, amplitudes, counts: tuple[int, ...] = HARMONIC_COUNTS
-) -> Curve:
+def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
     """Compute the backbone of a mode from periodic motions at amplitudes (k,) [m] of the output.
 
     Raises NotConverged or PatchfemError if there is no curve.
@@ -45,171 +45,124 @@ def compute_balance_curve(
         Mode and joint of the backbone.
     amplitudes : (k,) array
         At the output [m], increasing.
-    counts : tuple of int
-        Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
 
     Returns
     -------
     Curve
-        Frequency, damping ratio, loss and force with their errors, at the amplitudes at which the mode oscillates.
+        Frequency, damping ratio, loss and force with their errors, at the amplitudes at which the mode oscillates. Under
+        rigid friction it begins at the amplitude above which the contact never rests.
     """
     if joint.is_linear:
         return compute_constant_curve(joint, amplitudes)
     joint.require_steady_loops("balance")
-    if joint.is_rigid:
-        return _compute_rigid_curve(joint, amplitudes)
+    rig = joint.steady_laws()
+    if joint.is_rigid and not joint.modes.omega.all():
+        raise PatchfemError(
+            "with rigid friction the free motion cannot be computed if the rig has a mode of 0 Hz"
+        )
 
-    # more harmonics until frequency and damping change by less than the tolerance
-    laws = joint.steady_laws()
-    tolerance = joint.model.accuracy.tolerance
-    harmonics = counts[0]
-    values, motions = tabulate_free_motions(laws, joint, amplitudes, harmonics)
-    error = np.zeros_like(values)
-    for harmonics in counts[1:]:
-        # Beyond the last motion that few harmonics find, more harmonics find none.
-        count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
-        if not count:
-            raise NotConverged(NO_FREE_MOTION)
-        amplitudes = amplitudes[:count]
-        better, motions = tabulate_free_motions(laws, joint, amplitudes, harmonics)
-        error = convergence_error(better - values[:, :count]) + ROUND_OFF_ERROR * np.abs(better)
-        values = better
-        known = np.isfinite(error[0])
-        if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():
-            break
-
-    error += joint.spatial_discretization_errors(
-        lambda mode, group: tabulate_free_motions(group, mode, amplitudes, counts[0])[0]
+    motions = FreeMotions(rig, joint.mode).find(amplitudes)
+    sustained, errors = tabulate_motions(motions, has_errors=joint.has_errors)
+    values = sustained[:3]
+    error = errors[:3] + joint.spatial_discretization_errors(
+        lambda mode, laws: tabulate_free_motions(laws, mode, amplitudes)
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():
-        raise NotConverged(NO_FREE_MOTION)
+        raise NotConverged(NO_SLIDING if joint.is_rigid else NO_FREE_MOTION)
     oscillates = known & (values[1] < 1)
     if not oscillates.any():
         raise NotConverged(NO_OSCILLATION)
 
-    # The force is proportional to the damping ratio and to the square of the frequency.
-    forces = np.full((2, amplitudes.size), np.nan)
+    # The error of the mesh changes the force as it changes the damping and the square of the frequency.
+    forces = force_errors = np.full((2, len(amplitudes)), np.nan)
     if joint.has_force:
-        forces = find_forces(laws, joint, amplitudes, harmonics, motions)
-    relative_error = error[1] / np.maximum(np.abs(values[1]), 1e-300) + 2 * error[0] / values[0]
-    error = np.vstack([error, np.abs(forces[0]) * (relative_error + ROUND_OFF_ERROR)])
+        forces, force_errors = find_forces(rig, joint, amplitudes, motions)
+    spatial = error - errors[:3]
+    relative = spatial[1] / np.maximum(np.abs(values[1]), 1e-300) + 2 * spatial[0] / values[0]
+    error = np.vstack([error, np.abs(forces[0]) * relative + force_errors[0]])
     return make_curve(amplitudes, np.vstack([values, forces]), error).at(oscillates)
 
 
-def tabulate_free_motions(
-    group: LawGroup, joint: JointMode, amplitudes, harmonics: int
-) -> tuple[np.ndarray, list]:
-    """Find the motions that a negative damping sustains.
+def tabulate_motions(
+    motions: list[FreeMotion | None], *, has_errors: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tabulate free motions.
 
     Parameters
     ----------
-    group : LawGroup
-        Laws of the interfaces on one mesh.
-    joint : JointMode
-        Mode and joint of the backbone.
-    amplitudes : (k,) array
-        Increasing, at the output [m].
-    harmonics : int
-        Number of harmonics of the motion.
+    motions : list of (FreeMotion or None)
+        (k,) motions of a mode at increasing amplitudes.
+    has_errors : bool
+        Whether the errors of the steps are estimated from motions with larger steps.
 
     Returns
     -------
-    values : (3, k) array
-        Frequency [Hz], damping ratio and loss [J]; NaN if no motion is found.
-    motions : list of FreeSolution or None
+    values : (4, k) array
+        Frequency [Hz], damping ratio, loss [J] and force [N]; NaN without a motion in which the contact never rests.
+    errors : (4, k) array
+        Their errors; those of round-off alone without `has_errors`.
     """
-    motions = _find_motions(group, joint, amplitudes, harmonics)
-    values = np.full((3, len(amplitudes)), np.nan)
-    for column, found in enumerate(motions):
-        if found is not None:
-            motion = found.motion
-            values[:, column] = motion.omega / (2 * np.pi), motion.zeta, motion.loss
-    return values, motions
+    values = np.full((4, len(motions)), np.nan)
+    rough = values.copy()
+    changes = np.zeros(len(motions))
+    for k, motion in enumerate(motions):
+        if motion is None or motion.sticks:
+            continue
+        values[:, k] = _list_values(motion)
+        changes[k] = motion.change
+        if has_errors:
+            other = replace(motion.shooting.motions, accuracy=ROUGH).solve(motion.amplitude, motion)
+            if other is not None:
+                rough[:, k] = _list_values(other)
+    if not has_errors:
+        return values, ROUND_OFF_ERROR * np.abs(values)
+    return values, estimate_errors(values, rough, changes)
 
 
-def _find_motions(
-    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, excitation=None, starts=None
-) -> list[FreeSolution | None]:
-    """Find the free motions of a mode at given amplitudes of the output.
+def _list_values(motion: FreeMotion) -> np.ndarray:
+    """Return frequency [Hz], damping ratio, loss [J] and force [N] of a free motion (4,)."""
+    return np.array([motion.omega / (2 * np.pi), motion.zeta, motion.loss, motion.force])
 
-    Parameters
-    ----------
-    group : LawGroup
-        Laws of the interfaces.
-    joint : JointMode
-        The mode and its contact.
-    amplitudes : (k,) array
-        Increasing amplitudes of the output [m].
-    harmonics : int
-        Number of harmonics.
-    excitation : (n, n) array, optional
-        Matrix E of `make_free_balance`.
-    starts : list of (FreeSolution or None), optional
-        Similar motions at the same amplitudes, from which the search starts.
 
-    Returns
-    -------
-    list of (FreeSolution or None)
-        None at an amplitude without a motion.
+def tabulate_free_motions(rig: UndrivenRig, joint: JointMode, amplitudes) -> np.ndarray:
+    """Return frequency [Hz], damping ratio and loss [J] (3, k) of a mode at amplitudes (k,) [m] of the output.
+
+    `rig` has the laws of the interfaces on one mesh, and `joint` is the mode. Without a motion they are NaN.
     """
-    equations = make_free_balance(
-        joint.modes,
-        group,
-        joint.mode,
-        amplitudes[-1],
-        harmonics,
-        excitation,
-        joint.modes.output,
-        (harmonics // HARMONIC_COUNTS[0]) ** 2,
-    )
-    small = MIN_AMPLITUDE_OVER_GROSS_SLIP * joint.slip_amplitude
-    return find_free_motions(equations, amplitudes, small, starts)
+    motions = FreeMotions(rig, joint.mode).find(amplitudes)
+    return tabulate_motions(motions, has_errors=False)[0][:3]
 
 
 def find_forces(
-    group: LawGroup,
-    joint: JointMode,
-    amplitudes,
-    harmonics: int,
-    motions: list[FreeSolution | None],
-) -> np.ndarray:
+    rig: UndrivenRig, joint: JointMode, amplitudes, motions: list[FreeMotion | None]
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the forces at the output that hold the phase resonance.
 
     Parameters
     ----------
-    group : LawGroup
+    rig : UndrivenRig
         Laws of the interfaces.
     joint : JointMode
         The mode and its contact.
     amplitudes : (k,) array
         Amplitudes of the output [m].
-    harmonics : int
-        Number of harmonics.
-    motions : list of (FreeSolution or None)
-        Free motions at these amplitudes, from `tabulate_free_motions`.
+    motions : list of (FreeMotion or None)
+        Free motions at these amplitudes.
 
     Returns
     -------
-    (2, k) array
-        Force [N] and its frequency [Hz]; NaN if no force holds the motion in the shape of the mode.
+    values, errors : (2, k) array
+        Force [N] and its frequency [Hz], and their errors; NaN if no force holds the motion in the shape of the mode.
     """
-    modes = joint.modes
-    reach = joint.reach
-    excitation = np.outer(modes.output, modes.output) / reach**2
-    forced_motions = _find_motions(group, joint, amplitudes, harmonics, excitation, motions)
-    out = np.full((2, len(amplitudes)), np.nan)
-    for column, (free, forced) in enumerate(zip(motions, forced_motions)):
-        if free is None or forced is None:
-            continue
-        motion = forced.motion
-        if not _holds_mode(free.motion.modal[1], motion.modal[1], modes.output):
-            continue
-        # the excitation 2 zeta omega m E z' with E = output output^T/reach^2, as a force at the output
-        output = abs(motion.modal[1] @ modes.output)
-        force = 2 * motion.zeta * motion.omega**2 * modes.mass * output / reach**2
-        out[:, column] = force, motion.omega / (2 * np.pi)
-    return out
+    forced = FreeMotions(rig, joint.mode, is_forced=True).find(amplitudes, motions)
+    for k, (free, motion) in enumerate(zip(motions, forced)):
+        if free is None or motion is None:
+            forced[k] = None
+        elif not _holds_mode(free.find_shape(), motion.find_shape(), joint.modes.output):
+            forced[k] = None
+    values, errors = tabulate_motions(forced, has_errors=joint.has_errors)
+    return values[[3, 0]], errors[[3, 0]]
 
 
 def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> bool:
@@ -228,78 +181,6 @@ def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> boo
     whole = output @ forced
     max_deviation = MAX_OUTPUT_MOTION_DEVIATION * abs(whole)
     return energy >= MIN_MODE_ENERGY_FRACTION and abs(output @ part - whole) <= max_deviation
-
-
-def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
-    """Compute the backbone of a mode under rigid friction (set-valued, without stick stiffness).
-
-    It begins at the amplitude above which the motion does not stop within a cycle.
-
-    Parameters
-    ----------
-    joint : JointMode
-        Mode with a contact of one interface.
-    amplitudes : (k,) array
-        Amplitudes at the output [m].
-
-    Returns
-    -------
-    Curve
-        Only the amplitudes above which the motion does not stop within a cycle.
-    """
-    model = joint.model
-    modes = joint.modes
-    if model.rig.springs.is_nonlinear or not modes.omega.all():
-        raise PatchfemError(
-            "with rigid friction the free motion cannot be computed if the rig has a nonlinear "
-            "spring or a mode of 0 Hz"
-        )
-
-    static = joint.friction_limit
-    friction = model.friction
-    kinetic = static
-    if friction.kinetic is not None:
-        kinetic = static * friction.kinetic / friction.static
-    row = modes.interfaces[0]
-    motions = limit_cycles.trace_relay_backbone(
-        modes, row, (kinetic, static), amplitudes, joint.mode
-    )
-
-    # Friction stops the motion in each cycle at the amplitudes that are left out.
-    known = np.array([motion is not None for motion in motions])
-    if not known.any():
-        raise NotConverged(
-            "at these amplitudes rigid friction stops the motion in each cycle, and only a motion "
-            "that always slides can be computed; give larger amplitudes"
-        )
-
-    amplitude = np.asarray(amplitudes)[known]
-    cycles, ratios = zip(*filter(None, motions))
-    omega = np.array([cycle.omega for cycle in cycles])
-    frequency = omega / (2 * np.pi)
-    damping = np.array(ratios)
-    relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
-    # The damping of the structure does not depend on the amplitude, so that only the frictional
-    # damping has an error.
-    structure_rate = modes.damping_matrix[joint.mode, joint.mode]
-    friction_damping = damping - structure_rate / (4 * np.pi * frequency)
-    damping_error = relative_error * np.abs(friction_damping) + ROUND_OFF_ERROR * np.abs(damping)
-
-    # The force of one mode follows from the first harmonic; half the range has the third one as well, which is
-    # 4 F/(3 pi) of the square wave of friction over the dynamic stiffness 8 m omega^2.
-    loss = force = third = np.full(amplitude.size, np.nan)
-    if modes.omega.size == 1:
-        slide = amplitude * abs(row[joint.mode] / modes.output[joint.mode])
-        loss = 4 * kinetic * slide
-        third = kinetic * row[0] ** 2 / (6 * np.pi * modes.mass * omega**2 * slide)
-        force = 2 * damping * omega**2 * modes.mass * amplitude / modes.output[0] ** 2
-    errors = (
-        (relative_error + ROUND_OFF_ERROR) * frequency,
-        damping_error,
-        np.zeros(amplitude.size),
-        (third + relative_error) * np.abs(force),
-    )
-    return make_curve(amplitude, (frequency, damping, loss, force), errors)
 
 
 def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:

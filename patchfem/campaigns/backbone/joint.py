@@ -2,17 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core import PatchfemError
-from ...dynamics.harmonic.forces import LawGroup
 from ...effects import law_has_trait
-from ...friction.cells import CELL_MERGES, join_cells
+from ...hybrid.cases import UndrivenRig
 from ...model.model import Model
-from ...response.errors import convergence_error
 from ...runs.joint import FreeRig, solve_without_joint
 from ...runs.patch.press import Patch
 from ...runs.plan import plan
@@ -62,7 +59,7 @@ class JointMode(NamedTuple):
     stiffness : (i,) array
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
-        Whether the errors of the mesh and of the cells of a law are computed.
+        Whether the errors of the steps and of the mesh are computed.
     has_force : bool
         Whether the force of phase resonance is computed.
     stiffer : FreeRig or None
@@ -151,7 +148,7 @@ class JointMode(NamedTuple):
 
     @property
     def has_cells(self) -> bool:
-        """Whether a law has a density of sliders, which is cut into cells."""
+        """Whether a law has a density of sliders, which begin to slip one after the other."""
         interfaces = self.model.rig.friction.interfaces
         return any(law_has_trait(interface.numbers.law, "cells") for interface in interfaces)
 
@@ -199,10 +196,10 @@ class JointMode(NamedTuple):
         """Return the amplitudes (k,) [m] of the slide of the first interface, in the stuck mode, for those at the output."""
         return np.abs(self.modes.interfaces[0] @ self.shape) * np.asarray(amplitudes) / self.reach
 
-    def steady_laws(self) -> LawGroup:
-        """Return the steady friction loops of all interface laws.
+    def steady_laws(self) -> UndrivenRig:
+        """Return the rig without its drive, with the laws of all interfaces.
 
-        Raises PatchfemError if a law has no steady loop in closed form.
+        Raises PatchfemError if a law has no steady loop.
         """
         try:
             return decays.make_laws_on_mesh(self.model, self.patch)
@@ -231,42 +228,27 @@ class JointMode(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def spatial_discretization_errors(
-        self, compute: Callable[["JointMode", LawGroup], np.ndarray]
+        self, compute: Callable[["JointMode", UndrivenRig], np.ndarray]
     ) -> np.ndarray | float:
-        """Return the error estimates of a quantity for the mesh and the discrete sliders of a law.
+        """Return the error estimates of a quantity for the mesh of patches in partial slip.
 
         Parameters
         ----------
         compute : callable
-            Function of a JointMode and a LawGroup that returns the quantity as an array.
+            Function of a JointMode and an UndrivenRig that returns the quantity as an array.
 
         Returns
         -------
         ndarray or float
-            Error of each value, with the shape of the quantity; 0.0 if no errors are estimated, or if the contact has
-            neither partial slip nor discrete sliders.
+            Error of each value, with the shape of the quantity; 0.0 if no errors are estimated, or without partial slip.
         """
-        model = self.model
-        error = 0.0
-        if not self.has_errors or not (self.has_cells or self.has_partial_slip):
-            return error
-
-        # Change of the quantity on a coarser mesh, and with neighbouring cells of sliders joined
-        group = self.steady_laws()
-        if self.has_partial_slip:
-            error = error + decays.estimate_mesh_error(
-                group,
-                decays.make_laws_on_coarse_meshes(model, self.coarse, self.stiffer),
-                lambda laws: compute(self.with_modes(laws.modes, laws.stiffness()), laws),
-            )
-        if self.has_cells:
-            best = compute(self, group)
-            changes = []
-            for cells in CELL_MERGES:
-                merged = group.with_elements(partial(join_cells, *cells))
-                changes.append(np.abs(compute(self, merged) - best))
-            error = error + convergence_error(np.max(changes, axis=0), ratio=4.0, order=2.0)
-        return error
+        if not self.has_errors or not self.has_partial_slip:
+            return 0.0
+        return decays.estimate_mesh_error(
+            self.steady_laws(),
+            decays.make_laws_on_coarse_meshes(self.model, self.coarse, self.stiffer),
+            lambda laws: compute(self.with_modes(laws.modes, laws.stiffness), laws),
+        )
 
     def with_modes(self, modes, stiffness: np.ndarray) -> "JointMode":
         """Return the mode in another modal basis, with interfaces of stiffness (i,) [N/m] in stick."""
@@ -410,7 +392,9 @@ def _stuck_stiffness(joint: JointMode) -> np.ndarray:
     if not np.isfinite(planned).all() or not planned.all():
         return planned
     try:
-        return joint.steady_laws().stiffness()[: planned.size]
+        laws = joint.steady_laws()
+        is_equal = (laws.rows == joint.modes.interfaces[:, None]).all(axis=2)
+        return is_equal @ laws.stiffness
     except PatchfemError:
         if planned.size > 1:
             return planned

@@ -3,8 +3,9 @@
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...dynamics.harmonic import quasi_static
+from ...friction.protocol import SteadyLoop
 from ...friction.record import steady_loop
+from ...hybrid import quasi_static
 from ...response.errors import add_errors
 from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
@@ -13,8 +14,9 @@ from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import JointMode
 from .records import EQUAL_AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
-# Number of samples of a friction loop per cycle; half as many give the error.
-N_LOOP_SAMPLES = 4096
+ROUGH_RTOL = (
+    1e-8  # step tolerance of the friction loops whose differences from the fine ones are the errors
+)
 # Largest number of corrections of the displacement until the amplitude is the requested one.
 MAX_AMPLITUDE_CORRECTIONS = 60
 # Relative error that is added to the estimated errors of a computed friction loop.
@@ -36,7 +38,7 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
             "mode of the sticking contact"
         )
 
-    # A closed form comes first, then the laws of harmonic balance, then a bench, which is the slowest.
+    # A closed form comes first, then the laws of a free motion, then a march on a bench, which is the slowest.
     curve = _compute_in_closed_form(joint, amplitudes)
     if curve is not None:
         return curve
@@ -47,19 +49,15 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
             raise
         return _compute_from_bench_loops(joint, amplitudes)
 
-    def tabulate(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup.
-
-        `samples` is the number of samples of a loop.
-        """
-        return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)
-
-    # The sampling error is the change from half the samples.
-    best = tabulate(laws, N_LOOP_SAMPLES)
+    # The error of the steps is the change with larger ones.
+    best = decays.compute_static_curve(laws, joint.mode, amplitudes)
     has_amplitude = np.abs(best[0] / amplitudes - 1) < EQUAL_AMPLITUDE_TOL
     best[0] = np.where(has_amplitude, amplitudes, best[0])
-    error = np.abs(best - tabulate(laws, N_LOOP_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
-    error += joint.spatial_discretization_errors(lambda _, group: tabulate(group, N_LOOP_SAMPLES))
+    rough = decays.compute_static_curve(laws, joint.mode, amplitudes, ROUGH_RTOL)
+    error = np.abs(best - rough) + ROUND_OFF_ERROR * np.abs(best)
+    error += joint.spatial_discretization_errors(
+        lambda _, group: decays.compute_static_curve(group, joint.mode, amplitudes)
+    )
     return _select_rising_part(best, error)
 
 
@@ -106,9 +104,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
-        best = _compute_from_loops(
-            joint, slides, [quasi_static.StaticLoops(*loop) for loop in loops]
-        )
+        best = _compute_from_loops(joint, slides, loops)
         has_amplitude = np.abs(best[0] / amplitudes - 1) < EQUAL_AMPLITUDE_TOL
         if has_amplitude.all():
             break
@@ -122,9 +118,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     return _select_rising_part(best, relative * np.abs(best))
 
 
-def _compute_from_loops(
-    joint: JointMode, slides, loops: list[quasi_static.StaticLoops]
-) -> np.ndarray:
+def _compute_from_loops(joint: JointMode, slides, loops: list[SteadyLoop]) -> np.ndarray:
     """Compute amplitude, frequency, damping, loss and force (5, k) from hysteresis loops.
 
     The loops have displacement amplitudes `slides` (k,) [m], and `joint` is the mode.
@@ -148,7 +142,7 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     frequency = joint.stuck_mode.omega / (2 * np.pi)
 
     loops = []
-    loops_with_tip_error = []
+    loops_with_force_error = []
     loops_with_area_error = []
     for slide in slides:
         steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
@@ -159,15 +153,15 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
         stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, steady.change)
-        loop = quasi_static.StaticLoops(stiffness * slide, area)
+        loop = SteadyLoop(stiffness * slide, area)
         loops.append(loop)
-        loops_with_tip_error.append(loop._replace(tip=loop.tip + stiffness_error * slide))
+        loops_with_force_error.append(loop._replace(force=loop.force + stiffness_error * slide))
         loops_with_area_error.append(loop._replace(area=loop.area + area_error))
 
-    # The error is the sum of the changes by an error of the tip and one of the area.
+    # The error is the sum of the changes by an error of the force and one of the area.
     best = _compute_from_loops(joint, slides, loops)
     error = ROUND_OFF_ERROR * np.abs(best)
-    for moved in (loops_with_tip_error, loops_with_area_error):
+    for moved in (loops_with_force_error, loops_with_area_error):
         error += np.abs(_compute_from_loops(joint, slides, moved) - best)
 
     if joint.stiffer is not None:

@@ -16,7 +16,7 @@ MISSING_MESH_ERROR_NOTE = (
 )
 # Reason why a curve has no value at some amplitudes, by method
 REASONS_OF_GAPS = {
-    "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
+    "balance": "no periodic motion was found at these amplitudes; the curve may turn back to "
     "smaller amplitudes, or the mode may stop oscillating",
     "quasi-static": "the static curve does not reach these amplitudes",
 }

@@ -1,6 +1,6 @@
 """Fit of a rig to measured frequency and damping as functions of amplitude.
 
-The curve of the model comes from periodic motions at the measured amplitudes, by harmonic balance. The
+The curve of the model comes from periodic motions at the measured amplitudes. The
 quasi-static curve, which is a hundred times faster, gives the start of this search. If one of the two methods has no
 result at its starting points, the other is used.
 """

@@ -86,4 +86,6 @@ def from_law(law, load):
         Mean load [N].
     """
     numbers = law.static, law.length, law.exponent, law.shape
-    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,))
+    return LawNumbers(
+        "bouc_wen", numbers, (0.0,), (1e-2,), stiffness=law.static * load / law.length
+    )

@@ -92,4 +92,5 @@ def from_law(law, load):
         Mean load [N].
     """
     numbers = (law.static, law.kinetic, law.stiffness, law.speed, law.micro_damping, law.viscous)
-    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * law.static / law.stiffness,))
+    scale = 1e-2 * law.static / law.stiffness
+    return LawNumbers("lugre", numbers, (0.0,), (scale,), stiffness=law.stiffness * load)

@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...friction.laws.elastic_plastic import masing_loop
+from ...friction.protocol import SteadyLoop
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
@@ -352,7 +354,35 @@ def from_elements(stiffness, yield_displacement):
     edges = np.append(0.0, np.unique(x))
     forces = np.minimum.outer(edges, x) @ k
     numbers = (0.0, TURNS_FREELY, forces[-1], edges[-1], edges.size - 1, *edges, *forces)
-    return LawNumbers("masing", numbers, length=forces[-1] / k.sum() if k.any() else edges[-1])
+    length = forces[-1] / k.sum() if k.any() else edges[-1]
+    return LawNumbers("masing", numbers, length=length, stiffness=k.sum())
+
+
+def list_elements(law: LawNumbers) -> tuple[np.ndarray, np.ndarray]:
+    """Return stiffness [N/m] and increasing yield displacement [m] (t,) of the elements of a law of `from_elements`."""
+    pieces = int(law.numbers[4])
+    points = np.array(law.numbers[POINTS : POINTS + pieces + 1])
+    forces = np.array(law.numbers[POINTS + pieces + 1 :])
+    slopes = np.append(np.diff(forces) / np.diff(points), 0.0)
+    return -np.diff(slopes), points[1:]
+
+
+def find_loop(law: LawNumbers, amplitude: float) -> SteadyLoop:
+    """Return the loop between two opposite slides of an amplitude > 0 [m].
+
+    By Masing's rules the area is 8 times the work of first loading less 4 times force times slide.
+    """
+    p = np.array(law.numbers)
+    if p[1] < 0:
+        return masing_loop(*list_elements(law), amplitude)
+
+    # Work of the power law up to phi_max, and of the constant force beyond it
+    ratio = min(amplitude / p[3], 1.0)
+    scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2))
+    part = ratio ** (p[0] + 1) / ((p[0] + 2) * (p[0] + 3))
+    force = float(load_first(p, amplitude))
+    work = scale * p[3] * ratio**2 * ((p[1] + 1) / 2 - part) + p[2] * max(amplitude - p[3], 0.0)
+    return SteadyLoop(force, 8 * work - 4 * force * amplitude)
 
 
 def with_all_reversals(law: LawNumbers) -> LawNumbers:
@@ -390,5 +420,7 @@ def from_law(law, load):
     limit = law.static * load
     if hasattr(law, "chi"):
         numbers = (law.chi, law.beta, limit, law.phi_max, 1, 0.0, law.phi_max, 0.0, limit)
-        return LawNumbers("masing", numbers, length=law.static / law.stiffness)
+        return LawNumbers(
+            "masing", numbers, length=law.static / law.stiffness, stiffness=law.stiffness * load
+        )
     return from_elements([limit / law.length], [law.length])

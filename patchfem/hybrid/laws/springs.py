@@ -87,4 +87,5 @@ def make_interlocking(stiffness, wavelength):
     -------
     LawNumbers
     """
-    return LawNumbers("springs", (0.0, stiffness, 2 * 3.141592653589793 / wavelength))
+    numbers = (0.0, stiffness, 2 * 3.141592653589793 / wavelength)
+    return LawNumbers("springs", numbers, stiffness=stiffness)

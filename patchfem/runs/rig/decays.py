@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...dynamics.harmonic import forces, quasi_static
+from ...hybrid import quasi_static
+from ...hybrid.cases import UndrivenRig
 from ...response.coarser import ComparisonRuns
 from ...response.decay_curve import (
     MIN_HALF_CYCLE_RATIO,
@@ -38,7 +39,6 @@ UNKNOWN_LOOP_REASON = (
     "the hysteresis loop of this friction law is not known without a computation in time"
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
-N_LOOP_SAMPLES = 4096  # samples of a cycle of a static loop without a closed form
 MAX_DECAY_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
 # Number of amplitudes per decade at which the mesh error is computed.
 MESH_AMPLITUDES_PER_DECADE = 16
@@ -91,8 +91,8 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
-def make_laws_on_mesh(model, patch, meshed=()) -> "forces.LawGroup":
-    """Return the friction laws of a rig, discretized on one of the meshes of its patches.
+def make_laws_on_mesh(model, patch, meshed=()) -> UndrivenRig:
+    """Return a rig without its drive, with friction laws discretized on one of the meshes of its patches.
 
     Parameters
     ----------
@@ -109,11 +109,11 @@ def make_laws_on_mesh(model, patch, meshed=()) -> "forces.LawGroup":
         If a law has no steady loop.
     """
     settings = numerics.choose_numerics(with_automatic_method(model))
-    return joints.make_law_group(model, replace(settings, meshed=meshed), patch)
+    return joints.make_undriven_rig(model, replace(settings, meshed=meshed), patch)
 
 
-def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> "list[forces.LawGroup]":
-    """Return a list of friction laws of a rig, each with one patch on its coarser mesh.
+def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list[UndrivenRig]:
+    """Return rigs without a drive, each with one patch on its coarser mesh.
 
     Parameters
     ----------
@@ -137,21 +137,21 @@ def with_automatic_method(model):
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
-def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int) -> np.ndarray:
+def compute_static_curve(
+    laws: UndrivenRig, mode_index: int, amplitudes, rtol: float | None = None
+) -> np.ndarray:
     """Compute amplitude, frequency, damping ratio and loss of a mode from quasi-static cycles.
 
     Parameters
     ----------
-    modes
-        Modal basis.
-    laws : LawGroup
-        Friction laws of the interfaces.
+    laws : UndrivenRig
+        Modes and friction laws of the interfaces.
     mode_index : int
         Index of the mode.
     amplitudes : (k,)
         Amplitudes of the output [m].
-    samples : int
-        Number of samples per cycle.
+    rtol : float, optional
+        Tolerance of a step, for loops without a closed form.
 
     Returns
     -------
@@ -160,9 +160,9 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
         the output that replaces the energy of a cycle [N].
     """
     motions = quasi_static.find_static_motions(
-        modes, laws, mode_index, amplitudes, modes.output, samples
+        laws, mode_index, amplitudes, laws.modes.output, rtol
     )
-    return tabulate_static_motions(modes, motions)
+    return tabulate_static_motions(laws.modes, motions)
 
 
 def tabulate_static_motions(modes, motions) -> np.ndarray:
@@ -188,12 +188,12 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
 
     Parameters
     ----------
-    fine : LawGroup
+    fine : UndrivenRig
         Laws on the mesh of the run.
-    coarse : list of LawGroup
+    coarse : list of UndrivenRig
         Laws with a coarser mesh of one patch each.
     compute : callable
-        Function that computes the quantities from a LawGroup, as an array.
+        Function that computes the quantities from an UndrivenRig, as an array.
     """
     best = compute(fine)
     changes = (compute(other) - best for other in coarse)
@@ -236,7 +236,7 @@ def estimate_decay_mesh_errors(
         Increasing amplitudes of the output [m]. The errors are interpolated where no static motion
         is found.
     find_mode : callable
-        Function of a LawGroup that returns the index of the mode.
+        Function of an UndrivenRig that returns the index of the mode.
     stiffer : joint.FreeRig, optional
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
@@ -256,9 +256,7 @@ def estimate_decay_mesh_errors(
         error = estimate_mesh_error(
             fine,
             make_laws_on_coarse_meshes(model, coarse, stiffer),
-            lambda laws: compute_static_curve(
-                laws.modes, laws, mode_index, amplitudes, N_LOOP_SAMPLES
-            )[1:3],
+            lambda laws: compute_static_curve(laws, mode_index, amplitudes)[1:3],
         )
     except NotConverged as reason:
         return unknown._replace(reason=str(reason))
@@ -342,7 +340,7 @@ def _find_nearest_mode(modes, laws, frequency: float) -> int:
     """
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):
-        omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness(), k)
+        omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness, k)
         if modes.output @ shape:
             distances[k] = abs(omega / (2 * np.pi) - frequency)
     return int(np.argmin(distances))

@@ -1,21 +1,23 @@
 """Amplitude above which friction does not limit a mode with negative damping.
 
 In: a `rig.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
-largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
+largest unstable limit cycle (`hybrid.free_motions`), and notes.
 """
 
 from math import tau
 from typing import NamedTuple
 
+import numpy as np
+
 from ...core import Measure, NotConverged, Outcome, PatchfemError
-from ...dynamics import limit_cycles
 from ...effects import law_has_trait
 from ...formatting import format_length
+from ...hybrid import free_motions
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response.measures import Measures
 from ...response.rows import MOTION_TABLE
 from .engines import find_obstacle_of_map
-from .joints import make_law_group, make_single_law
+from .joints import make_undriven_rig
 from .solution import first_interface_load
 
 FLUTTER_MEASURE = "flutter_amplitude"
@@ -24,13 +26,13 @@ NO_MOVING_INTERFACE_NOTE = (
     "of such a mode"
 )
 NO_CYCLE_NOTE = (
-    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_CYCLE_RATIO:g} and "
-    f"{limit_cycles.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
+    f"no unstable limit cycle was found at amplitudes between {free_motions.MIN_CYCLE_RATIO:g} and "
+    f"{free_motions.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
     "damping coefficient"
 )
 NO_SMALLER_CYCLE_NOTE = (
-    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_SLIDING_RATIO:g} and "
-    f"{limit_cycles.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
+    "no unstable limit cycle was found at amplitudes up to "
+    f"{free_motions.MAX_CYCLE_RATIO:g} times 4 F/(pi |c| omega), and motions below {{}} could not be followed"
 )
 UNSUPPORTED_BOND_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
@@ -40,7 +42,9 @@ NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
     "gains"
 )
-RIGID_FRICTION_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
+RIGID_FRICTION_REASON = (
+    "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz"
+)
 
 
 class Flutter(NamedTuple):
@@ -116,7 +120,7 @@ class LimitCycles(NamedTuple):
     - smallest_amplitude: smallest output amplitude of the search [m], or 0 if it covered all amplitudes.
     """
 
-    cycles: "list[limit_cycles.LimitCycle]"
+    cycles: list[free_motions.LimitCycle]
     reason: str
     smallest_amplitude: float = 0.0
 
@@ -124,9 +128,8 @@ class LimitCycles(NamedTuple):
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface.
 
-    A law of rigid friction is a relay, and harmonic balance finds the limit cycles of all other laws. If none can be
-    computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and `patch` is the pressed patch of
-    the interface, or None for an interface without one.
+    If none can be computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and `patch` is the
+    pressed patch of the interface, or None for an interface without one.
     """
     rig = model.rig
     law = model.friction
@@ -134,34 +137,26 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         return LimitCycles([], "limit cycles can be computed for one interface only")
 
     modes = rig.modes
-    # Slide of the interface per unit of each mode.
-    row = modes.interfaces[0]
-    if not row[limit_cycles.find_unstable_modes(modes)].any():
+    if not modes.interfaces[0][free_motions.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_MOVING_INTERFACE_NOTE)
 
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
 
-    element = make_single_law(model, numerics, patch)
     try:
-        # Rigid friction is a relay: the force has one magnitude during slip.
-        if element is not None and element.form == "rigid":
-            if rig.springs.is_nonlinear:
-                return LimitCycles([], f"{RIGID_FRICTION_REASON} a nonlinear spring")
-            if not modes.omega.all():
-                return LimitCycles([], f"{RIGID_FRICTION_REASON} a mode of 0 Hz")
-            static, kinetic = element.numbers[1:3]
-            cycles = limit_cycles.find_relay_cycles(modes, row, kinetic, static)
-            return LimitCycles(cycles, NO_SLIDING_NOTE)
-
-        # All other laws have smooth loops, which harmonic balance finds.
-        group = make_law_group(model, numerics, patch)
-        cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
-            modes, group, row, law.static * first_interface_load(model, patch)
-        )
-        reason = NO_SMALLER_CYCLE_NOTE if smallest_amplitude else NO_CYCLE_NOTE
-        return LimitCycles(cycles, reason, smallest_amplitude)
-    except NotConverged as missing:
-        return LimitCycles([], str(missing))
+        undriven = make_undriven_rig(model, numerics, patch)
     except PatchfemError:
         return LimitCycles([], UNSUPPORTED_BOND_LAW_REASON)
+    is_rigid = not np.isfinite(undriven.stiffness).all()
+    if is_rigid and not modes.omega.all():
+        return LimitCycles([], RIGID_FRICTION_REASON)
+    try:
+        cycles, smallest = free_motions.find_limit_cycles(
+            undriven, law.static * first_interface_load(model, patch)
+        )
+    except NotConverged as missing:
+        return LimitCycles([], NO_SLIDING_NOTE if is_rigid else str(missing))
+    reason = NO_CYCLE_NOTE
+    if smallest:
+        reason = NO_SMALLER_CYCLE_NOTE.format(format_length(smallest, 2))
+    return LimitCycles(cycles, NO_SLIDING_NOTE if is_rigid else reason, smallest)

@@ -1,7 +1,7 @@
 """Friction laws of the interfaces of a rig in the form of each engine.
 
 In: a Model, its Numerics and its Patch. Out: `Joint`s, from which follow the laws of the engine `hybrid` (`make_joints`),
-the contact points of a march (`make_contact`), and the laws for harmonic balance (`make_law_group`, `make_single_law`).
+the contact points of a march (`make_contact`), and the rig without a drive (`make_undriven_rig`).
 A patch that slips part by part under a constant load is its exact set of Jenkins elements.
 """
 
@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.harmonic import forces
-from ...dynamics.harmonic import laws as balance_laws
+from ...core import PatchfemError
 from ...effects import law_has_trait
 from ...friction import protocol, record
 from ...friction.laws import elastic_plastic
 from ...hybrid import laws as hybrid_laws
-from ...hybrid.cases import Load
+from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
 from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_reversals
 from ...hybrid.records import LawNumbers
@@ -33,6 +32,10 @@ from ..patch import faces, jenkins_elements
 from . import bond_lists, strips
 from .numerics import Numerics
 
+NO_STEADY_LOOP = (
+    'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
+    "pieces that are rigid in shear; run the scene in time instead"
+)
 MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
@@ -61,7 +64,7 @@ class Joint(NamedTuple):
         return record.make_law(self.law, self.load.mean)
 
     def make_element(self) -> protocol.Element:
-        """Return the law under its mean load in the form of harmonic balance."""
+        """Return the law under its mean load in the form of the march."""
         if self.stiffness is not None:
             return elastic_plastic.parallel_element(self.stiffness, self.yields)
         return self.make_law().element(self.load.mean)
@@ -246,7 +249,7 @@ def _find_stick_tolerance(joints, laws) -> float:
     return MAX_STUCK_SLIP_RATIO * min(lengths, default=0.0)
 
 
-# ---- march and harmonic balance
+# ---- march, and motions without a drive
 
 
 def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
@@ -304,8 +307,8 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> protocol.Element
     return list_joints(model, patch, numerics.meshed)[0].make_element()
 
 
-def make_law_group(model: Model, numerics: Numerics, patch) -> forces.LawGroup:
-    """Return the laws of all interfaces and the nonlinear springs of a rig for harmonic balance.
+def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
+    """Return the modes of a rig with the laws of all interfaces and its nonlinear springs, without the drive.
 
     Parameters
     ----------
@@ -322,14 +325,12 @@ def make_law_group(model: Model, numerics: Numerics, patch) -> forces.LawGroup:
         If a law has no steady loop.
     """
     rig = model.rig
-    if len(rig.friction.interfaces) == 1:
-        parts = [(0, make_single_law(model, numerics, patch))]
-    else:
-        joints = list_joints(model, patch, numerics.meshed)
-        parts = [(k, joint.make_element()) for k, joint in enumerate(joints)]
-    if rig.springs.interlock is not None:
-        stiffness, wavelength = rig.springs.interlock
-        parts.append((0, balance_laws.Spring(stiffness, wavelength=wavelength)))
-    if rig.springs.cubic is not None:
-        parts.append((rig.modes.output, balance_laws.Spring(cubic=rig.springs.cubic)))
-    return forces.LawGroup(rig.modes, parts)
+    joints = list_joints(model, patch, numerics.meshed)
+    for joint in joints:
+        has_bonds = joint.stiffness is None and law_has_trait(joint.law.law, "bonds")
+        if has_bonds and joint.law.rest_growth is not None:
+            raise PatchfemError(NO_STEADY_LOOP)
+    if len(joints) == 1 and make_single_law(model, numerics, patch) is None:
+        raise PatchfemError(NO_STEADY_LOOP)
+    laws = [(joint.make_hybrid_law(), joint.load) for joint in joints]
+    return UndrivenRig(rig.modes, tuple(list_interfaces(rig, laws)), len(laws))

@@ -12,7 +12,6 @@ import numpy as np
 
 from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
-from ....dynamics.curve_points import sample_adaptively
 from ....formatting import format_length
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
@@ -29,6 +28,7 @@ from ..engines import estimate_hybrid_errors, may_fold
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
 from ..solution import Solution
+from .curve_points import sample_adaptively
 from .curves import (
     COLUMN_MEASURES,
     INTERPOLATION_TOL,

@@ -14,27 +14,21 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import root
 
-from ...core import ModalBasis, PatchfemError
-from ...friction.laws.elastic_plastic import masing_loop
-from .forces import LawGroup
-from .laws import Jenkins
-from .slides import make_slides
+from ..core import ModalBasis, PatchfemError
+from ..friction.protocol import SteadyLoop
+from .cases import Case, Interface, Options, UndrivenRig, make_rig, make_start
+from .drives import make_tones
+from .laws import masing
+from .periodic import find_periodic_motion
 
-TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the forces of a law are compared
-TEST_SAMPLES = 512  # samples per cycle of this comparison
-FORCE_TOL = 1e-9  # relative change of a force that is round-off
+LOOP_RTOL = 1e-11  # tolerance of a step of a loop without a closed form
+TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the loops of a law are compared
+LOOP_TOL = 1e-6  # relative change of a loop that is due to its steps
 SLIDE_ROOT_TOL = (
     1e-13  # change of the slides, relative to those of the stuck mode, at which their search ends
 )
 SLIDE_TOL = 1e-9  # relative error of the slides of an equilibrium
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
-
-
-class StaticLoops(NamedTuple):
-    """Force [N] at the tip, and area [J], of the friction loop of an interface."""
-
-    tip: float
-    area: float
 
 
 class StaticMotion(NamedTuple):
@@ -51,81 +45,92 @@ class StaticMotion(NamedTuple):
     loss: float
 
 
-def find_loops(laws, u: float, samples: int) -> StaticLoops:
-    """Return the tip force and the area of the friction loop of an interface row.
+def find_loop(
+    interface: Interface, u: float, rtol: float | None = None, omega: float = 1.0
+) -> SteadyLoop:
+    """Return the friction loop of an interface at an amplitude u > 0 [m] of its slide.
+
+    Laws without a closed form follow a sine.
 
     Parameters
     ----------
-    laws : sequence
-        Laws on one row.
+    interface : Interface
+        Law and load.
     u : float
-        Amplitude of the slide, >= 0 [m].
-    samples : int
-        Samples of a cycle, for laws that have no closed form.
+        Amplitude of the slide [m].
+    rtol : float, optional
+        Tolerance of a step of this motion.
+    omega : float
+        Its frequency [rad/s].
     """
-    tip = area = 0.0
-    slides = make_slides([[0.0, u]], 1.0, samples)
-    for law in laws:
-        if isinstance(law, Jenkins):
-            law_tip, law_area = masing_loop(law.stiffness, law.limit_slide, u)
-        else:
-            force = law.evaluate(slides, 0).force[slides.is_sample]
-            law_tip = (force[0] - force[samples // 2]) / 2
-            law_area = force @ slides.rate[0, slides.is_sample] * 2 * np.pi / samples
-        tip += float(law_tip)
-        area += float(law_area)
-    return StaticLoops(tip, area)
+    law = interface.law
+    if law.law == "masing":
+        return masing.find_loop(law, u)
+    if law.law == "springs":
+        cubic, stiffness, turn = law.numbers
+        return SteadyLoop(cubic * u**3 + stiffness / turn * np.sin(turn * u), 0.0)
+
+    # The periodic motion of a bench, whose slide is prescribed
+    alone = [interface._replace(slide=np.ones(1))]
+    signal = make_tones([(u, omega, 0.0)], 2 * np.pi / omega)
+    rig = make_rig(None, signal, alone, (u, u * omega), Options(rtol=rtol or LOOP_RTOL))
+    case = Case(rig, make_start(rig, alone), np.zeros(1), np.zeros(1), np.zeros(0), 1)
+    values = find_periodic_motion(case).run.values
+    return SteadyLoop(values["secant_stiffness"] * u, values["loop_area"])
 
 
-def depends_on_speed(group: LawGroup, u: float) -> bool:
-    """Return whether a friction force of the group depends on the sliding speed at an amplitude u [m] of the slides."""
-    slides = np.tile([0.0, u], (len(group.rows), 1))
-    slow, fast = (
-        group.compute_forces(slides, omega, TEST_SAMPLES) for omega in (1.0, TEST_RATE_RATIO)
-    )
-    return bool((np.abs(fast - slow).max(axis=1) > FORCE_TOL * np.abs(slow).max(axis=1)).any())
+def depends_on_speed(rig: UndrivenRig, u: float) -> bool:
+    """Return whether a friction force of a rig depends on the sliding speed at an amplitude u [m] of the slides."""
+    for one in rig.interfaces:
+        slow, fast = (np.array(find_loop(one, u, omega=omega)) for omega in (1.0, TEST_RATE_RATIO))
+        if (np.abs(fast - slow) > LOOP_TOL * np.abs([slow[0], slow[0] * u])).any():
+            return True
+    return False
 
 
 def find_static_motions(
-    modes: ModalBasis, group: LawGroup, mode: int, amplitudes, row, samples: int = 4096
+    rig: UndrivenRig, mode: int, amplitudes, row, rtol: float | None = None
 ) -> list[StaticMotion]:
     """Find the quasi-static motions of a mode at given amplitudes, with NaN where no equilibrium is found.
 
     Parameters
     ----------
-    modes : ModalBasis
-        Modes of the structure, without the contact.
-    group : LawGroup
-        Laws of the interfaces.
+    rig : UndrivenRig
+        Modes of the structure without the contact, and laws of the interfaces.
     mode : int
         Index of the coordinate of the mode.
     amplitudes : array_like
         (k,) amplitudes [m] of the displacement row z, such as that of the output.
     row : ndarray
         (n,)
-    samples : int, optional
-        Samples per cycle, for laws that have no closed form.
+    rtol : float, optional
+        Tolerance of a step, for loops without a closed form.
 
     Raises
     ------
     PatchfemError
         If a law depends on the velocity.
     """
-    if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(amplitudes))):
+    modes = rig.modes
+    rows = rig.rows
+    if depends_on_speed(rig, float(np.abs(rows).max()) * float(np.max(amplitudes))):
         raise PatchfemError(SPEED_MESSAGE)
-    stiffness = group.stiffness()
+    stiffness = rig.stiffness
 
-    def find_mode(slides, amplitude: float) -> tuple[float, np.ndarray, list[StaticLoops]]:
+    def find_mode(slides, amplitude: float) -> tuple[float, np.ndarray, list[SteadyLoop]]:
         """Return frequency, coordinates at an amplitude, and loops of the mode with the secants at slides (i,) [m]."""
-        loops = [find_loops(laws, u, samples) for u, laws in zip(slides, group.laws)]
-        secants = [loop.tip / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]
-        omega, shape = modes.compute_stuck_mode(group.rows, np.array(secants), mode)
+        loops = [
+            find_loop(one, u, rtol) if u > 0 else SteadyLoop(0.0, 0.0)
+            for u, one in zip(slides, rig.interfaces)
+        ]
+        secants = [loop.force / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]
+        omega, shape = modes.compute_stuck_mode(rows, np.array(secants), mode)
         return omega, shape * (amplitude / abs(float(row @ shape))), loops
 
     # The slides of the mode must be those of its secants.
     motions = []
     for amplitude in amplitudes:
-        stuck = np.abs(group.rows @ find_mode(np.zeros(stiffness.size), amplitude)[1])
+        stuck = np.abs(rows @ find_mode(np.zeros(stiffness.size), amplitude)[1])
         unit = np.maximum(stuck, 1e-300)
 
         def find_residual(x, amplitude=amplitude, unit=unit) -> np.ndarray:
@@ -140,7 +145,7 @@ def find_static_motions(
             unit : (i,) array
                 Slides of the stuck mode [m].
             """
-            return np.abs(group.rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
+            return np.abs(rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
 
         solution = root(find_residual, stuck / unit, tol=SLIDE_ROOT_TOL)
         omega, z, loops = find_mode(np.abs(solution.x) * unit, amplitude)
@@ -165,12 +170,12 @@ def find_static_motions_from_loops(
         Index of the coordinate of the mode.
     slides : array_like
         (k,) amplitudes of the slide [m], > 0.
-    loops : sequence of StaticLoops
+    loops : sequence of SteadyLoop
         (k,) loop at each amplitude.
     """
     motions = []
     for slide, loop in zip(slides, loops):
-        omega, shape = modes.compute_stuck_mode(row[None], np.array([loop.tip / slide]), mode)
+        omega, shape = modes.compute_stuck_mode(row[None], np.array([loop.force / slide]), mode)
         motions.append(_make_motion(modes, omega, shape * slide / (row @ shape), loop.area))
     return motions
 

@@ -1,0 +1,559 @@
+"""Periodic motions of a mode without a drive, by shooting: backbones and limit cycles.
+
+z'' + (D - 2 zeta omega) z' + Omega^2 z + rows^T F/m = 0 has, for every amplitude of the output, one periodic motion of a
+mode with its own omega and zeta. The negative damping of all coordinates supplies what friction and dampers take, so
+that zeta is the loss of a cycle over 8 pi times the mean kinetic energy, as in a slow free decay (extended periodic
+motion: Krack, Comput. Struct. 154, 59, 2015). With one mode that moves as a sine of amplitude A and slide s this is
+omega^2 = omega_0^2 + s^2 K_eq/m and zeta = zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2), where K_eq and the loss are
+those of the friction loop. A limit cycle has zeta = 0. In a test of phase resonance a force at the output, in phase with
+its velocity, takes the place of the negative damping.
+
+The unknowns are the state at phase 0, the frequency, and the damping or the force. A period begins where the
+fundamental of the output vanishes and rises, far from the reversals of the output.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import ModalBasis, NotConverged
+from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
+from .drives import make_tones
+from .laws import is_rigid
+from .measures import split_integrals
+from .periodic import (
+    MAX_KINKED_CHANGE,
+    MAX_REMAINDER,
+    MAX_STABLE_MULTIPLIER,
+    copy_state,
+)
+from .periodic_curves import N_FIRST, LoopShooting
+from .records import (
+    N_FACE_INTEGRALS,
+    N_INTEGRALS,
+    Clock,
+    Cycle,
+    Memory,
+    Mode,
+    Setting,
+    State,
+    Tail,
+    Window,
+)
+from .runs import COARSE, COARSE_STEP, ERROR_FACTOR, ERROR_FLOOR, run_case
+
+CHANGE_TOL = 1e-9  # change over a period, relative to the motion, that counts as none
+MAX_STEPS = 1e5  # steps of the engine in the first periods of the search for a motion
+MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the first periods
+MAX_NEWTON_STEPS = 20  # Newton steps to a motion
+# Largest ratio of the changes over a period after and before a correction at which the derivatives are updated
+MAX_BROYDEN_RATIO = 0.3
+MAX_DETOURS = 4  # of these, steps that are shortened, or that begin with new derivatives
+# Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
+LONGEST_STEPS = np.array([0.3, 0.6])
+RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
+# Smallest cosines between the start of the search and a motion. At a larger angle the motion is that of another mode, or
+# one whose harmonics are in resonance. A force at the output moves the modes otherwise than the free motion.
+MIN_COSINES = (0.9, 0.5)
+SAME_AMPLITUDE_TOL = 1e-3  # relative difference of amplitudes between which no slope is taken
+MAX_FOLLOWED = 20  # attempts to reach an amplitude from another one, with halved steps where no motion is found
+# Amplitudes at which the mode with sticking contacts and that without them are tried as starts, relative to that of the
+# first motion
+STUCK_RATIOS = (1.0, 1e-2, 1e-4, 1e-6)
+FREE_RATIOS = (1.0, 3.0, 10.0)
+N_SAMPLES = 64  # samples of a period for the shape of its motion
+MIN_STOP = 1e-9  # shortest rest of rigid friction that is seen, in periods
+
+# Amplitudes at which the damping of free motions is evaluated to bracket limit cycles, relative to that of den Hartog's
+# balance, and their number
+MIN_CYCLE_RATIO = 1e-6
+MAX_CYCLE_RATIO = 4.0
+N_AMPLITUDES = 48
+NOT_FOLLOWED_MESSAGE = (
+    "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
+    "amplitude at which friction dissipates what the mode gains"
+)
+
+
+class Accuracy(NamedTuple):
+    """Tolerance of a step, and smallest number of steps per period."""
+
+    rtol: float
+    n_steps: float
+
+
+FINE = Accuracy(1e-11, MIN_STEPS)
+# Steps of the motions whose differences from the fine ones are the errors
+ROUGH = Accuracy(COARSE * FINE.rtol, MIN_STEPS / COARSE_STEP)
+
+
+def estimate_errors(values, rough, changes) -> np.ndarray:
+    """Return the errors (..., k) of values of k motions from those of motions with larger steps.
+
+    Parameters
+    ----------
+    values, rough : (..., k) array
+        Values with FINE and with ROUGH steps.
+    changes : (k,) array
+        Changes of the motions over a period, relative to their size.
+    """
+    error = ERROR_FACTOR * np.abs(values - rough)
+    return error + (ERROR_FLOOR * FINE.rtol + np.asarray(changes)) * np.abs(values)
+
+
+class FreeMotion(NamedTuple):
+    """Periodic motion of a mode that a negative damping or a force at the output sustains.
+
+    - amplitude: half the range of the output [m]
+    - omega, rate: frequency [rad/s], and damping rate 2 zeta omega [1/s] or a multiple of the force
+    - loss: work of friction per cycle [J]
+    - change: largest change of the state over a period, relative to its scale
+    - sticks: whether an interface with rigid friction rests for a part of the cycle
+    - shooting: map of a period
+    - state: state at its start
+    - slope: change (2 n + 2,) of the modes, divided by the amplitude, and of frequency and rate per change of the logarithm
+      of the amplitude, since the motion from which this one was found
+    """
+
+    amplitude: float
+    omega: float
+    rate: float
+    loss: float
+    change: float
+    sticks: bool
+    shooting: "FreeShooting"
+    state: State
+    slope: np.ndarray | float = 0.0
+
+    @property
+    def unknowns(self) -> np.ndarray:
+        """Modal coordinates and velocities, divided by the amplitude, frequency and rate (2 n + 2,) at the start."""
+        n_modes = self.shooting.motions.rig.modes.omega.size
+        motion = self.state.y[: 2 * n_modes] / self.amplitude
+        return np.append(motion, self.state.y[self.shooting.extra])
+
+    @property
+    def zeta(self) -> float:
+        """Damping ratio of structure and friction."""
+        return self.rate / (2 * self.omega)
+
+    @property
+    def force(self) -> float:
+        """Amplitude [N] of the force at the output that sustains the motion."""
+        return self.rate * self.shooting.unit_force
+
+    def find_shape(self) -> np.ndarray:
+        """Return the first harmonic (n,) of the modal coordinates [m] as complex amplitudes."""
+        times = np.arange(N_SAMPLES) * (self.shooting.period / N_SAMPLES)
+        case = replace(self.shooting.case, samples=times)
+        rows = run_case(case, start=self.shooting.load_loops(self.state)).rows
+        samples = rows[np.isin(rows[:, 0], times), 1 : 1 + case.rig.modes.shape[1]]
+        return np.fft.rfft(samples, axis=0)[1] * (2 / N_SAMPLES)
+
+    def find_multiplier(self) -> float:
+        """Return the magnitude of the largest Floquet multiplier besides that of a shift in time, which is 1."""
+        shooting = self.shooting
+        shooting.map = None
+        shooting.state = shooting.advance(self.state)
+        linear = shooting.differentiate(self.state)[0]
+        is_motion = ~np.isin(linear.columns, shooting.extra)
+        multipliers = np.linalg.eigvals(linear.slopes[np.ix_(is_motion, is_motion)])
+        shift = np.argmin(np.abs(multipliers - 1))
+        return float(np.abs(np.delete(multipliers, shift)).max(initial=0.0))
+
+
+class FreeShooting(LoopShooting):
+    """Map of a period of a free motion, whose state is extended by two unknowns: frequency and rate.
+
+    The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. Over a period the map adds to the
+    frequency what the output misses of its phase, and to the rate what it misses of its amplitude, so that a motion of
+    the amplitude is a fixed point. For a limit cycle it sets the rate to 0 instead.
+
+    Parameters
+    ----------
+    motions : FreeMotions
+        Rig, accuracy and excitation.
+    start : (float, (n,) array)
+        Frequency [rad/s] and shape of a linear mode, from which the first motion begins.
+    amplitude : float
+        Half the range of the output [m]; for a limit cycle about that.
+    is_cycle : bool
+        Whether the motion is a limit cycle, whose amplitude is unknown.
+    """
+
+    def __init__(self, motions: "FreeMotions", start, amplitude: float, *, is_cycle: bool = False):
+        self.motions = motions
+        self.start = start
+        self.amplitude = amplitude
+        self.is_cycle = is_cycle
+        rig = motions.rig
+        modes = rig.modes
+        omega, shape = start
+        reach = float(modes.output @ shape)
+        sizes = (amplitude, amplitude * omega)
+        rtol, n_steps = motions.accuracy
+        options = Options(rtol=rtol, n_steps=n_steps, max_steps=MAX_STEPS)
+        signal = make_tones([], 2 * np.pi / omega)
+        arrays = make_rig(modes, signal, rig.interfaces, sizes, options)
+
+        # The force that supplies to the linear mode the power of the negative damping of rate 1
+        self.unit_force = modes.mass * sizes[1] * float(shape @ shape) / reach**2
+        arrays.modes[Mode.PUSH] = modes.output * self.unit_force / modes.mass
+
+        # The further unknowns are states without rates, after those of the laws.
+        y = make_start(arrays, rig.interfaces)
+        place = y.size - N_INTEGRALS - N_FACE_INTEGRALS * len(rig.interfaces)
+        self.extra = np.array([place, place + 1])
+        scales = np.insert(arrays.scales, [place, place], [omega, RATE_SCALE * omega])
+        y = np.insert(y, [place, place], [omega, 0.0])
+        y[modes.omega.size : 2 * modes.omega.size] = shape * sizes[1] / reach
+        arrays = arrays._replace(scales=scales)
+        empty = np.zeros(0)
+        super().__init__(Case(arrays, y, empty, empty, empty, rig.n_friction))
+
+    def advance(self, state: State) -> State:
+        """Return the state a period after another one, with its further unknowns corrected."""
+        omega, rate = state.y[self.extra]
+        self._set_excitation(omega, rate)
+        state = copy_state(state)
+        state.y[self.extra[-1] + 1 :] = 0.0
+        end = super().advance(state)
+
+        # Half the range of the output, and the cosine part of its fundamental
+        cycle = self.record.cycles[0]
+        self.size = (cycle[Cycle.MAX] - cycle[Cycle.MIN]) / 2
+        cosine = omega / np.pi * end.y[Tail.COSINE]
+        gain = RATE_SCALE * omega * (self.size / self.amplitude - 1)
+        end.y[self.extra] += omega * cosine / self.amplitude, -rate if self.is_cycle else gain
+        return end
+
+    def _set_excitation(self, omega: float, rate: float) -> None:
+        """Give the map its frequency [rad/s] and its negative damping or force of a rate [1/s]."""
+        self.period = 2 * np.pi / omega
+        settings = self.case.rig.settings.copy()
+        settings[Setting.LONGEST_STEP] = self.period / self.motions.accuracy.n_steps
+        settings[Setting.OMEGA] = omega
+        settings[Setting.PERIOD] = self.period
+        rig = self.case.rig._replace(settings=settings)
+        if self.motions.is_forced:
+            rig = rig._replace(tones=np.array([[rate, omega, np.pi / 2]]))
+        else:
+            damping = self.motions.rig.modes.damping_matrix
+            rig = rig._replace(damping=damping - rate * np.eye(len(damping)))
+        self.case = replace(self.case, rig=rig, ends=np.array([self.period]))
+
+    def start_from(self, motion: FreeMotion) -> None:
+        """Begin at a motion that is extrapolated from another one over the logarithm of the amplitude."""
+        ratio = self.amplitude / motion.amplitude
+        unknowns = motion.unknowns + motion.slope * np.log(ratio)
+        state = copy_state(motion.state)
+        state.y[: unknowns.size - 2] = unknowns[:-2] * self.amplitude
+        state.y[self.extra] = unknowns[-2:]
+        state.memory[:, Memory.STACK :: 2] *= ratio
+        state.memory[:, [Memory.SIZE, Memory.SPEED]] = 0.0
+        state.clock[[Clock.OUTPUT_SIZE, Clock.OUTPUT_SPEED]] = 0.0
+        self.state = state
+
+    def find_columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state.
+
+        The further ones are always among them. The forces at reversal points follow from the displacements beside them.
+        """
+        columns = super().find_columns(before)
+        is_force = (columns >= self.n) & ((columns - self.n) % 2 == 1)
+        return np.union1d(columns[~is_force], self.extra)
+
+    def solve(self) -> FreeMotion | None:
+        """Find the motion, or None without convergence."""
+        # A correction that leads far away ends with values that are not finite.
+        with np.errstate(invalid="ignore", over="ignore"):
+            try:
+                return self._search()
+            except NotConverged:
+                return None
+
+    def _search(self) -> FreeMotion | None:
+        """Find the motion by Newton's method, or None without convergence.
+
+        Where kinks of the laws are close together the change over a period may stop to fall before CHANGE_TOL.
+        """
+        # The laws take the states and the memory of the loop.
+        laws = slice(2 * self.motions.rig.modes.omega.size, self.extra[0])
+        for _ in range(N_FIRST):
+            end = self.advance(self.state)
+            self.state.memory[:] = end.memory
+            self.state.y[laws] = end.y[laws]
+
+        # Motions far from that of the mode may take very many steps.
+        self.limit_steps(MAX_STEPS_RATIO * self.n_steps)
+        guess = self.state
+        step = last_residual = np.zeros(0)
+        best = np.inf
+        n_long = n_maps = 0
+        for _ in range(MAX_NEWTON_STEPS):
+            before = self.state
+            self.relax(1)
+            change = self.measure_change(before)
+            if change < CHANGE_TOL or best <= change < MAX_KINKED_CHANGE:
+                is_near = self._find_cosine(guess, before) > MIN_COSINES[self.motions.is_forced]
+                return self._describe(before, change) if is_near else None
+            if not np.isfinite(change):
+                return None
+
+            # After a correction that helped, its residual updates the derivatives (Broyden's method).
+            start = self.pack(before)
+            residual = self.pack(self.state) - start
+            if not change < MAX_BROYDEN_RATIO * best:
+                n_maps += 1
+                self.map = None
+            elif change > MAX_REMAINDER * best:
+                self.map = self.map.update(step, residual - last_residual)
+            best = change
+            last_residual = residual
+            if not np.isfinite(self.differentiate(before)[0].slopes).all():
+                return None
+            self.correct(before)
+            step = self.pack(self.state) - start
+
+            # A long step is shortened, because frequency and damping are then far from those of the motion.
+            excess = np.abs(step[self.extra] / (LONGEST_STEPS * start[self.extra[0]])).max()
+            n_long += excess > 1
+            if max(n_long, n_maps) > MAX_DETOURS or not np.isfinite(step).all():
+                return None
+            if excess > 1:
+                step /= excess
+                self.state = self.unpack(self.state, start + step)
+        return None
+
+    def _find_cosine(self, first: State, second: State) -> float:
+        """Return the cosine of the angle between two states of the modes, whose velocities are divided by the frequency."""
+        n = self.motions.rig.modes.omega.size
+        unit = np.append(np.ones(n), np.full(n, 1 / second.y[self.extra[0]]))
+        a = first.y[: 2 * n] * unit
+        b = second.y[: 2 * n] * unit
+        return float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)))
+
+    def _describe(self, state: State, change: float) -> FreeMotion:
+        """Return the motion that starts with a state and changes it by a fraction of its scale over a period."""
+        omega, rate = state.y[self.extra]
+        n_friction = self.case.n_friction
+        work = split_integrals(self.case, self.state.y)[:n_friction, 0]
+        stuck = self.record.faces[:n_friction, Window.STUCK]
+        rigid = [is_rigid(one.law.law) for one in self.motions.rig.interfaces[:n_friction]]
+        return FreeMotion(
+            amplitude=self.size if self.is_cycle else self.amplitude,
+            omega=float(omega),
+            rate=float(rate),
+            loss=float(work.sum()),
+            change=change,
+            sticks=bool((stuck[rigid] > MIN_STOP * self.period).any()),
+            shooting=self,
+            state=state,
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FreeMotions:
+    """Free motions of a mode.
+
+    - rig: modes and interfaces
+    - mode: index of the coordinate of the mode
+    - accuracy: steps of the motions
+    - is_forced: whether a force at the output sustains them, instead of a negative damping of all coordinates
+    """
+
+    rig: UndrivenRig
+    mode: int
+    accuracy: Accuracy = FINE
+    is_forced: bool = False
+
+    def solve(self, amplitude: float, near: FreeMotion, *, is_cycle: bool = False):
+        """Return the `FreeMotion` at an amplitude [m] from a similar motion `near`, or None.
+
+        With `is_cycle` it is the limit cycle near this amplitude.
+        """
+        shooting = FreeShooting(self, near.shooting.start, amplitude, is_cycle=is_cycle)
+        shooting.start_from(near)
+        motion = shooting.solve()
+        if motion is None or abs(motion.amplitude / near.amplitude - 1) < SAME_AMPLITUDE_TOL:
+            return motion
+        step = np.log(motion.amplitude / near.amplitude)
+        return motion._replace(slope=(motion.unknowns - near.unknowns) / step)
+
+    def follow(self, amplitude: float, near: FreeMotion) -> FreeMotion | None:
+        """Return the motion at an amplitude [m], followed from another one `near` in steps as long as possible, or None."""
+        targets = [amplitude]
+        for _ in range(MAX_FOLLOWED):
+            motion = self.solve(targets[-1], near)
+            if motion is None:
+                targets.append(float(np.sqrt(near.amplitude * targets[-1])))
+                continue
+            # Beyond the aperiodic limit no motion is wanted, and they become hard to find.
+            if motion.zeta > 1 and not self.is_forced:
+                return None
+            near = motion
+            targets.pop()
+            if not targets:
+                return near
+        return None
+
+    def find(self, amplitudes, similar: list[FreeMotion | None] | None = None) -> list:
+        """Find the motions at increasing amplitudes (k,) [m] of the output.
+
+        They are followed upwards from the mode with sticking contacts, then downwards from the mode without the contact.
+        Each pass ends where no motion is found, or where rigid friction rests for a part of the cycle.
+
+        Parameters
+        ----------
+        amplitudes : (k,) array
+            Half the range of the output [m], increasing.
+        similar : list, optional
+            Similar motions at these amplitudes, or None, from which the search begins.
+
+        Returns
+        -------
+        list of (FreeMotion or None)
+        """
+        amplitudes = [float(amplitude) for amplitude in amplitudes]
+        out: list[FreeMotion | None] = [None] * len(amplitudes)
+        if similar is not None:
+            for k, near in enumerate(similar):
+                out[k] = None if near is None else self.solve(amplitudes[k], near)
+
+        rig = self.rig
+        modes = rig.modes
+        stuck_mode = modes.compute_stuck_mode(rig.rows, rig.stiffness, self.mode)
+        free_mode = (modes.omega[self.mode], np.eye(modes.omega.size)[self.mode])
+        upwards = range(len(amplitudes))
+        passes = ((upwards, stuck_mode, STUCK_RATIOS), (upwards[::-1], free_mode, FREE_RATIOS))
+        for order, (omega, shape), ratios in passes:
+            near = None
+            for k in order:
+                if out[k] is None and near is not None:
+                    out[k] = self.follow(amplitudes[k], near)
+                elif out[k] is None and omega and modes.output @ shape:
+                    out[k] = self._follow_linear_mode(amplitudes[k], (omega, shape), ratios)
+                near = out[k]
+                if near is None or near.sticks:
+                    break
+        return out
+
+    def _follow_linear_mode(self, amplitude: float, start, ratios) -> FreeMotion | None:
+        """Return the motion at an amplitude [m] that is followed from a linear mode `start`, or None.
+
+        The mode is tried at amplitudes of which `ratios` are those to the amplitude.
+        """
+        for ratio in ratios:
+            motion = FreeShooting(self, start, ratio * amplitude).solve()
+            if motion is not None:
+                return self.follow(amplitude, motion)
+        return None
+
+
+class LimitCycle(NamedTuple):
+    """Limit cycle of a self-excited mode.
+
+    - amplitude, error: half the range of the output, and its error [m]
+    - omega: angular frequency [rad/s]
+    - is_stable: whether perturbations decay
+    """
+
+    amplitude: float
+    error: float
+    omega: float
+    is_stable: bool
+
+
+def find_unstable_modes(modes: ModalBasis) -> np.ndarray:
+    """Return the indices (k,) of the modal coordinates that have negative damping."""
+    return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
+
+
+def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
+    """Estimate the limit-cycle amplitude [m] of the output by den Hartog's energy balance, 4 F s/(pi |d| omega m).
+
+    Friction of at most F dissipates up to 4 F A in a cycle of amplitude A, and a damping d < 0 supplies pi |d| m omega
+    A^2.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    row : ndarray
+        (n,) slide s per coordinate.
+    limit : float
+        Friction force F [N].
+    mode : int
+        Index of the coordinate, whose damping d is negative.
+    """
+    gives = -modes.damping_matrix[mode, mode] * modes.omega[mode] * modes.mass
+    return 4 * limit * abs(row[mode] * modes.output[mode]) / (np.pi * gives)
+
+
+def find_limit_cycles(rig: UndrivenRig, limit: float) -> tuple[list[LimitCycle], float]:
+    """Find the limit cycles of modes with negative damping, whose interface slides.
+
+    They are the free motions whose damping changes its sign over the amplitude. The friction of an interface that rests
+    for a part of the cycle is not that of a sliding one, so that the motions of rigid friction are followed down to the
+    amplitude at which it begins to rest.
+
+    Parameters
+    ----------
+    rig : UndrivenRig
+        Modes, and one friction interface.
+    limit : float
+        Largest friction [N].
+
+    Returns
+    -------
+    cycles : list of LimitCycle
+        In increasing amplitude.
+    min_amplitude : float
+        Smallest amplitude of the output that was examined [m]; 0 if all were.
+
+    Raises
+    ------
+    NotConverged
+        If no free motion is found at the largest amplitude.
+    """
+    cycles = []
+    min_amplitude = 0.0
+    row = rig.rows[0]
+    for mode in find_unstable_modes(rig.modes):
+        size = estimate_amplitude(rig.modes, row, limit, mode)
+        if not size > 0:
+            continue
+        amplitudes = size * np.geomspace(MIN_CYCLE_RATIO, MAX_CYCLE_RATIO, N_AMPLITUDES)
+        motions = FreeMotions(rig, int(mode)).find(amplitudes)
+        known = [motion is not None and not motion.sticks for motion in motions]
+        if not known[-1]:
+            raise NotConverged(NOT_FOLLOWED_MESSAGE)
+
+        # The motions above the last gap
+        first = 0 if all(known) else len(known) - known[::-1].index(False)
+        if first:
+            min_amplitude = max(min_amplitude, amplitudes[first])
+        for low, high in pairwise(motions[first:]):
+            if np.sign(low.rate) * np.sign(high.rate) < 0:
+                cycles.append(_find_cycle_between(low, high))
+    return sorted(cycles), min_amplitude
+
+
+def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
+    """Return the limit cycle between two free motions whose dampings have different signs.
+
+    It is stable if the damping rises over the amplitude and no other perturbation of the motion grows.
+    """
+    share = low.rate / (low.rate - high.rate)
+    guess = low.amplitude + share * (high.amplitude - low.amplitude)
+    near = min((low, high), key=lambda motion: abs(motion.amplitude - guess))
+    motions = near.shooting.motions
+    cycle = motions.solve(guess, near, is_cycle=True)
+    rough = cycle and replace(motions, accuracy=ROUGH).solve(guess, cycle, is_cycle=True)
+    if rough is None:
+        raise NotConverged("a limit cycle was not found between two amplitudes that enclose it")
+    error = estimate_errors(cycle.amplitude, rough.amplitude, cycle.change)
+    is_stable = high.rate > 0 and cycle.find_multiplier() < MAX_STABLE_MULTIPLIER
+    return LimitCycle(cycle.amplitude, float(error), cycle.omega, is_stable)
