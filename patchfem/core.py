@@ -338,17 +338,6 @@ class SineDrive:
         return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
-class ErrorCauses(NamedTuple):
-    """Contributions to the error of a measure, and its order of convergence.
-
-    - parts: contribution of each discretisation, such as "steps" or "mesh", from coarser runs (`response.coarser`).
-    - order: observed order of convergence with the time step; None if it is unknown.
-    """
-
-    parts: dict[str, float]
-    order: float | None = None
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Measure:
     """Computed quantity of a run with its unit and its numerical error.
@@ -362,7 +351,8 @@ class Measure:
     - text: definition of the measure.
     - reason: reason why the value is None.
     - engine: method that computed the value; "" for the engine of the run.
-    - causes: contributions to the error; None if they are unknown.
+    - parts: contribution to the error of each discretisation, such as "steps" or "mesh", from coarser runs
+      (`response.coarser`); None if they are unknown.
     """
 
     value: float | None
@@ -372,7 +362,7 @@ class Measure:
     text: str = ""
     reason: str = ""
     engine: str = ""
-    causes: ErrorCauses | None = None
+    parts: dict[str, float] | None = None
 
     def error_ratio(self, tolerance: float) -> float:
         """Return the numerical error divided by the error that a tolerance allows.

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_cli
+from friction_loops import write_loop
 from scene_texts import make_shaken_block
 
 import patchfem as pf
@@ -43,17 +44,9 @@ def test_exact_scene_from_dict_equals_text():
 def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
     """A fit to a computed loop recovers the friction coefficient within 1e-6, with options given in any form."""
     bench = pf.new("bench")
-    run = pf.run(bench)
-    loop = np.column_stack([run.response.time, run.response.slide * 1e6, run.response.force])
-    path = tmp_path / "loop.csv"
-    path.write_text(
-        "time [s],displacement [um],force [N],cycle\n"
-        + "".join(
-            ",".join(map(repr, row)) + f",{1 + (k >= len(loop) - 5)}\n"
-            for k, row in enumerate(loop.tolist())
-        ),
-        "utf-8",
-    )
+    response = pf.run(bench).response
+    cycle = np.where(np.arange(response.time.size) < response.time.size - 5, 1, 2)
+    path = write_loop(tmp_path / "loop.csv", response.time, response.slide, response.force, cycle)
     static = pf.load(bench).friction.static
     free = {"friction.static": (static / 2, 2 * static)}
     options = pf.FitOptions(hold=["cycle=2"])

@@ -20,7 +20,7 @@ from ..surface.compare.records import Comparison
 from ..surface.profile import Profile, resample_evenly
 
 # The two surfaces of a comparison, in names of files and results
-SIDES = ("before", "after")
+SURFACE_NAMES = ("before", "after")
 # Measures of a pressed patch that are compared for both surfaces
 COMPARED_MEASURES = (
     "pressure_peak",
@@ -63,7 +63,9 @@ class SurfaceRuns(NamedTuple):
         for name in COMPARED_MEASURES:
             by_side = {side: one.measures.get(name) for side, one in self.results.items()}
             if any(one is not None and one.value is not None for one in by_side.values()):
-                measures[name] = {side: _measure_to_dict(by_side.get(side)) for side in SIDES}
+                measures[name] = {
+                    side: _measure_to_dict(by_side.get(side)) for side in SURFACE_NAMES
+                }
         warnings = []
         for side, result in self.results.items():
             texts = [*result.warnings, *result.notes]
@@ -73,7 +75,7 @@ class SurfaceRuns(NamedTuple):
             "scene": self.title,
             "measures": measures,
             "failed": list(self.failed),
-            "outcome": dict.fromkeys(SIDES) | outcomes,
+            "outcome": dict.fromkeys(SURFACE_NAMES) | outcomes,
             "warnings": warnings,
         }
 
@@ -101,7 +103,7 @@ def run_both_surfaces(
     """
     results = {}
     failed = []
-    for side, model in zip(SIDES, (before, after)):
+    for side, model in zip(SURFACE_NAMES, (before, after)):
         try:
             results[side] = run(plan(model), say)
         except (PatchfemError, NotConverged) as error:
@@ -142,7 +144,7 @@ def write_common_traces(comparison: Comparison, folder: Path) -> list[Path]:
     if curves is not None and np.isfinite(curves.before).any():
         traces = [Profile(curves.x, z, "trace") for z in (curves.before, curves.after)]
     paths = []
-    for side, trace in zip(SIDES, traces, strict=True):
+    for side, trace in zip(SURFACE_NAMES, traces, strict=True):
         flat = level(resample_evenly(trace))
         x = 1e6 * (flat.x - (flat.x[0] + flat.x[-1]) / 2)
         rows = [f"{place:.6f},{height:.6f}" for place, height in zip(x, 1e6 * flat.z, strict=True)]

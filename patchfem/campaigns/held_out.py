@@ -1,14 +1,18 @@
 """Rows of a measured table that a fit leaves out and predicts (--hold, --leave-out)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..inputs.damage import shorten
+from ..scene.keys.quantities import parse_quantity
 
 MAX_LISTED_LENGTH = 200  # largest number of characters of a list of values in a message
+EQUAL_TOL = 1e-9  # largest relative difference at which two numbers count as equal
+# Kind of quantity and unit of each column of numbers by which rows can be selected
+NUMBER_UNITS = {"frequency": ("frequency", "Hz"), "input": ("acceleration", "m/s^2")}
 
 
 def find_cells(columns: Mapping[str, Sequence], name: str, path: Path) -> Sequence:
@@ -39,9 +43,7 @@ def find_cells(columns: Mapping[str, Sequence], name: str, path: Path) -> Sequen
 def select_held_out(
     selector: str,
     path: Path,
-    columns: Mapping[str, Sequence],
-    matches: Callable[[str, object, str], bool],
-    format_cell: Callable[[str, object], str],
+    columns: Mapping[str, Sequence[float | str]],
 ) -> np.ndarray:
     """Return a mask (n,) of the rows that fulfil a condition "column=value,value" of the option --hold.
 
@@ -52,11 +54,8 @@ def select_held_out(
     path : Path
         Table, for messages.
     columns : Mapping
-        Column -> its n cells, of those columns by which rows can be selected.
-    matches : callable
-        (column, cell, value as text) -> whether the cell has this value.
-    format_cell : callable
-        (column, cell) -> text of the cell, for messages.
+        Column -> its n cells, of those columns by which rows can be selected: labels, or numbers [SI] of
+        `NUMBER_UNITS`.
 
     Returns
     -------
@@ -65,7 +64,7 @@ def select_held_out(
     Raises
     ------
     PatchfemError
-        If the condition is incomplete, or if no row has one of the values.
+        If the condition is incomplete, if a value lacks its unit, or if no row has one of the values.
     """
     name, equals, values = map(str.strip, selector.partition("="))
     texts = [text.strip() for text in values.split(",")]
@@ -77,7 +76,7 @@ def select_held_out(
     cells = find_cells(columns, name, path)
     selected = np.zeros(len(cells), bool)
     for text in texts:
-        has_value = np.array([matches(name, cell, text) for cell in cells])
+        has_value = np.array([_has_value(name, cell, text) for cell in cells])
         if not has_value.any():
             known = ", ".join(dict.fromkeys(format_cell(name, cell) for cell in cells))
             raise PatchfemError(
@@ -86,3 +85,30 @@ def select_held_out(
             )
         selected |= has_value
     return selected
+
+
+def format_cell(name: str, cell: float | str) -> str:
+    """Return the text of a cell in the column `name`: a label, or a number with its unit."""
+    if isinstance(cell, str):
+        return cell or "(none)"
+    return f"{cell:.6g} {NUMBER_UNITS[name][1]}"
+
+
+def _has_value(name: str, cell: float | str, text: str) -> bool:
+    """Return whether a cell in the column `name` has the value that a text of the option --hold states.
+
+    Labels that are numbers are compared as numbers, and frequencies and inputs but for round-off. The flags of a row need
+    only contain the text.
+    """
+    if name == "flag":
+        return text in cell
+    if isinstance(cell, str):
+        try:
+            return float(cell) == float(text)
+        except ValueError:
+            return cell == text
+    try:
+        value = parse_quantity(text, NUMBER_UNITS[name][0])
+    except ValueError as error:
+        raise PatchfemError(f"--hold {name}={text}: {error}") from None
+    return abs(cell - value) <= EQUAL_TOL * abs(value)

@@ -59,7 +59,10 @@ def find_rounded_angle(line_load, flat, radius, modulus) -> float:
 
 
 def _compute_scaled_load(angle) -> float:
-    """Return the load 2 P R/(a_f^2 E*) at which pi/2 - phi_0 of the rounded punch is this angle."""
+    """Return the load 2 P R/(a_f^2 E*), without unit, at which a rounded punch touches over a given angle of its edges.
+
+    `angle` is pi/2 - phi_0 [rad], with phi_0 of `rounded_punch_half_width`.
+    """
     return subtract_sine(2 * angle) / (2 * np.cos(angle) ** 2)
 
 

@@ -152,7 +152,6 @@ def sweep(
     if by.collect:
         answer = run.collect_shards(sweep_scene, cases, target, not output.no_page)
     else:
-        # notes on invalid cases and on a bolted joint
         for text in (cases.warning, sweep_scene.note_bolted_joint()):
             if text and not output.quiet:
                 note(text)

@@ -195,7 +195,9 @@ def compile_optimised(function, arguments: tuple[object, ...]) -> tuple[BaseCont
         If this version of numba lacks the methods `LIBRARY_METHODS`.
     """
     if not all(hasattr(JITCodeLibrary, name) for name in LIBRARY_METHODS):
-        raise NotImplementedError
+        raise NotImplementedError(
+            f"this version of numba lacks some of {', '.join(LIBRARY_METHODS)}"
+        )
     options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
     dispatcher = CPUDispatcher(function.py_func, function.locals, options, OptimisedCompiler)
     argument_types = tuple(

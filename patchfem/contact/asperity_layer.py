@@ -22,7 +22,6 @@ from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_LAYER_STEPS = 60
-# Message if Newton's method fails
 DIVERGED_MESSAGE = (
     "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
     'deviation, or set law = "linear"'

@@ -18,7 +18,7 @@ MIN_RELATIVE_PRESSURE = 1e-13
 # Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
 MIN_PRESSURE_FRACTION = 1e-287
 # Largest ratio of first-row height to cell length for which `edge_offset` was measured
-MAX_ASPECT = 4.0
+MAX_CELL_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
 # triangles and quadrilaterals with aspects 0.3 to 2.4, within 0.03
 QUADRATIC_OFFSET = 0.345
@@ -66,7 +66,7 @@ def edge_offset(
     cell = (1 - fraction) * inner + fraction * outer
     if is_quadratic:
         return QUADRATIC_OFFSET * cell
-    aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_ASPECT)
+    aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_CELL_ASPECT)
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
 
 

@@ -103,7 +103,7 @@ class HolderPosition(NamedTuple):
 class StripModel(NamedTuple):
     """Model of equal strips that are pressed by one rigid holder.
 
-    - compliance: Compliance [m/N] of each strip; rigid pieces (0) need asperities.
+    - compliance: Compliance of the test pieces at the nodes of each strip. It may be zero (rigid pieces) with asperities.
     - layout: Nodes of the strips.
     - asperities: Pressure law of the asperities (`asperity_laws`); None if the pieces are bare.
     """

@@ -506,7 +506,8 @@ def build_first_set(sets, name):
 def compute_energy(sets, slot, heave, rotation):
     """Compute the energy of a preloaded contact, and its derivatives, for a contact set.
 
-    The load is N0 less the slope in heave, the moment M0 less that in rotation.
+    The load of the contact is the load at rest less the slope of the energy in heave, and its moment that at rest less
+    the slope in rotation.
 
     Parameters
     ----------
@@ -515,7 +516,7 @@ def compute_energy(sets, slot, heave, rotation):
     slot : int
         Slot of the contact set.
     heave, rotation : float
-        Heave -d [m] and rotation [rad] of the holder.
+        Motion of the holder from rest: heave [m], positive where the pieces separate, and rotation [rad].
 
     Returns
     -------

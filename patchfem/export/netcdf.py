@@ -147,7 +147,10 @@ def to_dataset(answer: Answer):
 
 
 def from_dataset(dataset, kind: str) -> Answer:
-    """Return the answer of a kind that has the arrays of an xarray.Dataset; without arrays for any other object."""
+    """Return an answer of the given kind, such as "run" or "sweep", with the arrays of an xarray.Dataset.
+
+    An object without variables, such as None, gives an answer without arrays.
+    """
     variables = getattr(dataset, "variables", {})
     data = {
         str(name): make_variable(tuple(map(str, one.dims)), np.asarray(one.values), one.attrs)

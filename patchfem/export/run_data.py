@@ -205,12 +205,6 @@ VARIABLES = {
     "coherence": Row("frequency", "1", "coherence of drive and output", "motion.spectra.coherence"),
     "gain_peak": Row("", "Hz", "frequency of the peak of H1", "measures.response_frequency.value"),
     "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "wear.columns.cycle"),
-    "wear_pressure_peak_at_edge": Row(
-        "wear_cycle",
-        "Pa",
-        "excess of a pressure peak at the edge of the contact over all pressures inside; else 0",
-        "wear.columns.pressure_peak_at_edge",
-    ),
 }
 # fields along the interface, by their names in `Result.fields`
 FIELDS = {

@@ -30,7 +30,7 @@ from .records import (
 
 MIN_STEPS = 12  # steps per shortest period of drive and load, so that no short slip is missed
 MIN_SCALE = 1e-3  # smallest magnitudes of a motion relative to those expected
-REVERSALS = 48  # reversal points that a law keeps
+REVERSALS = 512  # nested reversals that a law remembers, as in `points.laws`
 MAX_STEPS = 3e6  # steps of a run; with the comparison run they take up to 50 CPU seconds
 MAX_CYCLE_STEPS = 100  # further steps per cycle that a run may take
 DEFAULT_RTOL = 1e-7  # tolerance of a step

@@ -24,9 +24,9 @@ N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance lea
 
 @njit(**NJIT_KERNEL)
 def copy_values(source, target):
-    """Copy an array of one dimension.
+    """Copy a vector element by element.
 
-    An assignment of a slice would need reference counts.
+    Numba would count references for an assignment to a slice, and the kernels are compiled without reference counts.
     """
     for k in range(source.size):
         target[k] = source[k]

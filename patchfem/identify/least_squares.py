@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from scipy.special import stdtrit
 
 from ..core import NotConverged, Outcome
 from .descent import Descent, descend
@@ -77,6 +78,34 @@ class Fit:
         """Return this fit with evaluations and descents of an earlier search, which gave its only start."""
         counts = earlier.counts.add(self.counts)
         return replace(self, counts=counts, descent_rms=earlier.descent_rms)
+
+    def widen(self, changes, bounds) -> "Fit":
+        """Return this fit with intervals that contain the effect of numerical errors of the model.
+
+        An error that changes the residual by d shifts the parameters as in linear least squares, by (J^T J)^-1 J^T d. Both
+        ends of an interval move outwards by the sum of the shifts.
+
+        Parameters
+        ----------
+        changes : (m, r) array_like
+            Change of the residual by each of m errors, whose signs are not known.
+        bounds : sequence of (low, high)
+            Bounds of the n parameters.
+        """
+        intervals = self.intervals
+        rows, n = intervals.effects.shape
+        dof = max(intervals.rows - n, 1)
+        deviation = max(self.rms * np.sqrt(rows / dof), 1e-300)
+
+        # In standard deviations of the parameters, J is `effects`, and the inverse of J^T J is the correlation.
+        gradients = np.nan_to_num(intervals.effects).T @ np.transpose(changes) / deviation
+        shifts = np.abs(np.nan_to_num(intervals.correlation) @ gradients).sum(axis=1)
+        factors = 1 + shifts / stdtrit(dof, 0.975)
+        values = self.values[:, None]
+        ends = np.clip(
+            values + factors[:, None] * (intervals.ends - values), *np.transpose(bounds)[:, :, None]
+        )
+        return replace(self, intervals=replace(intervals, ends=ends))
 
 
 @dataclass(frozen=True, slots=True)

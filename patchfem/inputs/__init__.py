@@ -34,6 +34,7 @@ PUBLIC = {
     ),
     "packed": (
         "count_zip_bytes",
+        "open_arrays",
         "refuse_large_content",
     ),
     "records": (

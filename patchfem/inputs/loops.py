@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from .tables import TableFormat, read_columns, require_increasing_time
+from .tables import TableFormat, read_columns
 from .units import CHANNEL_UNITS
 
 READING_NAMES = ("force", "friction_ratio")  # quantities of which a loop has exactly one
@@ -87,15 +87,17 @@ def read_loop(path) -> Loop:
 
     # The slide is measured from the first row.
     displacement = values["displacement"]
-    time = values.get("time")
-    if time is not None:
-        require_increasing_time(f"{path}:", time)
     if not np.ptp(displacement):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
     if not values[quantity].any():
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so there is nothing to fit")
     return Loop(
-        path, time, displacement - displacement[0], values[quantity], quantity, columns.labels
+        path=path,
+        time=values.get("time"),
+        displacement=displacement - displacement[0],
+        reading=values[quantity],
+        quantity=quantity,
+        labels=columns.labels,
     )
 
 

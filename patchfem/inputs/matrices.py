@@ -5,7 +5,6 @@ direction, node, direction, number); .mat: MATLAB; .npz: arrays of NumPy, or one
 scipy.sparse.save_npz.
 """
 
-import zipfile
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +15,7 @@ from scipy import sparse
 from ..core import PatchfemError
 from . import matlab
 from .damage import list_some, refuse_damage
-from .packed import count_zip_bytes, refuse_large_content
+from .packed import open_arrays
 from .symmetric import SKEW_REFUSAL, symmetrize
 
 # Names of each matrix in a file with several matrices.
@@ -114,11 +113,11 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
     `matrix_name` is "stiffness", "mass" or "damping", whose usual names are in `MATRIX_NAMES`. `path` is for the
     message.
     """
-    short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
+    names = list(names)
+    short_names = {name.rpartition(".")[2].lower(): name for name in reversed(names)}
     for known in MATRIX_NAMES[matrix_name]:
         if known in short_names:
             return short_names[known]
-    names = list(names)
     if len(names) != 1:
         contents = list_some(names) or "none"
         raise PatchfemError(
@@ -262,10 +261,7 @@ def _read_numpy(path: Path, matrix_name: str) -> Matrix:
 
     The file is a sparse matrix as SciPy writes it, or contains arrays by name.
     """
-    if not zipfile.is_zipfile(path):
-        raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
-    refuse_large_content(path, count_zip_bytes(path), "save the matrices as sparse ones")
-    with np.load(path, allow_pickle=False) as file:
+    with open_arrays(path, "save the matrices as sparse ones") as file:
         if {"format", "shape", "data"} <= set(file.files):
             return _make_matrix(path, sparse.load_npz(path))
         return _make_matrix(path, file[_find_matrix_name(path, file.files, matrix_name)])

@@ -5,7 +5,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..exceptions import PatchfemError
-from ..scene.files import UNIVERSAL_EXTENSIONS
 from ..scene.keys.quantities import UNIT_FACTORS
 from .damage import shorten
 from .tables import TableFormat, find_factors, parse_number, read_text
@@ -68,14 +67,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
     PatchfemError
         If the file is not such a table; the message names the line.
     """
-    path = Path(path)
-    ending = path.suffix.lower()
-    if ending in (".mat", *UNIVERSAL_EXTENSIONS) and path.is_file():
-        raise _make_record_error(path)
     table = read_text(path, TABLE_FORMAT.contents)
-    columns = {name.lower() for name in table.names}
-    if "time" in columns and "frequency" not in columns:
-        raise _make_record_error(path)
     factors = find_factors(table, TABLE_FORMAT)
     unknown = [name for name in table.names if name not in (*COLUMN_UNITS, "flag")]
     if unknown:
@@ -87,19 +79,6 @@ def read_table(path: Path) -> list[MeasuredRow]:
     for number, cells in table.iterate_rows(skips_blank=True):
         rows.append(_parse_row(f"{path}:{number}: ", dict(zip(table.names, cells)), factors))
     return rows
-
-
-def _make_record_error(path: Path) -> PatchfemError:
-    """Return the error for a time record, `path`, that was given in place of a table of responses."""
-    options = ""
-    if path.suffix.lower() == ".mat":
-        options = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"'
-    return PatchfemError(
-        f"{path}: this file contains records over time; a rig is fitted to rows of frequency, input, "
-        "acceleration and displacement, or to frequency and damping against amplitude. Compute the "
-        f"latter from a free decay with `patchfem import {path} --decay{options} -o decay.csv`, then fit "
-        "to decay.csv"
-    )
 
 
 def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) -> MeasuredRow:

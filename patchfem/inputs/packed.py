@@ -4,6 +4,8 @@ import io
 import zipfile
 from pathlib import Path
 
+import numpy as np
+
 from ..core import PatchfemError
 
 MAX_UNPACKED_BYTES = 2**30  # largest size of the content of a packed file in bytes
@@ -24,6 +26,18 @@ def refuse_large_content(path, size: float, remedy: str) -> None:
     if size > MAX_UNPACKED_BYTES:
         limit = MAX_UNPACKED_BYTES >> 20
         raise PatchfemError(f"{path}: more than {limit} MiB after it is unpacked; {remedy}")
+
+
+def open_arrays(path: Path, remedy: str) -> np.lib.npyio.NpzFile:
+    """Open a .npz file, which reads an array when its name is asked for.
+
+    Raises PatchfemError if the file `path` is no archive, or if its content is too large; `remedy` is what the user can
+    do then.
+    """
+    if not zipfile.is_zipfile(path):
+        raise PatchfemError(f"{path} cannot be read (it is not an archive of NumPy arrays)")
+    refuse_large_content(path, count_zip_bytes(path), remedy)
+    return np.load(path, allow_pickle=False)
 
 
 def count_zip_bytes(file: Path | io.BytesIO) -> int:

@@ -79,13 +79,11 @@ def check_file(path: Path, remedy: str) -> None:
         raise PatchfemError(f"{path}: more than {MAX_BYTES >> 20} MiB; {remedy}")
 
 
-def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:
+def parse_requests(texts: Iterable) -> list[RequestedChannel]:
     """Parse texts of requests such as "force=Load cell [lbf]", separated by commas.
 
     Raises PatchfemError for a text that is no request, for an unknown quantity or unit, and for a
     quantity that is requested twice.
-
-    `quantities` are those that may be requested.
     """
     requests = {}
     parts = [part for text in texts for part in re.split(r",(?=\s*\w+\s*=)", text)]
@@ -97,9 +95,9 @@ def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> lis
                 '"force=Load cell [lbf]"'
             )
         name, source, unit = match.groups("")
-        if name not in quantities:
-            raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(quantities)}")
-        if unit and name in CHANNEL_UNITS:
+        if name not in CHANNEL_UNITS:
+            raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(CHANNEL_UNITS)}")
+        if unit:
             find_unit_factor(name, unit, "--map ")
         if name in requests:
             raise PatchfemError(f"--map {name}: given twice")
@@ -165,7 +163,9 @@ def select_channels(
         time = _find_shared_time(path, selected, channels if requests else [], channel_list)
     if time is not None:
         values = {"time": time, **values}
-    return make_records(path, values, notes, channel_list)
+    _check_values(path, values)
+    frozen = {name: frozen_array(column) for name, column in values.items()}
+    return Records(frozen, notes, channel_list)
 
 
 def find_channel(path, channels: list[Channel], source: str) -> Channel:
@@ -215,31 +215,11 @@ def describe_channels(channels: list[Channel]) -> str:
     return list_some(texts) or "no channel of numbers"
 
 
-def make_records(
-    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str
-) -> Records:
-    """Check arrays in SI and return them as `Records`.
+def _check_values(path, values: dict[str, np.ndarray]) -> None:
+    """Raise PatchfemError unless channels [SI] by quantity can be the records of a file.
 
-    Parameters
-    ----------
-    path : Path
-        File to read.
-    values : dict
-        Quantity -> (k,) array.
-    notes : list of str
-        Sentences for the user; may be extended.
-    channel_list : str
-        All channels of the file in words.
-
-    Returns
-    -------
-    Records
-
-    Raises
-    ------
-    PatchfemError
-        If the lengths differ, if there are fewer than two samples, if a value is not finite, or if time
-        does not rise.
+    They must have the same length, at least two samples and finite values, and times must rise. `path` is that of the
+    file.
     """
     sizes = {name: len(column) for name, column in values.items()}
     if len(set(sizes.values())) > 1:
@@ -260,8 +240,6 @@ def make_records(
 
     if "time" in values:
         require_increasing_time(f"{path}: sample ", values["time"], second_row=2)
-    frozen = {name: frozen_array(column) for name, column in values.items()}
-    return Records(frozen, notes, channel_list)
 
 
 def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -8,12 +8,10 @@ from ..core import PatchfemError
 from ..scene.files import UNIVERSAL_EXTENSIONS
 from ..scene.keys.quantities import UNIT_FACTORS
 from .records import select_channels
-from .tables import TableFormat, read_columns, require_increasing_time
+from .tables import TableFormat, read_columns
 from .units import CHANNEL_UNITS, SI_UNITS
 from .universal import make_channels, read_datasets
 
-# End of the message if there is no file of a drive signal
-FILE_REMEDY = "; drive.file is relative to the scene"
 # Columns of the table of a spectrum
 SPECTRUM_FORMAT = TableFormat(
     {
@@ -23,7 +21,6 @@ SPECTRUM_FORMAT = TableFormat(
     ("frequency", "level"),
     "frequency [Hz],level [g^2/Hz]",
     "a spectrum",
-    FILE_REMEDY,
 )
 
 
@@ -61,12 +58,10 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
             ("time", quantity),
             f"time [s],{quantity} [{SI_UNITS[quantity]}]",
             "a drive",
-            FILE_REMEDY,
         )
         values = read_columns(path, table).values
         time = values["time"]
         value = values[quantity]
-        require_increasing_time(f"{path}:", time)
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from .tables import TableFormat, read_columns, require_increasing_time
+from .tables import TableFormat, read_columns
 from .units import CHANNEL_UNITS
 
 # Columns of the file of a prescribed slide
@@ -42,7 +42,6 @@ def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
         COLUMN_NAMES,
         "time [s],displacement [um]",
         "a path",
-        "; slide.file is relative to the scene",
     )
 
     columns = read_columns(path, table)
@@ -61,7 +60,6 @@ def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
                 "import --zero`"
             )
     time, displacement = columns.values()
-    require_increasing_time(f"{path}:", time)
     if not np.any(displacement):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
     return time, displacement

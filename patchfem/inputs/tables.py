@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..disk.open_with_timeout import open_for_reading
 from ..exceptions import Missing, PatchfemError
 from .damage import shorten
-from .units import normalize_unit
+from .units import find_unit_factor
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,14 +37,12 @@ class TableFormat(NamedTuple):
     - required: columns that must be there. "displacement slide" accepts either name.
     - example: header of such a table.
     - contents: what the file is, such as "a drive".
-    - remedy: end of the message if there is no file.
     """
 
     units: Mapping
     required: tuple[str, ...]
     example: str
     contents: str
-    remedy: str = ""
 
 
 class Columns(NamedTuple):
@@ -110,9 +108,10 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
     PatchfemError
         If a quotation mark is not closed.
     """
+    cells = line.split(separator)
     try:
-        rows = csv.reader([line], delimiter=separator, skipinitialspace=True)
-        cells = next(rows) if '"' in line else line.split(separator)
+        if '"' in line:
+            cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     except csv.Error as error:
         raise PatchfemError(
             f"{location}: the quotation marks in this row cannot be read ({error})"
@@ -120,15 +119,15 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
+def read_text(path: Path, contents: str) -> TextTable:
     """Read a table whose columns may have any names.
 
     Parameters
     ----------
     path : Path
         File to read.
-    contents, remedy : str
-        What the file is, such as "a drive", and the end of the message if there is no file.
+    contents : str
+        What the file is, such as "a drive".
 
     Raises
     ------
@@ -146,7 +145,7 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
             )
         text = data.decode("utf-8-sig")
     except FileNotFoundError:
-        raise Missing(f"{path}: there is no such file{remedy}") from None
+        raise Missing(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
@@ -168,8 +167,10 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     Raises PatchfemError if the header is not that of the format, `form`.
     """
     names = table.names
-    quoted = shorten(table.header, MAX_LINE_LENGTH)
-    expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{quoted}'"
+    expected = (
+        f"{table.path}:1: a header like `{form.example}` is needed, not "
+        f"'{shorten(table.header, MAX_LINE_LENGTH)}'"
+    )
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")
 
@@ -181,12 +182,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
             continue
         if unit is None and "" not in units:
             raise PatchfemError(f"{expected} ({name} without a unit)")
-        factors[name] = units.get(normalize_unit(unit or ""))
-        if factors[name] is None:
-            known = ", ".join(filter(None, units))
-            raise PatchfemError(
-                f"{table.path}:1: {name} [{shorten(unit)}]: unknown unit; use one of {known}"
-            )
+        factors[name] = find_unit_factor(name, unit or "", f"{table.path}:1: ", units)
 
     # An entry such as "displacement slide" is met by either column.
     absent = [text.split()[0] for text in form.required if not set(text.split()) & set(names)]
@@ -249,12 +245,12 @@ def read_columns(path, form: TableFormat) -> Columns:
     Missing
         If there is no file.
     PatchfemError
-        If the file is not such a table; the message names the line.
+        If the file is not such a table, or if its times do not rise; the message names the line.
     """
     from ..core import frozen_array
 
     path = Path(path)
-    table = read_text(path, form.contents, form.remedy)
+    table = read_text(path, form.contents)
     factors = find_factors(table, form)
     if len(table.lines) < 2:
         raise PatchfemError(
@@ -262,10 +258,7 @@ def read_columns(path, form: TableFormat) -> Columns:
             f"not {len(table.lines)}"
         )
 
-    # Cells are read one by one only if there is text among them, or a cell at fault to name.
-    values = {} if len(factors) < len(table.names) else _read_numbers(table, factors)
-    if values:
-        return Columns(values, {})
+    values = {}
     labels = {}
     rows = [cells for _, cells in table.iterate_rows()]
     for name, cells in zip(table.names, zip(*rows)):
@@ -276,30 +269,9 @@ def read_columns(path, form: TableFormat) -> Columns:
         for line, cell in enumerate(cells, 2):
             numbers.append(parse_number(f"{path}:{line}: {name}", cell, factors[name]))
         values[name] = frozen_array(numbers)
+    if "time" in values:
+        require_increasing_time(f"{path}:", values["time"])
     return Columns(values, labels)
-
-
-def _read_numbers(table: TextTable, factors: dict[str, float]) -> dict[str, np.ndarray]:
-    """Return the columns (k,) of a table that contains only numbers in range, in SI, and else nothing.
-
-    `factors` are those to SI by column. NumPy's reader takes a tenth of the time of `parse_number`, but does not say
-    which cell is wrong.
-    """
-    import numpy as np
-
-    from ..core import frozen_array
-
-    try:
-        values = np.loadtxt(table.lines, delimiter=table.separator, comments=None, ndmin=2)
-    except ValueError:
-        return {}
-    # NumPy leaves out blank lines.
-    if values.shape != (len(table.lines), len(factors)):
-        return {}
-    values = values * list(factors.values())
-    if not (np.abs(values) <= MAX_VALUE).all():
-        return {}
-    return {name: frozen_array(column) for name, column in zip(factors, values.T)}
 
 
 def require_increasing_time(place: str, time: np.ndarray, second_row: int = 3) -> None:

@@ -5,6 +5,7 @@ without a unit.
 """
 
 import re
+from collections.abc import Mapping
 
 from ..exceptions import PatchfemError
 from ..scene.keys import quantities
@@ -32,10 +33,10 @@ _UNIT_SYNONYMS = {
     "newton": "N",
     "newtons": "N",
 }
-# Spellings of "per second squared" and of "per second" after a unit.
-_RATE_UNIT_PATTERNS = {
-    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2| s-2| s\^-2)"),
-    "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),
+# Spellings of "per second squared" and of "per second" at the end of a unit.
+_RATE_PATTERNS = {
+    "/s^2": re.compile(r" ?/ ?s(?:ec)?(?:\^|\*\*)?2$| s\^?-2$"),
+    "/s": re.compile(r" ?/ ?s(?:ec)?$| s\^?-1$"),
 }
 
 
@@ -43,24 +44,26 @@ def normalize_unit(text: str) -> str:
     """Spell the text of a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = quantities.normalize_unit(text)
     text = _UNIT_SYNONYMS.get(text.lower(), text)
-    for ending, pattern in _RATE_UNIT_PATTERNS.items():
-        match = pattern.fullmatch(text)
-        if match:
-            return match[1] + ending
+    for ending, pattern in _RATE_PATTERNS.items():
+        text = pattern.sub(ending, text)
     return text
 
 
-def find_unit_factor(quantity: str, unit: str, location: str = "") -> float:
+def find_unit_factor(
+    quantity: str, unit: str, location: str, units: Mapping[str, float] | None = None
+) -> float:
     """Return the factor that converts a quantity from a unit to SI.
 
     Parameters
     ----------
     quantity : str
-        Key of `CHANNEL_UNITS`.
+        Name for the error message; without `units`, key of `CHANNEL_UNITS`.
     unit : str
         Unit in any spelling that `normalize_unit` knows.
     location : str
         Beginning of the error message.
+    units : Mapping, optional
+        Factors to SI by unit; default: those of the quantity in `CHANNEL_UNITS`.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def find_unit_factor(quantity: str, unit: str, location: str = "") -> float:
     PatchfemError
         If the quantity does not have this unit.
     """
-    units = CHANNEL_UNITS[quantity]
+    units = units or CHANNEL_UNITS[quantity]
     name = normalize_unit(unit)
     if name not in units:
         raise PatchfemError(

@@ -95,9 +95,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
 
 
 def make_responses(columns, steps: int) -> np.ndarray:
-    """Return the responses (c, LEVELS + 1, 2, 5) of slide and velocity in a whole step and its halves.
-
-    The last axis has slide and velocity at the start, and the coefficients of accelerations 1, t and t^2/2.
+    """Return slide and velocity after a step of each case per unit of what moves it, for the march of cases.
 
     Parameters
     ----------
@@ -105,6 +103,12 @@ def make_responses(columns, steps: int) -> np.ndarray:
         Numbers of the cases, in the order of `Number`.
     steps : int
         Whole steps per cycle.
+
+    Returns
+    -------
+    (c, LEVELS + 1, 2, 5) array
+        Axis 1 is the number of halvings of the step. Axis 2 has slide and velocity at its end. Axis 3 has what moves
+        them: slide and velocity at the start, and accelerations 1, t and t^2/2.
     """
     n = columns.shape[1]
     matrix = np.zeros((n, 5, 5))

@@ -10,7 +10,9 @@ from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
 N_MEMORY = 6  # rows of memory of a point, without a stack of reversals
-REVERSALS = 48  # reversals that parallel sliders remember
+# Nested reversals that parallel sliders remember. A decay by 3 % from one to the next has reached 2e-7 of its start. After
+# decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
+REVERSALS = 512
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
@@ -129,8 +131,10 @@ def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     return _pack(Law.INTERLOCK, (stiffness, wavelength))
 
 
-def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
+def make_point_law(friction, load) -> PointLaw:
     """Return the law that the keys of a table [friction] define, under a load [N].
+
+    Bonds of the law "nonlocal" do not grow.
 
     Parameters
     ----------
@@ -138,9 +142,6 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         Keys in SI units; floats, or arrays (c,) of the values of c points.
     load : float or (c,)
         Normal load [N].
-    bonds : Bonds, optional
-        Bonds of the law "nonlocal" with their rest speed; without them the bonds have the keys `static` and
-        `bond_length` alone.
     """
     name = friction.law
     load = np.maximum(load, MIN_LOAD)
@@ -158,7 +159,7 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         return make_jenkins(friction.static, length, load)
 
     if name == "nonlocal":
-        return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
+        return make_bonds(Bonds(friction.static, friction.bond_length), load)
 
     if name == "iwan":
         length = max_yield_displacement(limit, friction.stiffness, friction.chi, friction.beta)

@@ -31,7 +31,7 @@ from ..friction.bonds.point_kernels import bond_mean
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
-from .law_rows import Law
+from .law_rows import Law, Masing
 from .march_rows import (
     DONE,
     EXCEEDS_TRAVEL,
@@ -138,9 +138,23 @@ def sum_triples(first, second, third):
 
 
 @njit(**NJIT_CALL)
-def copy_memory(source, target):
-    """Copy the memory (l, m) of all points."""
-    for k in range(source.shape[0]):
+def copy_memory(numbers, source, target):
+    """Copy the memory (l, m) of all points, without the rows that no stack of reversals uses.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points. Row 0 is the `Law`.
+    source : (l, m) array
+        Memory that is copied.
+    target : (l, m) array
+        Copy (output).
+    """
+    n_rows = min(source.shape[0], int(Masing.STACK))
+    for j in range(source.shape[1]):
+        if numbers[0, j] == Law.MASING:
+            n_rows = max(n_rows, Masing.STACK + 2 * int(source[Masing.COUNT, j]))
+    for k in range(n_rows):
         for j in range(source.shape[1]):
             target[k, j] = source[k, j]
 
@@ -213,7 +227,7 @@ def prepare_points(system, h):
     count = points.port.size
 
     # Trials since the last accepted step may have changed the memory.
-    copy_memory(points.memory, points.trial)
+    copy_memory(points.numbers, points.memory, points.trial)
     if options.has_loads:
         for j in range(count):
             start = values[Point.START_LOAD, j]
@@ -909,7 +923,7 @@ def commit(system, h):
                 press(points.numbers, points.trial, j, middle, values[Point.END_LOAD, j])
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
 
-    copy_memory(points.trial, points.memory)
+    copy_memory(points.numbers, points.trial, points.memory)
 
     # The rates of the last three steps extrapolate those of the next one.
     shear = points.shear
@@ -1009,7 +1023,7 @@ def relax_pieces(system):
         step = Step(slide, 0.0, 0.0, 0.0, 0.0)
         advance(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
 
-    copy_memory(points.trial, points.memory)
+    copy_memory(points.numbers, points.trial, points.memory)
     for k in range(r):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
 

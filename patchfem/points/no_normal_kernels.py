@@ -6,10 +6,9 @@ from ..compiled.jit import njit
 
 @njit(**NJIT_CALL)
 def find_set(sets, slot, approach, rotation):
-    """Return -1, the slot of no contact set.
+    """Return -1, which says that there is no contact set.
 
-    The arguments are the contact sets, the slot of the present one, the approach [m] and the rotation [rad], which are
-    not used.
+    The arguments are those of `press_kernels.find_set`, and are not used.
     """
     return -1
 

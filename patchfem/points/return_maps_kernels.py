@@ -31,6 +31,8 @@ LIST          mu, length [m]                                       see `lists_ke
 from math import exp, sin, sqrt, tanh
 from typing import NamedTuple
 
+import numpy as np
+
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
@@ -437,8 +439,18 @@ def _walk(numbers, memory, j, dq, commits):
             n = 0
             virgin = -1.0
         if Masing.STACK + 2 * n + 4 > memory.shape[0]:
-            # The stack is full: the oldest inner loop is given up.
-            for k in range(Masing.STACK + 2, Masing.STACK + 2 * n - 4):
+            # The stack is full: the loop of two successive reversals is given up that is closest to those around and
+            # inside it, because its absence changes the later branches least.
+            least = np.inf
+            first = Masing.STACK + 2
+            for k in range(Masing.STACK + 2, Masing.STACK + 2 * n - 4, 2):
+                gap = abs(memory[k + 2, j] - memory[k - 2, j]) * abs(
+                    memory[k + 4, j] - memory[k, j]
+                )
+                if gap < least:
+                    least = gap
+                    first = k
+            for k in range(first, Masing.STACK + 2 * n - 4):
                 memory[k, j] = memory[k + 4, j]
             n -= 2
         memory[Masing.SLIDE, j] = q

@@ -11,6 +11,7 @@ PUBLIC = {
     "coarser": (
         "CoarserRuns",
         "estimate_errors",
+        "list_step_runs",
         "second_order_errors",
     ),
     "decay_curve": (
@@ -25,7 +26,6 @@ PUBLIC = {
     ),
     "errors": (
         "ERROR_MEASURES",
-        "FrictionScale",
         "MAX_ORDER",
         "absolute_change",
         "add_errors",

@@ -86,3 +86,27 @@ def estimate_errors(
             (coarser.source, coarser.rule(reference_values, *map(solve_values, coarser.runs)))
         )
     return errors
+
+
+def list_step_runs(steps: int, fine, coarse_runs: ComparisonRuns, solved_runs) -> list[StepRun]:
+    """Return a StepRun of a run and of each run with fewer steps, from fine to coarse.
+
+    Without coarse runs in time, the list contains only the run itself.
+
+    Parameters
+    ----------
+    steps : int
+        Steps per cycle of the run.
+    fine
+        The run, with its CPU time `seconds` [s] and its measures `values` by name.
+    coarse_runs : list of CoarserRuns
+        Settings of the coarse runs, those in time first.
+    solved_runs : dict
+        Coarse runs by settings.
+    """
+    runs = [StepRun(steps, fine.seconds, fine.values)]
+    if coarse_runs and coarse_runs[0].source == "steps":
+        for settings in coarse_runs[0].runs:
+            run = solved_runs[settings]
+            runs.append(StepRun(settings.steps, run.seconds, run.values))
+    return runs

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import ErrorCauses, Measure
+from ..core import Measure
 from .measures import Measures, Values
 from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
@@ -27,8 +27,6 @@ MAX_ORDER = 2.0
 # Largest plausible ratio of two successive changes (order 4); beyond it, the last change is accidentally
 # small.
 MAX_CHANGE_RATIO = 16.0
-# Lowest observed order of convergence at which an error is assumed to decrease with the step size.
-MIN_OBSERVED_ORDER = 0.5
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
@@ -198,7 +196,7 @@ class FrictionScale(NamedTuple):
     cycle_work: float
 
 
-def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Values:
+def friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
     The error of a measure is `fraction` times a reference value: the friction limit, the bond
@@ -211,9 +209,14 @@ def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Va
         Values of the measures by name.
     fraction : float
         Error of the friction force relative to the friction limit [1].
-    scale : FrictionScale
-        Reference values of force, length and work.
+    law
+        Law with its coefficient of static friction and its bond length [m].
+    load : float
+        Largest normal load [N].
+    works : (2,)
+        Sums of the absolute friction work in the whole run and in a cycle [J].
     """
+    scale = FrictionScale(law.static, law.static * load, law.bond_length, *works)
     errors = {}
     for name, value in values.items():
         find_scale = find_definition(name).friction_scale
@@ -222,39 +225,9 @@ def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Va
     return errors
 
 
-def observed_orders(*values: Values) -> Values:
-    """Return the observed order of convergence of each measure with the time step, at most 2.
-
-    Parameters
-    ----------
-    *values : dict
-        Measures by name of three runs, with all, a half and a quarter of the steps; with fewer runs, the
-        result is empty.
-
-    Returns
-    -------
-    dict
-        Orders by name, without measures whose order is below MIN_OBSERVED_ORDER, because more steps
-        may not make these more accurate, or that are missing in a run.
-    """
-    if len(values) < 3:
-        return {}
-    fine, half, quarter = values
-    last_changes = absolute_change(fine, half)
-    previous_changes = absolute_change(half, quarter)
-    orders = {}
-    for name in last_changes:
-        if last_changes[name] > 0 and previous_changes.get(name, 0.0) > 0:
-            order = float(np.log2(previous_changes[name] / last_changes[name]))
-            if order >= MIN_OBSERVED_ORDER:
-                orders[name] = min(order, MAX_ORDER)
-    return orders
-
-
 def add_errors(
     values: Values,
     errors=(),
-    step_values=(),
     *,
     min_relative_error: float = 0.0,
     size: float = np.inf,
@@ -270,8 +243,6 @@ def add_errors(
         Values by name.
     errors : sequence of (str, dict)
         Error sources with errors by name (`coarser.estimate_errors`).
-    step_values : sequence of dict
-        Values of the runs with decreasing numbers of time steps, from fine to coarse.
     min_relative_error : float
         Relative error that is added [1].
     size : float
@@ -279,18 +250,18 @@ def add_errors(
     """
     measures = {}
     amplitude = values.get(AMPLITUDE, 0.0)
-    for name, causes in split_errors(values, errors, step_values).items():
+    for name, parts in split_errors(values, errors).items():
         value = float(values[name])
-        error = total_error(name, value, causes.parts.values(), min_relative_error, amplitude)
+        error = total_error(name, value, parts.values(), min_relative_error, amplitude)
         floor = float(error_floor(name, size))
         measures[name] = Measure(
-            value, find_definition(name).unit, float(error), floor, causes=causes
+            value, find_definition(name).unit, float(error), floor, parts=parts
         )
     return measures
 
 
-def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCauses]:
-    """Return the contributions to the error of each measure, and its order of convergence.
+def split_errors(values: Values, errors) -> dict[str, Values]:
+    """Return the contributions to the error of each measure by source.
 
     If a measure is missing in a coarse run, its error is its absolute value.
 
@@ -300,17 +271,14 @@ def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCause
         Values by name.
     errors : sequence of (str, dict)
         Error sources with errors by name (`coarser.estimate_errors`).
-    step_values : sequence of dict
-        Values of the runs with decreasing numbers of time steps, from fine to coarse.
     """
-    orders = observed_orders(*step_values)
-    causes = {}
+    parts_by_name = {}
     for name, value in values.items():
         parts = {}
-        for cause, errors_by_name in errors:
-            parts[cause] = parts.get(cause, 0.0) + errors_by_name.get(name, abs(value))
-        causes[name] = ErrorCauses(parts, orders.get(name))
-    return causes
+        for source, errors_by_name in errors:
+            parts[source] = parts.get(source, 0.0) + errors_by_name.get(name, abs(value))
+        parts_by_name[name] = parts
+    return parts_by_name
 
 
 def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Measures:

@@ -15,29 +15,20 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
-from ..response import rows
+from ..response import errors, rows
 from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
 from .results.interfaces import Face, merge_findings
 from .results.result import Advice, Finding, Result
-from .rig import costs, engines
 
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
 PROPOSED_TOLERANCE_RATIO = 0.1
-# Largest number of halvings of the time step to which the observed order is extrapolated.
-MAX_EXTRAPOLATED_HALVINGS = 4
-# Fraction of the allowed error that the time steps may have if the other causes alone exceed it.
-MIN_STEP_ERROR_FRACTION = 0.2
+# Largest number of halvings of a time step that the scene fixes; with more of them, the key is to be left out.
+MAX_FIXED_HALVINGS = 4
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.
 MAX_PROPOSED_STRIPS = 64
-# Measures whose error is of first order in the width of the strips: the pressure peak of the outermost strip is
-# computed at its centre.
-FIRST_ORDER_MEASURES = (
-    "pressure_peak",
-    "loaded_fraction",
-)
 # Measures from samples, whose error does not depend on the number of harmonics.
 SAMPLED_MEASURES = (
     "stick_fraction",
@@ -191,9 +182,8 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
 
 
 def _advise_strips(patch_model, excess: Mapping) -> Advice:
-    """Return the advice to use as many strips as the tolerance requires."""
-    orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
-    ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
+    """Return the advice to use as many strips as second order requires, at least twice as many."""
+    ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_ORDER))
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_PROPOSED_STRIPS:
         return NO_ADVICE
@@ -272,44 +262,21 @@ def _advise_on_motion(missed: Missed) -> Advice:
 
 
 def _advise_steps(missed: Missed) -> Advice | None:
-    """Return the advice to use as many steps per cycle as the order of convergence requires."""
+    """Return the advice to use as many steps per cycle as second order requires, or to leave out what fixes too few."""
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
-    model = missed.model
-    name = missed.worst
-    parts, order = missed.measures[name].causes
+    halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_ORDER)
 
     # A rig doubles its steps while this reduces the errors, or needs none, unless the scene fixes them.
-    fixed = [key for key in ("method", "steps_per_cycle") if key in model.accuracy.model_fields_set]
-    can_choose = model.kind == "rig" and (
-        model.accuracy.steps_per_cycle is not None
-        or (fixed and not engines.HYBRID.find_unsupported_feature(model))
-    )
-
-    clause = ""
-    if order is None:
-        clause = (
-            f"the results with {steps // 4}, {steps // 2} and {steps} steps per cycle show no order of convergence of "
-            f"{name}; "
-        )
-    else:
-        # The steps may have what the other causes leave of the allowed error.
-        total = sum(parts.values())
-        allowed = total / missed.excess[name]
-        target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
-        halvings = max(1, ceil(log2(parts["steps"] / target) / order))
-        if halvings <= MAX_EXTRAPOLATED_HALVINGS or not can_choose:
-            proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
-            return Advice.set_key(STEPS_KEY, proposed)
-
-    if can_choose:
+    model = missed.model
+    fixed = ["method"] * (model.accuracy.method != "auto")
+    if model.accuracy.steps_per_cycle is not None:
+        fixed.append("steps_per_cycle")
+    if model.kind == "rig" and fixed and halvings > MAX_FIXED_HALVINGS:
         keys = " and ".join(f"accuracy.{key}" for key in fixed)
-        return Advice(f"{clause}leave out {keys}; the steps then follow from the tolerance", keys)
-    if 2 * steps > costs.MAX_MARCH_STEPS:
-        return Advice(clause + USE_ERROR_ADVICE)
-    text = f"{clause}try {STEPS_KEY} = {2 * steps}, or {USE_ERROR_ADVICE}"
-    return Advice(text, STEPS_KEY, 2 * steps)
+        return Advice(f"leave out {keys}; the steps then follow from the tolerance", keys)
+    return Advice.set_key(STEPS_KEY, steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS))
 
 
 def _advise_motion_mesh(missed: Missed) -> Advice | None:

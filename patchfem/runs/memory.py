@@ -17,7 +17,6 @@ FIXED_BYTES = 160e6  # packages and compiled code [bytes]
 # Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
 NODE_BYTES = {True: 4.6e3, False: 8.1e3}
 STRIP_NODE_BYTES = 3e3  # per strip and interface node [bytes]
-SHEAR_NODE_BYTES = 24.0  # per shear mode and interface node [bytes]
 SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
 MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
@@ -84,9 +83,6 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     if strips := max((layer.count for layer in layers if layer is not None), default=0):
         size = STRIP_NODE_BYTES * strips * points
         parts.append(MemoryPart(size, f"{strips} strips of them", "lower contact.strips.count"))
-    if n_shear := plan.unknowns.get("shear_modes"):
-        size = SHEAR_NODE_BYTES * n_shear * points
-        parts.append(MemoryPart(size, f"{n_shear} shear modes", "lower accuracy.shear_modes"))
 
     # The histories of a motion count by its stored samples, which the scene may set by the steps.
     has_steps = model.accuracy.steps_per_cycle is not None

@@ -178,7 +178,7 @@ def _make_plan(model: Model) -> Plan:
         if model.has_bolted_patch:
             chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
-        patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
+        patch_sentences += patch_plan.describe_tilt(groups, model.patch)
 
     interfaces = rig.friction.interfaces if rig is not None else ()
     for number, interface in enumerate(interfaces):
@@ -201,7 +201,6 @@ def _make_plan(model: Model) -> Plan:
     if rig is not None:
         engine = engines.choose_engine(model).name
         unknowns |= of_rig.count_unknowns(model)
-        law_sentences += of_rig.describe_printed_law(model)
     if model.kind == "bench":
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts

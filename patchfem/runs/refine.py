@@ -150,7 +150,7 @@ def split_error(measure: Measure, name: str) -> Values:
     """Return the contributions to the error of a measure by axis; that of a static measure is the mesh."""
     if name in PATCH_TABLE:
         return {"mesh": measure.error or 0.0}
-    return {} if measure.causes is None else measure.causes.parts
+    return measure.parts or {}
 
 
 def find_axis(measure: Measure, name: str) -> str:
@@ -272,11 +272,10 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
             continue
         error = earlier.error / ERROR_RATIO
         if error > measure.error and np.isfinite(error):
-            causes = measure.causes
-            if causes is not None and earlier.causes is not None:
-                parts = {axis: one / ERROR_RATIO for axis, one in earlier.causes.parts.items()}
-                causes = causes._replace(parts=parts)
-            bounded[name] = replace(measure, error=error, causes=causes)
+            parts = measure.parts
+            if parts is not None and earlier.parts is not None:
+                parts = {axis: one / ERROR_RATIO for axis, one in earlier.parts.items()}
+            bounded[name] = replace(measure, error=error, parts=parts)
     return bounded
 
 

@@ -165,7 +165,7 @@ def _suggest_name(
     """
     if _is_table(raw[key]):
         table = _suggest_table(model, key, raw[key])
-        # A table with another name is no second one of a table that the scene has.
+        # A table that the scene has already is proposed only for a name that is spelt similarly.
         return table if table not in raw or _list_similar(key, [table]) else ""
     if not table_key:
         # --set may name a key without its table; the key then belongs to a table that has a key of this name.
@@ -186,8 +186,9 @@ def _suggest_name(
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
 
-    # The first candidate, from the best reason to the weakest: a similar spelling, a common word, the only key that is
-    # needed, a similar key for another kind of value, a similar key that is there already.
+    # The first candidate, from the best reason to the weakest: a similar spelling; a common word; the first key that is
+    # needed, which for --set must be the only one; a similar key for another kind of value; a similar key that is there
+    # already.
     word = key.lower()
     words = set(word.split("_"))
     return next(

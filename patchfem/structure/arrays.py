@@ -6,16 +6,15 @@ the slide of the first interface; force (n,), by default the output. Other array
 
 from math import prod
 from pathlib import Path
-from zipfile import is_zipfile
 
 import numpy as np
-from numpy.lib import format as npy
 from scipy.sparse import issparse
 
 from ..core import ModalBasis, PatchfemError
 from ..effects import MAX_COORDINATES
 from ..inputs.damage import refuse_damage
 from ..inputs.matlab import read_variables
+from ..inputs.packed import open_arrays
 from ..inputs.symmetric import to_real
 from ..scene.keys.removed import describe_removed
 from . import masses, matrices
@@ -23,8 +22,8 @@ from .modes import PATCH_MOTIONS
 
 REMOVED_ARRAYS = ("omega", "frequency")  # arrays of a file of modes, which is no longer read
 ARRAY_NAMES = ("M", "K", "C", "slide", "base", "output", "force", *PATCH_MOTIONS, *REMOVED_ARRAYS)
-# Largest size of a number [bytes], that of a complex number of double precision
-MAX_NUMBER_BYTES = 16
+# What to do with a file of arrays that is too large
+TOO_LARGE_REMEDY = "give a reduced model, or only the modes in the frequency range of the drive"
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -46,46 +45,25 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         If the file cannot be read or contains objects.
     """
     is_numpy = path.suffix.lower() == ".npz"
-    if is_numpy and path.is_file() and not is_zipfile(path):
-        raise PatchfemError(f"{path} cannot be read (it is not an archive of NumPy arrays)")
     with refuse_damage(f"{path} cannot be read", "; plain arrays are needed, not objects"):
         if is_numpy:
-            with np.load(path, allow_pickle=False) as file:
-                return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
-        variables = read_variables(path)
+            with open_arrays(path, TOO_LARGE_REMEDY) as file:
+                variables = {name: file[name] for name in ARRAY_NAMES if name in file}
+        else:
+            variables = read_variables(path)
 
-    # MATLAB has no vectors: a matrix with a single row or column stands for one.
     arrays = {}
     for name in filter(variables.__contains__, ARRAY_NAMES):
         values = variables[name]
-        _refuse_large(name, values.shape)
+        if prod(values.shape) > MAX_COORDINATES**2:
+            raise PatchfemError(
+                f"{name} of shape {'x'.join(map(str, values.shape))} is larger than {MAX_COORDINATES} coordinates "
+                f"squared; {TOO_LARGE_REMEDY}"
+            )
         full = values.toarray() if issparse(values) else values
-        arrays[name] = full.ravel() if 1 in full.shape else full
+        # MATLAB has no vectors: a matrix with a single row or column stands for one.
+        arrays[name] = full.ravel() if 1 in full.shape and not is_numpy else full
     return arrays
-
-
-def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
-    """Read the array `name` of a .npz file, whose header is checked first.
-
-    NumPy reserves the memory that the header states, so a damaged file could exhaust it.
-    """
-    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    with file.zip.open(f"{name}.npy") as member:
-        shape, _, dtype = readers[npy.read_magic(member)](member)
-    _refuse_large(name, shape, dtype.itemsize)
-    return file[name]
-
-
-def _refuse_large(name: str, shape: tuple[int, ...], itemsize: int = MAX_NUMBER_BYTES) -> None:
-    """Raise PatchfemError if an array is larger than the matrices of the largest permitted rig.
-
-    `name` and `shape` are those of the array, and `itemsize` [bytes] is the size of one number.
-    """
-    if prod(shape) * itemsize > MAX_COORDINATES**2 * MAX_NUMBER_BYTES:
-        raise PatchfemError(
-            f"{name} of shape {'x'.join(map(str, shape))} is larger than {MAX_COORDINATES} coordinates "
-            "squared; give a reduced model, or only the modes in the frequency range of the drive"
-        )
 
 
 def build_basis(

@@ -49,8 +49,6 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
         )
     if basis.shapes is None:
         return values
-    if n_named == n:
-        return np.linalg.solve(basis.shapes, values)
     return np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
 
 

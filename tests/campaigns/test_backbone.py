@@ -105,18 +105,24 @@ def test_exact_balanced_motion_repeats_after_a_cycle():
 
 
 def test_exact_rigid_friction_damping_agrees_with_closed_form():
-    """The damping of a block on Coulomb friction agrees with closed forms within 2 %.
+    """Frequency and damping of a block on Coulomb friction agree with their closed form within 1e-9.
 
-    The amplitude falls by 2 h = 2 F/k per half cycle, and the balance has the loss over 2 pi m
-    omega^2 A^2; the higher harmonics that it leaves out are of the order of h/A.
+    At an amplitude A, with h = F/k lost per half period, the gain G = (A/h + 1)/(A/h - 1) gives the net damping ratio -z
+    by pi z/sqrt(1 - z^2) = ln G. Under a static friction of four times F the block sticks at small amplitudes.
     """
     h = 30 / (0.5 * OMEGA**2)
-    backbone = compute_backbone(build_block('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
+    amplitudes = h * np.array([3, 10, 200])
+    backbone = compute_backbone(build_block('law = "coulomb"'), "", amplitudes)
     balance = backbone.curves["balance"]
+    sticking = build_block('law = "coulomb"\nkinetic = 0.075')
+    assert compute_backbone(sticking, "", [0.6 * h, 20 * h]).curves["balance"].amplitude == 20 * h
     assert list(backbone.missing) == ["quasi-static"]
     assert "has no finite stiffness" in backbone.missing["quasi-static"]
-    first = 2 * h / (np.pi * balance.amplitude) + 0.002
-    assert balance.damping == pytest.approx(first, rel=2e-2)
+    gain = np.log((amplitudes + h) / (amplitudes - h))
+    net_ratio = gain / np.hypot(np.pi, gain)
+    omega = OMEGA * np.sqrt(1 - net_ratio**2)
+    assert balance.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-9)
+    assert balance.damping == pytest.approx((net_ratio + 0.002) * OMEGA / omega, rel=1e-9)
     assert backbone.exponents.micro is None and backbone.exponents.gross == pytest.approx(1)
 
 
@@ -381,6 +387,23 @@ def test_bonds_without_closed_loop_state_the_method_to_use():
     (reason,) = compute_backbone(bonds, "", [3e-7], ("balance",)).missing.values()
     assert reason.endswith("; use --method quasi-static")
     assert not compute_backbone(bonds, "", [3e-7], ("quasi-static",)).missing
+
+
+def test_always_loops_of_growing_bonds_run_until_they_are_steady():
+    """Bonds that grow over tens of cycles have the frequency that follows from the last of 600 cycles of a bench."""
+    law = (
+        'law = "nonlocal"\nkinetic = 0.2\nbond_length = "1 um"\nrest_growth = "0.02 m/s^2"\n'
+        'slip_growth = "20 um"\nrest_speed = "1 mm/s"'
+    )
+    backbone = compute_backbone(build_block(law), "", [2e-6], ("quasi-static",))
+    frequency = float(backbone.frequencies.stuck)
+    slide = f'[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "{frequency!r} Hz"\ncycles = 600\n'
+    bench = make_shaken_block(law).partition("[structure]")[0] + slide
+    stiffness = pf.run(bench).measures["secant_stiffness"].value
+    curve = backbone.curves["quasi-static"]
+    omega = np.sqrt(OMEGA**2 + stiffness / 0.5)
+    assert curve.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
+    assert curve.frequency_error < 1e-4 * curve.frequency
 
 
 def test_quasi_static_curve_ends_at_maximum_force():

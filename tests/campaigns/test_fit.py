@@ -19,6 +19,10 @@ from patchfem.scene import load, loads
 LOAD = 100.0
 POINT = '[normal]\nload = "100 N"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
+PATCH = (
+    '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = "2 mm"\n'
+    'substrate = "Ti-8Al-1Mo-1V"\n'
+)
 LAWS = {
     "coulomb": '[friction]\nlaw = "coulomb"\nstatic = 0.5\n',
     "elastic-plastic": '[friction]\nlaw = "elastic-plastic"\nstatic = 0.5\nbond_length = "5 um"\n',
@@ -103,14 +107,24 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     time, slide = sine_path(24)
     ratio = reference_force("bonds", time, slide, TRUTH["bonds"]) / LOAD
     loop = write_loop(tmp_path / "loop.csv", time, slide, ratio, quantity="friction_ratio")
-    text = (
-        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = '
-        '"2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
-    )
-    (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
+    (tmp_path / "patch.toml").write_text(PATCH + LAWS["bonds"] + SINE, "utf-8")
     for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
         result = fit_hysteresis_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
         assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+
+
+def test_exact_force_of_elastic_pieces_does_not_jump_at_reversals(tmp_path):
+    """Elastic pieces that slide before every row have the full force in it, also where the slide turns round."""
+    time, slide = sine_path(24)
+    force = 0.31 * 80 * np.sign(np.diff(slide, prepend=0.0))
+    loop = write_loop(tmp_path / "loop.csv", time, slide, force)
+    (tmp_path / "patch.toml").write_text(
+        PATCH + "[contact.shear]\n" + LAWS["coulomb"] + SINE, "utf-8"
+    )
+    result = fit_hysteresis_loop(
+        load(tmp_path / "patch.toml"), loop, free_ranges("friction.static")
+    )
+    assert result.keys.fit.values == pytest.approx([0.31], rel=1e-9) and result.rms < 1e-7 * 80
 
 
 # ---- parameters that the rows do not determine, and doubtful records
@@ -334,21 +348,23 @@ def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
 
 
 def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
-    """The fitted scene states the rest speed, a thousandth of the largest measured speed.
+    """The fitted scene states the rest speed, a thousandth of the largest measured speed; a warning states its step error.
 
     The scene leaves the rest speed v_h out, so that it follows from the motion.
     """
-    time, slide = sine_path(24, 1)
+    time, slide = sine_path(12, 1)
     scene = load_scene(tmp_path, "growth", "friction.rest_speed=1 m/s")
     scene = loads(
         scene.text.replace('rest_speed = "0.01 mm/s"\n', ""),
         tmp_path / "scene.toml",
-        ["accuracy.steps_per_cycle=24"],
+        ["accuracy.steps_per_cycle=12"],
     )
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     )
     result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
+    change = result.step_error / np.abs(result.loop.reading).max()
+    assert f"changes by {change:.1g} of its peak" in result.keys.warnings[-1]
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
     text = format_fitted_scene(result, scene, ["Fitted.", "Two."], tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)

@@ -139,11 +139,22 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
     assert "The errors of the measured values are their scatter around the fit." in answer.out
     for name in ("fit.json", "report.html"):
         assert "from their scatter around the fit: " in (tmp_path / "out" / name).read_text("utf-8")
-    # a table of no kind is refused with the header of each kind
-    (tmp_path / "decay.csv").write_text("a [m],f [Hz],z\n1e-6,100,0.1\n")
-    answer = run_cli(*command)
-    for header in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
-        assert answer.code == 2 and f"`{header}" in answer.err
+    # a table of no kind and a record over time are refused with the header of each kind, and how to make the first
+    for header in (
+        "time [s],velocity [m/s]",
+        "Time [ms],displacement [m],force [N]",
+        "a [m],f [Hz],z",
+        "MATLAB",
+    ):
+        command[3] = "ring.mat" if header == "MATLAB" else "decay.csv"
+        (tmp_path / command[3]).write_text(f"{header}\n1,2,3\n")
+        answer = run_cli(*command)
+        for text in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
+            assert answer.code == 2 and f"`{text}" in answer.err
+        assert (
+            f"records over time is fitted as the table that `patchfem import {command[3]} --decay"
+            in answer.err
+        )
     table = tmp_path / "backbone.csv"
     table.write_text(
         "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"

@@ -43,12 +43,14 @@ def test_exact_closed_streams_do_not_affect_run(scene_file, tmp_path):
 
 
 def test_exact_closed_pipe_changes_neither_files_nor_exit_code(scene_file, tmp_path):
-    """A command whose reader has gone writes all files and ends with the code of its work."""
+    """A command whose reader has gone writes all files and ends with the code of its work, without a message."""
     reader, writer = os.pipe()
     os.close(reader)
     words = ("sweep", scene_file, "--over", "normal.load=100 N,-1 N", "--json", "--no-page")
     done = run_patchfem(*words, "-o", tmp_path / "out", stdout=writer, stderr=writer)
+    shown = run_patchfem("run", "--help", stdout=writer, stderr=subprocess.PIPE)
     os.close(writer)
+    assert (shown.returncode, shown.stderr) == (0, b"")
     assert done.returncode == 3 and (tmp_path / "out/sweep.csv").is_file()
 
 

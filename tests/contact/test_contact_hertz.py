@@ -16,17 +16,14 @@ LOAD = 9107.0  # per metre of width [N/m]
 PLANE_MODULUS = {"strain": TITANIUM[0] / (1 - TITANIUM[1] ** 2), "stress": TITANIUM[0]}
 
 
-def crown_radius(plane):
-    """Return the radius R of a^2 = 4 P R/(pi E*), with E* = E'/2 because both pieces are elastic."""
-    return np.pi * PLANE_MODULUS[plane] / 2 * HALF_WIDTH**2 / (4 * LOAD)
-
-
 @cache
 def press_crown(per_half_width, plane="strain"):
     """Return the grid and the contact state of the crowned pair."""
     grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 12.7e-3, 6e-3)
     pair = make_compliance(grid, make_bare_layers(TITANIUM, plane), width=1.0)
-    return grid, press(pair, crown(grid.x, crown_radius(plane)), LOAD)
+    # a^2 = 4 P R/(pi E*), with E* = E'/2 because both pieces are elastic
+    radius = np.pi * PLANE_MODULUS[plane] / 2 * HALF_WIDTH**2 / (4 * LOAD)
+    return grid, press(pair, crown(grid.x, radius), LOAD)
 
 
 def fit_half_width(x, p):

@@ -14,12 +14,12 @@ WIDTH = 12.7e-3
 HALF_WIDTH = 0.1e-3
 
 
-def spring_bed(n_nodes: int = 41, stiffness: float = 1e12) -> Compliance:
-    """Return the diagonal compliance of a bed of springs [Pa/m] over 10 mm."""
+def spring_bed(n_nodes: int = 41) -> Compliance:
+    """Return the diagonal compliance of a bed of springs of 1e12 Pa/m over 10 mm."""
     x = np.linspace(-5e-3, 5e-3, n_nodes)
     weight = np.full(n_nodes, np.diff(x)[0] * WIDTH)
     weight[[0, -1]] /= 2
-    compliance = np.diag(1 / (stiffness * weight))
+    compliance = np.diag(1 / (1e12 * weight))
     return Compliance(
         Interface(frozen_array(x), frozen_array(weight), WIDTH),
         frozen_array(compliance),
@@ -61,12 +61,12 @@ def compute_block(grid) -> tuple:
     )
 
 
-def find_hertz_edges(hertz_block, load: float, radius: float = 57.7e-3) -> tuple:
-    """Return the nodal forces and the contact edges of a crown under a load."""
+def find_hertz_edges(hertz_block, load: float) -> tuple:
+    """Return the nodal forces and the contact edges of a crown of 57.7 mm under a load."""
     pieces, row_height = hertz_block
     x = pieces.interface.x
     weight = pieces.interface.weight
-    state = press(pieces, x**2 / (2 * radius), load)
+    state = press(pieces, x**2 / (2 * 57.7e-3), load)
     force = state.sigma_n * weight
     pressed = edges.SetFactor(pieces.normal, force > 0)
     return force, edges.find_edges(pressed, x, force, state.gap, row_height=row_height)

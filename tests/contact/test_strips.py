@@ -48,11 +48,10 @@ def pair_strips(n_strips, n_elements=60):
     return c, pair.interface.x, weight, strip_offsets(WIDTH, n_strips)
 
 
-def rigid_strips(n_strips, n_cells=1, length=LENGTH, width=WIDTH):
-    """Return (normal, x, weight, offsets) of strips of rigid bodies, with nodes at the centres of equal cells."""
-    x = (np.arange(n_cells) + 0.5) * (length / n_cells) - length / 2
-    weight = np.full(n_cells, length * width / n_cells / n_strips)
-    return np.zeros((n_cells, n_cells)), x, weight, strip_offsets(width, n_strips)
+def rigid_strips(n_strips):
+    """Return (normal, x, weight, offsets) of strips of rigid bodies, with a single node in the middle."""
+    weight = np.full(1, LENGTH * WIDTH / n_strips)
+    return np.zeros((1, 1)), np.zeros(1), weight, strip_offsets(WIDTH, n_strips)
 
 
 def random_gaps(rng, x, n_strips, amplitude):

@@ -143,30 +143,3 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
             for sign in (1, -1)
         )
         assert (above < 0 < below) if cycle.is_stable else (below < 0 < above)
-
-
-def test_exact_backbone_of_rigid_friction_agrees_with_closed_form():
-    """Frequency and damping of a block on rigid friction agree with their closed form within 1e-7.
-    At an amplitude A, with h = F/k lost per half period, the gain G = (A/h + 1)/(A/h - 1) gives the
-    net damping ratio -z by pi z/sqrt(1 - z^2) = ln G."""
-    modes = make_shaken_modes([750.0], [0.003], [1.0], [2.0])
-    force = 9.0
-    zeta = 0.003
-    h = force / (0.5 * 750.0**2)
-    amplitudes = h * np.array([3.0, 10.0, 200.0])
-    gain = np.log((amplitudes + h) / (amplitudes - h))
-    net_ratio = gain / np.hypot(np.pi, gain)
-    omega = 750.0 * np.sqrt(1 - net_ratio**2)
-    found = limit_cycles.trace_relay_backbone(modes, modes.slide, (force, force), 2 * amplitudes, 0)
-    assert [cycle.omega for cycle, _ in found] == pytest.approx(omega, rel=1e-8)
-    assert [ratio for _, ratio in found] == pytest.approx(
-        (net_ratio + zeta) * 750.0 / omega, rel=1e-7
-    )
-    # high static friction: the block sticks
-    assert limit_cycles.trace_relay_backbone(
-        modes, modes.slide, (force, 4 * force), [2.4 * h], 0
-    ) == [None]
-    with np.errstate(all="raise"):  # friction does not act on this mode
-        assert limit_cycles.trace_relay_backbone(
-            modes, 0 * modes.slide, (force, force), [h, 2 * h], 0
-        ) == [None, None]

@@ -43,9 +43,9 @@ FORMS = {
 }
 
 
-def make_mesh(kind: str, grid=GRID) -> PieceMesh:
+def make_mesh(kind: str) -> PieceMesh:
     """Return the grid as a mesh of one kind of elements with random numbers of its nodes."""
-    mesh = mesh_of_grid(grid, 1.0 if kind.startswith("triangle") else 0.0, seed=3)
+    mesh = mesh_of_grid(GRID, 1.0 if kind.startswith("triangle") else 0.0, seed=3)
     if kind in ("triangle", "quad"):
         return PieceMesh(mesh.points, mesh.blocks, mesh.is_coating, mesh.interface, mesh.far)
     tagged = [np.isin(np.arange(len(mesh.points)), part) for part in (mesh.interface, mesh.far)]

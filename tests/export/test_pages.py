@@ -192,7 +192,7 @@ def test_exact_levels_are_listed_with_their_errors(folders):
 def test_always_page_works_in_browser(folders, chromium):
     """The charts are drawn without an error on the console, in the light and on a narrow screen without broken words."""
     for name in ("rig", "wear", "curve"):
-        page = chromium.visit(folders(name) / "report.html", 390)
+        page = chromium.visit(folders(name) / "report.html")
         page.wait_for_charts()
         assert page.faults == [] and page.broken_words() == []
         assert page.evaluate("document.documentElement.scrollWidth") <= 390

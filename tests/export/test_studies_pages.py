@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from command_line import read_json, read_page, run_successfully
 from friction_loops import elastic_plastic_force, write_loop
+from measured_rows import make_linear_rows, write_rows
 from page_data import find_strange_curves, find_wrong_numbers, read_charts
 from scene_texts import DRIVE, MODE, PLASTIC, POINT
 
@@ -19,19 +20,6 @@ BENCH = (
 )
 BLOCK = POINT + PLASTIC + MODE + DRIVE
 STATIC = "friction.static=0.1..0.7"
-G_N = 9.80665
-MIL = 25.4e-6
-
-
-def write_rows(path) -> None:
-    """Write the response of an oscillator (141 Hz, damping 3 %) to a base of 2 g, in closed form, at five frequencies."""
-    lines = ["frequency [Hz],input [g],acceleration [g],displacement [mil],flag"]
-    for frequency in (120.0, 135.0, 143.0, 150.0, 160.0):
-        omega, natural = 2 * np.pi * frequency, 2 * np.pi * 141.0
-        motion = -2 * G_N / (natural**2 - omega**2 + 2j * 0.03 * natural * omega)
-        felt = abs(2 * G_N - omega**2 * motion) / G_N
-        lines.append(f"{frequency},2,{felt!r},{abs(motion) / MIL!r},{'U' * (frequency == 143)}")
-    path.write_text("\n".join(lines), "utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +34,7 @@ def folders(tmp_path_factory):
     force = elastic_plastic_force(slide, 30.0, 2e-6)
     force += 0.3 * np.random.default_rng(1).normal(size=time.size)
     write_loop(base / "loop.csv", time, slide, force, 1 + (time > 0.05))
-    write_rows(base / "rows.csv")
+    write_rows(base, [(*row[:4], "U" * (row[0] == 143)) for row in make_linear_rows()])
     free_mode = (
         "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2"
     )

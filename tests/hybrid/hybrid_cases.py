@@ -55,7 +55,9 @@ def make_bench(law, time, slide, *, load=1.0, samples=(), rtol=1e-11) -> cases.C
     """Return a bench whose slide is straight between corners; the last leg is the window."""
     signal = drives.make_record(time, slide, time[-1])
     signal.pieces[-1, 1] = slide[-1]
-    interface = cases.Interface(law, cases.Load(load), np.ones(1))
+    if not isinstance(load, cases.Load):
+        load = cases.Load(load)
+    interface = cases.Interface(law, load, np.ones(1))
     sizes = np.abs(slide).max(), np.abs(np.diff(slide) / np.diff(time)).max()
     rig = cases.make_rig(None, signal, [interface], sizes, cases.Options(rtol=rtol))
     ends = np.array([time[-1]], float)

@@ -30,7 +30,7 @@ LAWS = {
 
 @pytest.mark.parametrize("name", LAWS)
 def test_shooting_equals_a_long_run(name):
-    """Steady motion of every law in at most 45 periods, where a run needs hundreds."""
+    """Steady motion of every law in at most 60 periods, where a run needs hundreds."""
     case = make_oscillator(LAWS[name], acceleration=0.95, zeta=0.01, cycles=600, rtol=1e-9)
     steady = find_periodic_motion(case)
     assert steady.change < steady.tolerance

@@ -33,7 +33,10 @@ def solve_linear(design, data):
 
 
 def test_exact_linear_fit_has_closed_form_intervals():
-    """Values, intervals, correlation and sensitivity of a linear fit agree with the normal equations."""
+    """Values, intervals, correlation and sensitivity of a linear fit agree with the normal equations.
+
+    An error of the model widens the intervals by the shift of the values that the same change of the data causes.
+    """
     values, half_width, covariance, sum_of_squares = solve_linear(DESIGN, NOISY)
     fit = Problem(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5]).solve()
     assert fit.values == pytest.approx(values, abs=1e-9)
@@ -47,6 +50,10 @@ def test_exact_linear_fit_has_closed_form_intervals():
         10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8
     )
     assert fit.intervals.methods == ("linear",) * 3
+    change = DESIGN[:, 0] ** 2
+    shift = np.abs(solve_linear(DESIGN, NOISY + change)[0] - values)
+    ends = fit.widen([change], [(-5, 5)] * 3).intervals.ends
+    assert np.ptp(ends, axis=1) / 2 == pytest.approx(half_width + shift, abs=1e-8)
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
     assert fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc") == []

@@ -39,11 +39,6 @@ def bytes_of(write, **options) -> bytes:
     return file.getvalue()
 
 
-def matrix_market(matrix, **options) -> bytes:
-    """Return a matrix as the content of a Matrix Market file."""
-    return bytes_of(lambda file: mmwrite(file, matrix, **options))
-
-
 Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.draw_scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
 
@@ -84,7 +79,7 @@ FILES = {
     "coordinates.mtx": (
         read_stiffness,
         "coordinates.mtx",
-        matrix_market(sparse.coo_array(K)),
+        bytes_of(mmwrite, a=sparse.coo_array(K)),
         bytes,
     ),
     "rows.mtx": (read_stiffness, "rows.mtx", b"1 1 4.0\n1 2 -1.5\n2 2 3e-3\n", bytes),

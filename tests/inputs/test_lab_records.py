@@ -115,10 +115,10 @@ def test_refuses_invalid_channel_map(tmp_path, requests, message):
     assert result.code == 2 and message in result.err and not (tmp_path / "o.csv").exists()
 
 
-def replace_value(values, index=3, value=np.nan):
+def replace_value(values, value=np.nan):
     """Return a copy of the values with one value replaced."""
     changed = np.array(values)
-    changed[index] = value
+    changed[3] = value
     return changed
 
 

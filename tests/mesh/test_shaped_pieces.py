@@ -15,10 +15,10 @@ LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
 ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
 
 
-def make_shaped_piece(end, overhang=0.0, element_size=0.31e-3, coating=COATING):
+def make_shaped_piece(end, overhang=0.0, element_size=0.31e-3):
     """Return a piece of the given length whose grid is `overhang` than its contact face at either end."""
     half_length = end.half_contact_length(LENGTH) - overhang
-    return graded_grid(2 * half_length, HEIGHT, element_size, coating).extend(LENGTH, end)
+    return graded_grid(2 * half_length, HEIGHT, element_size, COATING).extend(LENGTH, end)
 
 
 def compute_areas(body):

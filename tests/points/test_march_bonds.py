@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, follow_path, make_one_mode
+from march_paths import OMEGA, follow_path
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
@@ -34,12 +35,6 @@ def make_shear(shape, stiffness):
         stiffness=np.asarray(stiffness, float),
         points=np.arange(len(shape)),
     )
-
-
-def reversing_path(steps: int) -> np.ndarray:
-    """Return a path with five reversals at different slides [m]."""
-    t = np.linspace(0, 1, steps + 1)
-    return 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)
 
 
 def check_balance(found, path, rel=1e-12) -> None:
@@ -93,7 +88,8 @@ def test_exact_energy_balance_over_reversals(reading, order, growth):
     The reading by stretch creates no energy beyond round-off.
     """
     law = Bonds(0.4, 1e-6, order, reading, **growth)
-    path = reversing_path(160)
+    t = np.linspace(0, 1, 161)
+    path = 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)  # five reversals at different slides [m]
     rng = np.random.default_rng(3)
     shape = rng.normal(size=(4, 3)) / np.sqrt(0.4 * FORCE)[:, None]
     found = follow_path(make_lists(law, FORCE, make_shear(shape, [1e6, 3e6, 1e7])), path, 1e-3)
@@ -157,7 +153,7 @@ def test_order_two_against_integrated_rate_equations(growth):
     errors = []
     for steps in (100, 800, 6400):
         result = march(
-            make_one_mode(OMEGA, 0.003, 1.0),
+            make_modal_basis(OMEGA, 0.003),
             SineDrive(drive, OMEGA),
             make_bond_contact(law, 98.0665, ROW),
             2,
@@ -184,7 +180,7 @@ def march_list(law, capacity, monkeypatch):
     monkeypatch.setattr(engine.list_numbers, "estimate_list_capacity", lambda *_: capacity)
     contact = make_lists(law, 98.0665, None, np.inf, 0.0)
     return march(
-        make_one_mode(OMEGA, 0.01, 1.0), SineDrive(49.0, OMEGA), contact, 3, 100, window=3, frames=4
+        make_modal_basis(OMEGA, 0.01), SineDrive(49.0, OMEGA), contact, 3, 100, window=3, frames=4
     )
 
 

@@ -78,9 +78,7 @@ def make_compliant_contact(law, grooves, compliance):
     return make_flank_contact(law, grooves, LOAD, BASIS.slide, modes, LOAD_FRACTION)
 
 
-def sine_slide(steps):
-    """Return a sinusoidal slide in a number of steps [m]."""
-    return 20e-6 * np.sin(np.linspace(0, 7.3, steps + 1))
+SINE_SLIDE = 20e-6 * np.sin(np.linspace(0, 7.3, 201))  # [m]
 
 
 def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
@@ -148,10 +146,8 @@ def test_exact_coulomb_points_on_grooves_minimise_energy():
 def test_exact_energy_balance_with_shear_modes(law):
     """For laws with memory the energy is balanced on a prescribed slide and in a march with a
     lifted mass."""
-    forces, energies = follow_slide(
-        make_compliant_contact(law, GROOVES, COMPLIANCE), sine_slide(200)
-    )
-    work = forces[:-1, 1] @ np.diff(sine_slide(200))
+    forces, energies = follow_slide(make_compliant_contact(law, GROOVES, COMPLIANCE), SINE_SLIDE)
+    work = forces[:-1, 1] @ np.diff(SINE_SLIDE)
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-10
     )

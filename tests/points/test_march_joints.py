@@ -24,7 +24,7 @@ from patchfem.structure import make_release
 EVENT_ERROR = 1e-6  # an event is located within 1/2048 of a step
 
 
-def make_chain(stiffness, mass=1.0, zeta=0.0, faces=None):
+def make_chain(stiffness, zeta=0.0, faces=None):
     """Return the modes of unit masses in a row.
 
     Spring i connects mass i to the mass before it, spring 0 to the base; the last mass has a free end.
@@ -47,7 +47,7 @@ def make_chain(stiffness, mass=1.0, zeta=0.0, faces=None):
         rows[0],
         shape.T @ np.ones(n),
         shape[0],
-        mass,
+        1.0,
         None,
         rows,
         shapes=shape,
@@ -129,8 +129,8 @@ def test_always_difficult_random_chains_converge(seed):
 # ---- stops and releases inside steps
 
 
-def find_errors(modes, drive, static, kinetic, cycles, steps):
-    """Return the largest relative error of the extremes of all cycles for each number of steps.
+def find_errors(modes, drive, static, kinetic, cycles):
+    """Return the largest relative error of the extremes of all cycles for 400, 1600 and 6400 steps.
 
     The reference is the motion from event to event; several limits belong to several interfaces.
     """
@@ -141,7 +141,7 @@ def find_errors(modes, drive, static, kinetic, cycles, steps):
     elements = [Coulomb(slides, sticks).element(1.0) for sticks, slides in pairs]
     contact = make_contact(elements, modes.interfaces)
     errors = []
-    for count in steps:
+    for count in (400, 1600, 6400):
         result = march(modes, drive, contact, cycles, count, window=cycles)
         assert result.outcome is None and energy_balance(result.ledger) < 1e-9
         size = np.abs(reference.extremes).max()
@@ -154,7 +154,7 @@ def find_errors(modes, drive, static, kinetic, cycles, steps):
 def test_order_with_kinetic_below_static_friction(ratio):
     """Amplitudes converge if the kinetic friction is below the static friction."""
     modes = make_modal_basis(1.0, 0.02, [1.0], [-1.0])
-    errors = find_errors(modes, SineDrive(1.0, 0.3, False), 0.8, 0.8 * ratio, 20, (400, 1600, 6400))
+    errors = find_errors(modes, SineDrive(1.0, 0.3, False), 0.8, 0.8 * ratio, 20)
     assert errors[0] < 1e-4 and np.all(errors[1:] < np.maximum(errors[:-1] / 3, EVENT_ERROR))
 
 
@@ -174,5 +174,5 @@ def test_order_for_coupled_stops_with_kinetic_below_static(seed, n_interfaces, n
         rng.uniform(-1, 1, n_modes),
         damping=0.05 * root @ root.T if coupled else None,
     )
-    errors = find_errors(basis, SineDrive(1.0, 0.8), limit, 0.4 * limit, 5, (400, 1600, 6400))
+    errors = find_errors(basis, SineDrive(1.0, 0.8), limit, 0.4 * limit, 5)
     assert errors[0] < 1e-3 and np.all(errors[1:] < np.maximum(errors[:-1] / 3, EVENT_ERROR))

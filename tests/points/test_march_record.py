@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, make_one_mode
+from march_paths import OMEGA
 from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
@@ -23,7 +23,7 @@ from patchfem.slip.shear_modes import shear_modes
 from .test_march_loads import reduce_to_shear_modes
 
 DRIVE = SineDrive(49.0, OMEGA)
-BASIS = make_one_mode(OMEGA, 0.05, 1.0)
+BASIS = make_modal_basis(OMEGA, 0.05)
 ROW = np.ones(1)
 PITCHES = make_modes([143.0], [1.0], [0.0], [20.0], 0.05)
 CYCLES = 400
@@ -127,7 +127,7 @@ def test_exact_beats_and_slow_growth_are_not_repeated(monkeypatch):
 def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     """A march that keeps no early samples has the same last cycles, amplitudes and energies, also if it ends early."""
     contact = make_parallel_contact([2e5, 1e5], [1e-6, 2e-6], ROW)
-    basis = make_one_mode(OMEGA, 0.003, 1.0)
+    basis = make_modal_basis(OMEGA, 0.003)
     if np.isfinite(travel):
         travel *= march(basis, DRIVE, contact, cycles, 40, window=2).extremes.max()
     complete, short = (

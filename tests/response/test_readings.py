@@ -9,10 +9,10 @@ from patchfem.response import read_instrument
 OMEGA = 2 * np.pi * 143
 
 
-def make_motion(drive, count=2000):
+def make_motion(drive):
     """Return one cycle of a motion with three harmonics, and the harmonics of its acceleration."""
     parts = {1: 3e-5 - 1e-5j, 2: 4e-6j, 3: -2e-6 + 1e-6j}
-    t = np.linspace(0, 2 * np.pi / OMEGA, count + 1)
+    t = np.linspace(0, 2 * np.pi / OMEGA, 2001)
     y, v, a = (
         sum((c * (1j * n * OMEGA) ** k * np.exp(1j * n * OMEGA * t)).real for n, c in parts.items())
         for k in range(3)

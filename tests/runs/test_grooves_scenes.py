@@ -14,12 +14,12 @@ RIG = GROOVED + STRUCTURE + "[accuracy]\nsteps_per_cycle = 100\n"
 WAVE = 2 * np.pi / 80e-6
 
 
-def groove_loop_area(load, mu, amplitude, reach):
-    """Return the area of the loop of slow sliding between +-reach: N times the integral of the
+def groove_loop_area(mu, reach):
+    """Return the area of the loop of slow sliding between +-reach under 115 N: N times the integral of the
     difference of the two friction limits."""
     q = np.linspace(-reach, reach, 200_001)
-    t = amplitude * WAVE * np.sin(WAVE * q)
-    return load * np.trapezoid((t + mu) / (1 - mu * t) - (t - mu) / (1 + mu * t), q)
+    t = 7.5e-6 * WAVE * np.sin(WAVE * q)
+    return 115 * np.trapezoid((t + mu) / (1 - mu * t) - (t - mu) / (1 + mu * t), q)
 
 
 @pytest.mark.parametrize("reach", [30e-6, 200e-6])
@@ -27,7 +27,7 @@ def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
     """Area and peak force of a slow friction loop over grooves agree with the closed form, and its energies balance."""
     result = pf.run(BENCH, **{"slide.amplitude": f"{reach} m"})
     assert result.measures["loop_area"].value == pytest.approx(
-        groove_loop_area(115, 0.4, 7.5e-6, reach), rel=1e-9
+        groove_loop_area(0.4, reach), rel=1e-9
     )
     assert result.measures["energy_dissipated"].value == pytest.approx(
         result.measures["friction_work"].value, rel=1e-9
@@ -47,7 +47,7 @@ def test_exact_breakaway_on_grooves_uses_static_coefficient():
     start, on a falling slope, and with the kinetic coefficient in the loop."""
     result = pf.run(BENCH, **{"friction.kinetic": "0.3"})
     assert result.measures["loop_area"].value == pytest.approx(
-        groove_loop_area(115, 0.3, 7.5e-6, 30e-6), rel=1e-9
+        groove_loop_area(0.3, 30e-6), rel=1e-9
     )
     slope_angle = np.arctan(7.5e-6 * WAVE * np.sin(-0.3))
     first_micron = BENCH.replace(
@@ -64,7 +64,7 @@ def test_exact_tanh_loop_on_grooves_agrees_with_limits():
     along the slope, c ds/dt with c = mu N/v_0."""
     tanh_bench = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
     assert pf.run(tanh_bench).measures["loop_area"].value == pytest.approx(
-        groove_loop_area(115, 0.4, 7.5e-6, 30e-6), rel=1e-9
+        groove_loop_area(0.4, 30e-6), rel=1e-9
     )
     viscous = pf.run(tanh_bench.replace('"1 um/s"', '"1000 m/s"'))
     q = np.linspace(-30e-6, 30e-6, 20_001)

@@ -39,12 +39,6 @@ def assign_mode_keys(key, rows):
     return [f"structure.mode.{name}.{key}={value}" for name, value in rows.items()]
 
 
-def run_instruments(text, *options):
-    """Return the result of a scene and its measures of acceleration and displacement."""
-    result = run(loads(text, sets=options))
-    return result, [result.measures[name] for name in NAMES]
-
-
 def test_exact_linear_instruments_agree_with_closed_form():
     """The modal coordinates are z = -a base/(Omega^2 - omega^2 + 2 i zeta Omega omega), and both
     instruments measure their weighted sums."""
@@ -52,12 +46,13 @@ def test_exact_linear_instruments_agree_with_closed_form():
     text = text.replace('"yaw"\n', '"yaw"\nbase = 0.3\n').replace(
         "slide = 1.0", "slide = 1.0\nbase = 0.9"
     )
-    result, (acceleration, displacement) = run_instruments(
-        text,
+    sets = [
         *assign_mode_keys("accelerometer", ACCELEROMETER_ROW),
         *assign_mode_keys("gauge", GAUGE_ROW),
         "accuracy.method=harmonic",
-    )
+    ]
+    result = run(loads(text, sets=sets))
+    acceleration, displacement = (result.measures[name] for name in NAMES)
     w = 2 * np.pi * 140
     a = 5 * 9.80665
     omegas = 2 * np.pi * np.array([143.0, 129.0])

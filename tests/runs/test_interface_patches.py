@@ -22,28 +22,26 @@ STIFF_LAW = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 10\n'
 
 
-def format_contact(table: str, load: float, radius: float, keys: str = "") -> str:
+def format_contact(table: str, load: float, radius: float) -> str:
     """Return the tables of a crowned patch with shear."""
     return (
         f'[{table}]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "8 mm"\nload = "{load} N"\nsubstrate = "steel"\n'
-        f'{keys}[{table}.crown]\nradius = "{radius} m"\n[{table}.shear]\n'
+        f'[{table}.crown]\nradius = "{radius} m"\n[{table}.shear]\n'
     )
 
 
-def format_interface(
-    between: str, load: float, radius: float, law: str = LAW, keys: str = ""
-) -> str:
+def format_interface(between: str, load: float, radius: float) -> str:
     """Return an interface with a patch."""
-    return f"[[structure.interface]]\nbetween = {between}\n{law}" + format_contact(
-        "structure.interface.contact", load, radius, keys
+    return f"[[structure.interface]]\nbetween = {between}\n{LAW}" + format_contact(
+        "structure.interface.contact", load, radius
     )
 
 
-def format_spring_and_damper(mass: int, other_mass: int, stiffness: float = SPRING) -> str:
+def format_spring_and_damper(mass: int, other_mass: int) -> str:
     """Return a spring and a damper between two masses."""
     pair = f"between = [{mass}, {other_mass}]\n"
     return (
-        f'[[structure.spring]]\n{pair}stiffness = "{stiffness} N/m"\n[[structure.damper]]\n{pair}'
+        f'[[structure.spring]]\n{pair}stiffness = "{SPRING} N/m"\n[[structure.damper]]\n{pair}'
         f'coefficient = "{DAMPER} N s/m"\n'
     )
 

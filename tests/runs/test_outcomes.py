@@ -86,18 +86,19 @@ RUNS = [
         "softening spring",
         "",
     ),
+    # a march ends at twice the displacement sqrt(m omega^2/k3) at which the force of the spring vanishes
     (
         COULOMB_RIG,
         "accuracy.method=march; structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
         "grows",
-        r"beyond a displacement of .* um the motion grows without limit.*softening spring",
+        "beyond a displacement of 169 um the motion grows without limit.*softening spring",
         "",
     ),
     (
         PLASTIC_RIG,
         "accuracy.method=march; structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
         "grows",
-        r"beyond a displacement of .* um the motion grows without limit",
+        "beyond a displacement of 169 um the motion grows without limit",
         "",
     ),
     (COATED_RIG, "drive.acceleration=60 g", "leaves_contact", "", ""),
@@ -164,6 +165,7 @@ RUNS = [
     (BLOCK, "contact.element_size=3 mm", "done", "the 5 elements along the interface are too few", ""),
     # ---- bonds and loops
     (DWELL, GROWING + "friction.order=3", "done", "order = 3 and a growing", ""),
+    (DWELL, GROWING + "friction.order=3; friction.static=1", "done", r"reaches (?P<friction_ratio_peak>\S+) times mu_s", ""),
     (DWELL, "friction.order=3", "done", "", "times mu_s N"),
     (
         DWELL,
@@ -238,7 +240,11 @@ def test_exact_outcome_and_sentences(text, changes, outcome, sentence, absent):
     )
     assert outcome in (None, str(result.outcome)), result.outcome
     sentences = [*result.warnings, *result.notes]
-    assert any(re.search(sentence, one, re.S) for one in ["", *sentences]), sentences
+    found = [re.search(sentence, one, re.S) for one in ["", *sentences]]
+    assert any(found), sentences
+    # a named group of a pattern is the value of this measure
+    for name, number in next(filter(None, found)).groupdict().items():
+        assert float(number) == pytest.approx(result.measures[name].value, rel=5e-3)
     assert not absent or not any(re.search(absent, one) for one in sentences)
     if "changes until" in sentence:
         assert "relative_displacement_amplitude_steady" not in result.measures

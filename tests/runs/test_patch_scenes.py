@@ -128,12 +128,13 @@ def test_exact_sticking_loop_has_stiffness_of_skin(law):
 
 # ---- strips
 def test_exact_rolled_rigid_strips_agree_with_closed_form():
-    """Below the roll angle that opens the contact, the pressure is linear over the width; the
-    lateral centre is that of a wedge times 1 - 1/count^2."""
+    """At half the roll angle that opens the contact, the pressure is linear over the width, with its centre at half the
+    sixth of the width that bounds full contact; that of strips is it times 1 - 1/count^2."""
     roll = 0.5 * exact.wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
     tables = SKINS["linear"] + f'[contact.strips]\ncount = 2\nroll = "{roll!r} rad"\n'
     patch, patch_values = solve_patch(tables, material=RIGID)
     centre = exact.wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
+    assert centre == pytest.approx(-WIDTH / 12, rel=1e-12)
     assert patch_values["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / 4), rel=1e-5)
     assert patch_values["roll_moment"] == pytest.approx(
         LOAD * patch_values["pressure_centre_lateral"], rel=1e-12

@@ -8,7 +8,7 @@ import pytest
 
 import patchfem as pf
 from patchfem import compiled
-from patchfem.core import ErrorCauses, Measure
+from patchfem.core import Measure
 from patchfem.runs import refine
 
 MAIN_MEASURES = (
@@ -162,7 +162,7 @@ def test_exact_steps_of_a_rig_are_refined_within_its_time():
 def test_exact_steps_are_refined_where_they_alone_bring_a_measure_inside(parts, axis):
     """Smaller steps follow if they have most of an error, or if a measure meets its tolerance without their part."""
     error = sum(parts.values())
-    measure = Measure(1.0, "m", error, 0.0, causes=ErrorCauses(parts, None))
+    measure = Measure(1.0, "m", error, 0.0, parts=parts)
     worst = refine.find_worst_measure({"loop_area": measure}, 1e-3, ["steps"])
     assert worst.axis == axis
     assert worst.excess == (pytest.approx(error / 1e-3) if axis else 0.0)
@@ -170,7 +170,7 @@ def test_exact_steps_are_refined_where_they_alone_bring_a_measure_inside(parts, 
 
 def test_exact_errors_of_a_pass_are_bounded_with_their_causes():
     """An error that vanishes by chance is a quarter of that of the pass before, with the shares of its axes."""
-    before = {"a": Measure(1.0, "m", 4.0, 0.0, causes=ErrorCauses({"steps": 4.0}, None))}
-    now = {"a": Measure(1.0, "m", 0.0, 0.0, causes=ErrorCauses({"steps": 0.0}, None))}
+    before = {"a": Measure(1.0, "m", 4.0, 0.0, parts={"steps": 4.0})}
+    now = {"a": Measure(1.0, "m", 0.0, 0.0, parts={"steps": 0.0})}
     bounded = refine.bound_errors(now, before)["a"]
-    assert (bounded.error, bounded.causes.parts) == (1.0, {"steps": 1.0})
+    assert (bounded.error, bounded.parts) == (1.0, {"steps": 1.0})

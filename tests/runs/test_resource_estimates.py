@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from scene_texts import (
     BENCH,
-    COATED,
     COULOMB,
     DRIVE,
     MODE,
-    NONLOCAL,
     PATCH,
     POINT,
-    SHEAR,
     STRUCTURE,
 )
 
@@ -68,10 +65,10 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     assert peak < (7e8 if run_plan.kind == "bench" else 3e7)
 
 
-def test_exact_memory_of_drive_modes_and_shear_modes(tmp_path):
-    """The rows of a drive, the modes of a file and the shear modes count, and the largest of them is named.
+def test_exact_memory_of_drive_and_modes(tmp_path):
+    """The rows of a drive and the modes of a file count, and the largest of them is named.
 
-    Measured: 400 bytes for each row, 125 for each pair of modes, 24 for each shear mode and node.
+    Measured: 400 bytes for each row, 125 for each pair of modes.
     """
     rows = "".join(f"{0.001 * k},{k % 2}\n" for k in range(50_001))
     (tmp_path / "shake.csv").write_text("time [s],acceleration [g]\n" + rows)
@@ -87,16 +84,6 @@ def test_exact_memory_of_drive_modes_and_shear_modes(tmp_path):
     modal = '[structure]\nfile = "rig.npz"\n'
     scene = loads(POINT + TANH + modal + DRIVE, tmp_path / "a.toml", ["accuracy.method=harmonic"])
     assert _find_largest(scene) == (125 * n**2, f"{n} modes", "give fewer modes")
-
-    shear = ["accuracy.shear_modes=2000", "accuracy.method=march", "drive.cycles=2"]
-    scene = loads(COATED + SHEAR + NONLOCAL + STRUCTURE, "a.toml", shear)
-    parts = {part.what: part for part in memory.list_parts(plan(scene))}
-    points = plan(scene).unknowns["interface_points"]
-    assert parts["2000 shear modes"] == (
-        24 * 2000 * points,
-        "2000 shear modes",
-        "lower accuracy.shear_modes",
-    )
 
 
 DRIVE_REMEDY = "give fewer rows in drive.file, or lower drive.duration"

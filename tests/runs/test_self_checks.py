@@ -1,12 +1,15 @@
-"""Second computations from the values of a scene agree with the measures of its run; a wrong energy ends a run."""
+"""Second computations from the values of a scene agree with the measures of its run; a wrong energy or load ends a run."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scene_runs import run_scene
-from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
+from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem.core import Outcome
 from patchfem.points import time_march
+from patchfem.runs.balances import mark_unbalanced
 from patchfem.runs.bench import bench
 
 SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "170 Hz"\ndamping = 0.01\nslide = 0.4\noutput = 0.7\nbase = 0.3\n'
@@ -83,3 +86,14 @@ def test_always_lost_energy_ends_run_as_not_converged(
     assert result.outcome is Outcome.NOT_CONVERGED
     assert any(warning in sentence for sentence in result.warnings), result.warnings
     assert all(measure.error is None for measure in result.measures.values())
+
+
+def test_always_wrong_load_ends_run_as_not_converged():
+    """A pressure whose integral is 1 % more than the load of 26 lbf leads to not_converged with both numbers."""
+    result = run_scene(COATED, "")
+    pressure = result.patch.pressure
+    pressure = replace(pressure, sigma_n=1.01 * pressure.sigma_n)
+    marked = mark_unbalanced(replace(result, patch=replace(result.patch, pressure=pressure)))
+    assert marked.outcome is Outcome.NOT_CONVERGED
+    warning = "is 116.81 N, but the load is 115.654 N; they differ by 0.01 of the load"
+    assert warning in marked.warnings[0]

@@ -17,11 +17,6 @@ G, LIMIT = 9.80665, 0.3 * 26 * 4.4482216152605
 SOFT_ELEMENT = PLASTIC.replace("1 um", "20 um")
 
 
-def run_curve(text, **keys):
-    """Return the curve of a scene by the harmonic engine."""
-    return pf.run(text, **STEADY, **keys).motion.steady.curve
-
-
 @pytest.fixture
 def reduced_point_count(monkeypatch):
     """Compute curves with 13 points, refined only where they bend."""
@@ -33,7 +28,7 @@ def reduced_point_count(monkeypatch):
 @pytest.mark.parametrize("law", [COULOMB, SOFT_ELEMENT], ids=["coulomb", "elastic-plastic"])
 def test_exact_point_of_curve_agrees_with_sine_run(law):
     """The first, the middle and the last point of a curve agree with runs under a sine of the same frequency."""
-    curve = run_curve(POINT + law + MODE + STRONG_SWEEP)
+    curve = pf.run(POINT + law + MODE + STRONG_SWEEP, **STEADY).motion.steady.curve
     drive = '[drive]\nkind = "base"\nfrequency = "{!r} Hz"\nacceleration = "6 g"\ncycles = 10\n'
     for k in (0, len(curve["level"]) // 2, -1):
         run = pf.run(POINT + law + MODE + drive.format(float(curve["frequency"][k])), **STEADY)

@@ -86,15 +86,6 @@ NEVER = (
 )
 
 
-def list_tried_keys() -> list:
-    """Return (path, values to try) of every key of the schema that names no file."""
-    return [
-        (path, trial_values(path, kind))
-        for path, kind, model in list_schema_keys()
-        if model is None and path[-1] != "file" and ".".join(map(str, path)) not in NEVER
-    ]
-
-
 def trial_values(path: tuple, kind: str | None) -> list:
     """Return values for a key: all its choices, or quantities and numbers that are no defaults."""
     name = ".".join(map(str, path))
@@ -154,10 +145,12 @@ def keys_without_effect(scene: str) -> list:
     tables = tomllib.loads(SCENES[scene])
     base = run_and_collect(to_toml(tables))
     out = []
-    for path, tried in list_tried_keys():
+    for path, kind, model in list_schema_keys():
         name = ".".join(map(str, path))
+        if model is not None or path[-1] == "file" or name in NEVER:
+            continue
         is_silent = False
-        for value in tried:
+        for value in trial_values(path, kind):
             if (changed := set_key(tables, path, value)) is None:
                 continue
             try:

@@ -160,16 +160,15 @@ def list_refusals(names: str) -> list[str]:
     return []
 
 
-def make_pattern(names: str, instead: str) -> str:
-    """Return a pattern that only the message of a row matches; properties of the scene are free in it."""
-    return PROPERTY.sub("((?! and ).)+", re.escape(support.describe_row(names, instead)))
-
-
 @pytest.mark.parametrize("names, instead", support.SUPPORT, ids=[row[0] for row in support.SUPPORT])
 def test_refuses_each_row_of_support(names, instead):
-    """A scene with the features of a row is refused for this row alone, with its advice."""
+    """A scene with the features of a row is refused for this row alone, with its advice.
+
+    Properties of the scene are free in the message.
+    """
     (found,) = list_refusals(names)
-    assert re.fullmatch(make_pattern(names, instead), found.split(": ", 2)[2]), found
+    pattern = PROPERTY.sub("((?! and ).)+", re.escape(support.describe_row(names, instead)))
+    assert re.fullmatch(pattern, found.split(": ", 2)[2]), found
     assert " with is " not in found and not found.endswith("; ")
 
 

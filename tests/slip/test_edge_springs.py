@@ -8,11 +8,11 @@ from patchfem.slip import add_edge_springs, jenkins_set
 COUNT = 41
 
 
-def make_patch(first: int = 4, last: int = 36):
-    """Return compliance (m, m) [m/N] and nodal limits (m,) [N] of a crowned contact of the nodes first..last."""
+def make_patch():
+    """Return compliance (m, m) [m/N] and nodal limits (m,) [N] of a crowned contact of the nodes 4 to 36."""
     x = np.linspace(-1.0, 1.0, COUNT)
     compliance = np.exp(-3.0 * np.abs(x[:, None] - x)) + 0.2 * np.eye(COUNT)
-    loaded = (np.arange(COUNT) >= first) & (np.arange(COUNT) <= last)
+    loaded = (np.arange(COUNT) >= 4) & (np.arange(COUNT) <= 36)
     limit = np.where(loaded, np.sqrt(np.maximum(1.0 - (x / 0.85) ** 2, 0.01)), 0.0)
     return compliance, limit
 

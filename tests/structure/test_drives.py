@@ -64,10 +64,10 @@ def test_exact_tones_repeat_after_their_beat(frequencies, cycles):
 # ---- the march
 
 
-def march_without_friction(modes, drive, cycles, steps=200, start=None):
+def march_without_friction(modes, drive, cycles, steps=200):
     """Return a march of a basis under a drive without friction."""
     contact = make_contact([], modes.interfaces[:0], (), 1.0)
-    return march(modes, drive, contact, cycles, steps, window=1000, start=start)
+    return march(modes, drive, contact, cycles, steps, window=1000)
 
 
 def test_exact_step_response_agrees_with_closed_form():
@@ -94,9 +94,9 @@ def test_exact_step_response_agrees_with_closed_form():
 RIG = POINT + PLASTIC + MODE + "[accuracy]\ntolerance = 1e-2\n"
 
 
-def run_drive(drive, scene_text=RIG):
+def run_drive(drive):
     """Return the result and the values of its measures for the text of a drive."""
-    result = run(plan(loads(f"{scene_text}[drive]\n{drive}")))
+    result = run(plan(loads(f"{RIG}[drive]\n{drive}")))
     assert result.outcome is not Outcome.NOT_CONVERGED
     return result, {name: m.value for name, m in result.measures.items()}
 

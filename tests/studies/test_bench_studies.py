@@ -6,21 +6,16 @@ from scipy.integrate import solve_ivp
 from study_module import load_study
 
 
-def check_speeds(rows):
-    """Check that the steady friction is the Lorentzian of the velocity."""
+@pytest.mark.slow
+def test_exact_friction_against_velocity_is_a_lorentzian(tmp_path):
+    """The steady friction coefficient is a Lorentzian of velocity / characteristic velocity."""
+    rows = load_study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
     for row in rows:
         lorentz = 0.42 + 0.18 / (1 + row["share"] ** 2)
         assert row["promised"] == pytest.approx(lorentz, rel=1e-13)
         assert row["stretch"] == pytest.approx(lorentz, rel=1e-12)
         for order in (0, 1):
             assert row[order][0] == pytest.approx(row[order][1], rel=2e-6)
-
-
-@pytest.mark.slow
-def test_exact_friction_against_velocity_is_a_lorentzian(tmp_path):
-    """The steady friction coefficient is a Lorentzian of velocity / characteristic velocity."""
-    rows = load_study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
-    check_speeds(rows)
     # half of the drop at v_c = sqrt(a_s l_k)
     assert rows[0]["stretch"] == pytest.approx(0.51, rel=1e-12)
     assert "<svg" in (tmp_path / "picture.svg").read_text()

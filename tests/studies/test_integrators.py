@@ -27,15 +27,6 @@ def table(work):
     return read_json(work.TABLE)
 
 
-def find_row(table, problem, name, setting):
-    """Return the row of a problem, an integrator and its accuracy setting."""
-    return next(
-        r
-        for r in table["rows"]
-        if (r["problem"], r["engine"], r["knob"]) == (problem, name, setting)
-    )
-
-
 @pytest.mark.parametrize("where", ["block", "two"])
 def test_exact_dop853_restarted_at_events(engines, problem, where):
     """DOP853 restarted at each event has an error below 5e-9."""
@@ -52,6 +43,7 @@ def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
 
 def test_exact_saved_errors_are_reproduced(engines, problem, table):
     """The errors of the inexpensive rows of the saved table are reproduced within 2 %."""
+    errors = {(row["problem"], row["engine"], row["knob"]): row["error"] for row in table["rows"]}
     for where in ("decay", "block", "two"):
         for name, settings in (
             ("march", (200, 800)),
@@ -62,7 +54,7 @@ def test_exact_saved_errors_are_reproduced(engines, problem, table):
             run, _, problems = engines.OURS[name]
             for setting in settings if where in problems else ():
                 case = problem(where)
-                saved = find_row(table, where, name, setting)["error"]
+                saved = errors[where, name, setting]
                 assert case.error(run(case, setting)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 

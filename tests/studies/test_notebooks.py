@@ -42,9 +42,9 @@ def read_notebook(name: str):
 NOTEBOOKS = {name: read_notebook(name) for name in NAMES}
 
 
-def cell_sources(name: str, kind: str) -> list:
-    """Return the text of all cells of one kind."""
-    return [cell.source for cell in NOTEBOOKS[name].cells if cell.cell_type == kind]
+def read_code(name: str) -> str:
+    """Return the text of all cells with code."""
+    return "\n".join(cell.source for cell in NOTEBOOKS[name].cells if cell.cell_type == "code")
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def kernel(tmp_path_factory):
 def test_always_code_of_own_joint_runs(tmp_path, monkeypatch):
     """The code cells of a notebook run in this process, with their asserts."""
     monkeypatch.chdir(tmp_path)
-    exec("\n".join(cell_sources("own_joint", "code")), {})
+    exec(read_code("own_joint"), {})
     assert not list(tmp_path.iterdir())
 
 
@@ -122,7 +122,7 @@ def test_always_notebook_is_valid_and_without_output(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_always_notebook_uses_public_names_and_asserts(name):
     """A notebook imports only `patchfem`, uses its public names and has at least four asserts."""
-    tree = ast.parse("\n".join(cell_sources(name, "code")))
+    tree = ast.parse(read_code(name))
     imported = [
         module
         for node in ast.walk(tree)

@@ -185,7 +185,7 @@ def find_browser_errors(site: Path, home: Path) -> list:
     browser = Chromium(home)
     errors = []
     for name in ("README", "studies/README", "studies/site/start", "patchfem/scene/MEASURES"):
-        page = browser.visit(site / f"{name}.html", 390)
+        page = browser.visit(site / f"{name}.html")
         errors += [f"{name}: {fault}" for fault in page.faults]
         errors += [f"{name}: the word {word} is broken" for word in page.broken_words()]
     browser.close()

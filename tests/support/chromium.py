@@ -122,10 +122,16 @@ class Chromium:
         while event not in self.events:
             self._receive()
 
-    def visit(self, path: Path, width: int = 1200, height: int = 900) -> "Chromium":
-        """Load a page from a folder that also contains its scripts and styles."""
+    def visit(self, path: Path) -> "Chromium":
+        """Load a page from a folder that also contains its scripts and styles, in a window as narrow as a phone."""
         self._open_new_tab()
-        self.set_size(width, height)
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=390,
+            height=900,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
         self.faults = []
         self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
         return self
@@ -163,16 +169,6 @@ class Chromium:
             }
             return words;
         })()""")
-
-    def set_size(self, width: int, height: int) -> None:
-        """Set the size of the window [px]."""
-        self.call(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
-        )
 
     def evaluate(self, text: str):
         """Return the value of a JavaScript expression in the page; a promise is awaited."""

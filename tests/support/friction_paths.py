@@ -31,16 +31,14 @@ class PathHistory(NamedTuple):
     stored: np.ndarray
 
 
-def triangle_path(amplitude, cycles, per_stroke, start=0.0):
+def triangle_path(amplitude, cycles, per_stroke):
     """Return the knots of a triangle wave with `per_stroke` equal steps between reversals.
 
-    It begins at -amplitude if start < 0, else at 0.
+    It begins at 0.
     """
     stroke = np.linspace(-amplitude, amplitude, per_stroke + 1)
     cycle = np.concatenate([stroke[1:], stroke[::-1][1:]])
     path = np.concatenate([[-amplitude], *[cycle] * cycles])
-    if start < 0:
-        return path
     return np.concatenate([np.linspace(0, -amplitude, per_stroke // 2 + 1)[:-1], path])
 
 

@@ -24,18 +24,18 @@ def make_lugre_law():
     return FlowLaw(LuGre(0.8, 0.6, 8.0, 0.5, 0.02, 0.01).element(1.0))
 
 
-def make_sdof(xi=0.003, omega=1.0, mass=1.0):
+def make_sdof(xi=0.003):
     """Return a modal basis with a single mode."""
-    return make_modal_basis(omega, xi, mass=mass)
+    return make_modal_basis(1.0, xi)
 
 
-def make_five_modes(damping=None, zeta=0.02):
+def make_five_modes(damping=None):
     """Return a basis of five modes with the first frequency at 1 rad/s."""
     omega = np.array([1.0, 2.3, 3.9, 6.1, 8.8])
     slide = np.array([1.0, 0.7, -0.5, 0.4, 0.3])
     base = np.array([1.0, 0.3, 0.2, -0.1, 0.1])
     return make_modal_basis(
-        omega, zeta, slide, base, [1.0, -0.6, 0.4, 0.5, -0.2], mass=2.0, damping=damping
+        omega, 0.02, slide, base, [1.0, -0.6, 0.4, 0.5, -0.2], mass=2.0, damping=damping
     )
 
 
@@ -46,7 +46,7 @@ def make_elements(count=100, total=6.0, limit=1.2):
     return k, w * limit / (k @ w)
 
 
-def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
+def march_exactly(modes, drive, stiffness, limit, state, stretch, steps):
     """Propagate the modes exactly under a force that is linear in each step, found by fixed-point iteration.
 
     Returns rows (z, v) and forces.
@@ -71,7 +71,7 @@ def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=
     forces = [force]
     # Displacement at the interface per change of the force over a step.
     gain = modes.slide @ e[:n, 2 * n + 3] / dt
-    for i in range(steps * cycles):
+    for i in range(steps):
         s = np.array([np.sin(w * i * dt), np.cos(w * i * dt)])
         q = modes.slide @ y[:n]
         free = e[:, : 2 * n] @ y + e[:, 2 * n : 2 * n + 2] @ s + e[:, 2 * n + 2] * force

@@ -13,7 +13,7 @@ OMEGA, ZETA, RESIDUE = (
 TIME = STEP * np.arange(SAMPLES)
 
 
-def driven_response(quantity: str, seed: int = 1) -> tuple:
+def driven_response(quantity: str) -> tuple:
     """Return (input, response) of the modes from rest to sines with random phases.
 
     The sines are at all lines of the record up to 730 Hz. The steady response is a sum over the
@@ -23,7 +23,7 @@ def driven_response(quantity: str, seed: int = 1) -> tuple:
     spectrum = np.zeros(lines.size, complex)
     count = np.arange(5, 1500)
     spectrum[count] = (
-        np.exp(2j * np.pi * np.random.default_rng(seed).random(count.size)) * SAMPLES / 80
+        np.exp(2j * np.pi * np.random.default_rng(1).random(count.size)) * SAMPLES / 80
     )
     total = np.zeros(SAMPLES)
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
@@ -40,10 +40,10 @@ def driven_response(quantity: str, seed: int = 1) -> tuple:
     return np.fft.irfft(spectrum, SAMPLES), total
 
 
-def free_decay(amplitudes=(0.3, 0.2), offset=0.01, count=3000, omega=OMEGA, zeta=ZETA) -> tuple:
+def free_decay(amplitudes=(0.3, 0.2), omega=OMEGA, zeta=ZETA) -> tuple:
     """Return (time, displacement) of modes released from rest, those of this module by default."""
-    time = TIME[:count]
-    return time, offset + sum(
+    time = TIME[:3000]
+    return time, 0.01 + sum(
         a * np.exp(-z * w * time) * np.cos(w * np.sqrt(1 - z * z) * time + k)
         for k, (w, z, a) in enumerate(zip(omega, zeta, amplitudes))
     )

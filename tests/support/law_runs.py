@@ -74,7 +74,7 @@ def fit_law(folder, law: str, loop: tuple, free: str):
     return fit_hysteresis_loop(load(path), folder / "loop.csv", parse_ranges([free]))
 
 
-def shrinking_sine(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):
-    """Return (time, displacement) of a sine of 100 Hz with decreasing amplitude, which leaves minor loops open."""
-    time = np.arange(count * cycles + 1) / count / 100
-    return time, amplitude * (1 - 0.6 * time / time[-1]) * np.sin(2 * np.pi * 100 * time)
+def shrinking_sine(count: int = 400):
+    """Return (time, displacement) of three cycles of a decreasing sine of 100 Hz, which leaves minor loops open."""
+    time = np.arange(3 * count + 1) / count / 100
+    return time, 10e-6 * (1 - 0.6 * time / time[-1]) * np.sin(2 * np.pi * 100 * time)

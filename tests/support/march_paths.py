@@ -3,16 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from modal_bases import make_modal_basis
 
 from patchfem.points.slides import follow
 
 OMEGA = 2 * np.pi * 143
-
-
-def make_one_mode(omega, zeta, mass):
-    """Return a modal basis with one mode."""
-    return make_modal_basis(omega, zeta, mass=mass)
 
 
 class Path(NamedTuple):

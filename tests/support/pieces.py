@@ -62,10 +62,10 @@ def make_coated_pair(cells: int) -> Compliance:
 
 
 @cache
-def make_bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
-    """Return the compliance of uncoated blocks of the size of the test specimen."""
+def make_bare_pair() -> Compliance:
+    """Return the compliance of uncoated blocks of the size of the test specimen, with 32 columns."""
     return make_compliance(
-        graded_grid(LENGTH, HEIGHT, LENGTH / cells), make_bare_layers((young, TITANIUM[1]), plane)
+        graded_grid(LENGTH, HEIGHT, LENGTH / 32), make_bare_layers(TITANIUM, "strain")
     )
 
 

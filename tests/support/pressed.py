@@ -47,9 +47,9 @@ def press(pieces, gap, load, moment=None, rotation=0.0, spring=0.0) -> PressedPa
     return press_by_holder(pieces, gap, holder)
 
 
-def press_to_approach(pieces, gap, approach, rotation=0.0) -> PressedPatch:
+def press_to_approach(pieces, gap, approach) -> PressedPatch:
     """Press two bare pieces to a prescribed approach."""
-    return press_by_holder(pieces, gap, Holder(approach=approach, rotation=rotation))
+    return press_by_holder(pieces, gap, Holder(approach=approach))
 
 
 class PlainSolution(NamedTuple):
@@ -60,7 +60,7 @@ class PlainSolution(NamedTuple):
     n_iterations: int
 
 
-def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
+def solve_forces(c, x, gap, target) -> PlainSolution:
     """Solve the contact problem of a patch that is given as NumPy arrays.
 
     Parameters
@@ -71,17 +71,13 @@ def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSol
         Positions [m] and gap [m].
     target : (0,), (1,) or (2,) ndarray
         Nothing with the approach contained in the gap, load [N], or load and moment [N m].
-    start : (m,) bool ndarray, optional
-        Contact set of a similar problem.
-    spring : float
-        Stiffness of the holder [N m/rad].
 
     Returns
     -------
     PlainSolution
     """
     touch_approach = gap.min() if target.size else 0.0
-    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
-    solution = solve(StripCompliance(c), problem, start)
+    problem = patch_problem(x, gap - touch_approach, *map(float, target))
+    solution = solve(StripCompliance(c), problem)
     solution.motion[:1] += touch_approach
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)

@@ -14,11 +14,6 @@ LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)
 
 
-def fine_fraction(profile: Profile, length: float) -> float:
-    """Return the fraction of the rms height of a trace in waves shorter than a length [m]."""
-    return wave_spectrum(profile).lost_fraction(length)
-
-
 def make_cosines(orders, heights) -> Profile:
     """Return a sum of half-waves of the trace, which are orthogonal to each other and, if even, to a line."""
     return waves(X, heights, [2 * LENGTH / k for k in orders], [np.pi / 2] * len(orders))
@@ -30,9 +25,8 @@ def make_cosines(orders, heights) -> Profile:
     (2 * LENGTH, np.sqrt(14.0))])  # fmt: skip
 def test_exact_fine_fraction_of_three_waves(length, fraction):
     """The fine fraction of three waves is the root of the squares of the waves shorter than the given length."""
-    assert fine_fraction(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(
-        fraction / np.sqrt(14), abs=1e-9
-    )
+    spectrum = wave_spectrum(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]))
+    assert spectrum.lost_fraction(length) == pytest.approx(fraction / np.sqrt(14), abs=1e-9)
 
 
 def test_exact_lost_waves_are_reported_with_remedy():

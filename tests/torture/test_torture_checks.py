@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import CommandResult
-from torture import driver, results
+from torture import results
 from torture.trial import TrialFailure, check_result, limit_time
 
 PLANTED = {
@@ -74,11 +74,3 @@ def test_refuses_nan_in_result_file_and_leftover_files(tmp_path):
     (tmp_path / "out.partial").mkdir()
     with pytest.raises(TrialFailure, match=r"out\.partial"):
         results.check_no_remnants(tmp_path)
-
-
-def test_always_random_numbers_of_trial_are_reproducible():
-    """The random numbers of a trial depend only on its campaign, seed and index."""
-    trials = [("grammar", 5, 0), ("grammar", 5, 1), ("grammar", 6, 0), ("tables", 5, 0)]
-    numbers = [driver.make_generator(*trial).random() for trial in trials]
-    assert len(set(numbers)) == 4
-    assert driver.make_generator(*trials[0]).random() == numbers[0]

@@ -46,7 +46,7 @@ def make_contact_solver(compliance, x, gap, load=LOAD):
 def flat_contact():
     """Return contact solver, compliance, areas, wear rates and critical step of two flat uncoated
     blocks."""
-    pair = make_bare_pair(32)
+    pair = make_bare_pair()
     area = pair.interface.weight
     c = np.array(pair.normal)
     rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
@@ -59,12 +59,12 @@ def flat_contact():
     )
 
 
-def run_wear(problem, tolerance=1e-3, count=None):
+def run_wear(problem, tolerance=1e-3):
     """Return the last state and the number of steps of a complete wear run."""
     state = make_initial_wear_state(problem)
     jumps = 0
     while state.cycle < problem.cycles:
-        state = take_jump(problem, state, tolerance, count)
+        state = take_jump(problem, state, tolerance)
         jumps = jumps + 1
     return state, jumps
 
@@ -79,7 +79,7 @@ def test_exact_volume_without_pressure_oscillation_at_any_step(multiple):
     for count in range(1, 11):
         depth, force = solve_jump(press, depth, rate, multiple * critical)
         volume = KAPPA * LOAD * PATH * multiple * critical * count
-        assert depth @ area == pytest.approx(volume, rel=1e-12)
+        assert depth @ area == pytest.approx(volume, rel=1e-12, abs=0)
         assert np.abs(np.diff(force / area, 2)).max() <= 2 * np.abs(before).max()
     assert force.min() > 0
 
@@ -117,7 +117,7 @@ def test_order_two_for_transient_of_punch():
 def test_exact_steady_pressure_is_inverse_to_sliding_distance():
     """Under a non-uniform sliding distance s the pressure of a yawing pad tends to the classical p
     ~ 1/s, within 1e-11."""
-    pair = make_bare_pair(32)
+    pair = make_bare_pair()
     x = pair.interface.x
     area = pair.interface.weight
     width = pair.interface.width

@@ -64,7 +64,22 @@ def test_exact_symmetric_depth_has_no_direction():
         fit_wear(measured._replace(correlation=length), history) for length in (1.0, 25.0)
     )
     assert found.is_mirrored is None and found.centre.low < CENTRE < found.centre.high
-    assert correlated.depths.noise == pytest.approx(5 * found.depths.noise)
+    assert correlated.depths.noise == pytest.approx(5 * found.depths.noise, rel=1e-9, abs=0)
+
+
+def test_exact_common_error_of_depths_widens_the_interval():
+    """A standard deviation that all depths have in common moves the coefficient as depths that are larger by it do."""
+    measured = measure_depth(0.7)._replace(datum_error=0.0)
+    plain, moved, wide = (
+        fit_wear(each, make_history()).coefficient
+        for each in (
+            measured,
+            measured._replace(depth=measured.depth + 2e-8),
+            measured._replace(datum_error=2e-8),
+        )
+    )
+    added = np.sqrt((wide.high - wide.low) ** 2 - (plain.high - plain.low) ** 2) / 2
+    assert added / abs(moved.value - plain.value) == pytest.approx(1.96, rel=0.05)
 
 
 def test_always_interval_covers_true_coefficient():

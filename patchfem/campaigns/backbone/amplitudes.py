@@ -194,7 +194,9 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     # interpolation in logarithms; each step adds the points that it found
     tolerance = 1e-2 * joint.model.accuracy.tolerance
     for _ in range(MAX_FORCE_STEPS):
-        amplitudes_of_forces = np.array([_interpolate_amplitude(known, force) for force in forces])
+        # The largest force up to an amplitude leaves the first place at which a force is reached.
+        largest = np.log(np.maximum.accumulate(known.force))
+        amplitudes_of_forces = np.exp(np.interp(np.log(forces), largest, np.log(known.amplitude)))
         new = _estimate_forces(joint, np.unique(amplitudes_of_forces))
         reached = np.interp(amplitudes_of_forces, new.amplitude, new.force)
         if np.all(np.abs(reached - forces) <= tolerance * forces):
@@ -216,15 +218,3 @@ def _estimate_forces(joint: JointMode, amplitudes) -> Curve:
             "the force at the output that holds the phase resonance is not known here; give --amplitudes"
         )
     return curve
-
-
-def _interpolate_amplitude(curve: Curve, force: float) -> float:
-    """Return the smallest amplitude [m] at which the force [N] of a curve, a straight line in logarithms, is reached."""
-    above = int(np.argmax(curve.force >= force))
-    if not above:
-        return curve.amplitude[0]
-    places = slice(above - 1, above + 1)
-    log_amplitude = np.interp(
-        np.log(force), np.log(curve.force[places]), np.log(curve.amplitude[places])
-    )
-    return np.exp(log_amplitude)

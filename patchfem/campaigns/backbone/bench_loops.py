@@ -33,9 +33,9 @@ class SteadyLoop(NamedTuple):
 
 
 def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> SteadyLoop:
-    """Compute a friction loop with more and more cycles, until it is steady within the tolerance.
+    """Run a contact under a sinusoidal displacement until its friction loop is steady within the tolerance.
 
-    The number of cycles is doubled from run to run, up to `MAX_LOOP_CYCLES`. A loop is steady if its stiffness and its
+    Each run has twice as many cycles as the one before, up to `MAX_LOOP_CYCLES`. A loop is steady if its stiffness and its
     area are those of the run with half as many cycles.
 
     Parameters

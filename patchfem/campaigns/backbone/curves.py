@@ -341,16 +341,14 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     relative_error = MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    ranges = (
-        known & (amplitude < MAX_MICRO_SLIP_RATIO * slip),
-        known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
-    )
+    micro_slip = np.flatnonzero(known & (amplitude < MAX_MICRO_SLIP_RATIO * slip))
+    gross_slip = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_RATIO * slip))
 
     # The error of a slope is the sum of the relative errors of the losses at its ends over the width.
     loss_error = (2 * np.pi * curve.damping_error + ROUND_OFF_ERROR) * energy
     slopes = []
     errors = []
-    for points, first in zip(map(np.flatnonzero, ranges), (0, -2)):
+    for points, first in ((micro_slip, 0), (gross_slip, -2)):
         slope = None
         error = None
         if points.size > 1:
@@ -372,14 +370,14 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
     """
     falls = {}
     for method, curve in curves.items():
-        signs = (curve.damping[:-1] > 0) & (curve.damping[1:] <= 0)
-        if signs.any():
-            falls[method] = int(np.flatnonzero(signs)[-1])
-    if not falls:
+        falls[method] = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
+    method = next((name for name, places in falls.items() if places.size), None)
+    if method is None:
         return None
-    method, place = next(iter(falls.items()))
-    amplitudes = curves[method].amplitude[place : place + 2]
-    losses = amplitudes * curves[method].damping[place : place + 2]
+    curve = curves[method]
+    ends = falls[method][-1] + [0, 1]
+    amplitudes = curve.amplitude[ends]
+    losses = amplitudes * curve.damping[ends]
     joint = joint._replace(has_errors=False, has_force=False)
 
     def net_loss(log_amplitude: float) -> float:

@@ -121,21 +121,22 @@ class JointMode(NamedTuple):
         """Friction limit of the dominant interface [N]; 0 without friction."""
         model = self.model
         if len(model.rig.friction.interfaces) > 1 and self.patch is None:
-            interface = model.rig.friction.interfaces[self.face]
-            return interface.numbers.static * interface.load
+            return self.interface_limits[self.face]
         if model.friction is None:
             return 0.0
         load = model.nominal_load if self.patch is None else self.patch.pressure.load
         return model.friction.static * load
 
     @property
+    def interface_limits(self) -> list[float]:
+        """Friction limits of the interfaces [N] under the loads that their tables give; 0 without one."""
+        interfaces = self.model.rig.friction.interfaces
+        return [(face.numbers.static or 0.0) * (face.load or 0.0) for face in interfaces]
+
+    @property
     def is_linear(self) -> bool:
         """Whether no friction acts and no spring is nonlinear."""
-        interfaces = self.model.rig.friction.interfaces
-        has_friction = bool(self.friction_limit)
-        if len(interfaces) > 1:
-            limits = [face.numbers.static * (face.load or 0.0) for face in interfaces]
-            has_friction = has_friction or any(limits)
+        has_friction = bool(self.friction_limit) or any(self.interface_limits)
         return not (has_friction or self.model.rig.springs.is_nonlinear)
 
     @property

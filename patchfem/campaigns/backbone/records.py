@@ -95,8 +95,8 @@ def make_band(curves: dict[str, Curve]) -> Band | None:
     curve = curves[method]
     limits = []
     for name in ("frequency", "damping"):
-        low = getattr(curve, name) - getattr(curve, f"{name}_error")
-        high = getattr(curve, name) + getattr(curve, f"{name}_error")
+        low = np.full(curve.amplitude.size, np.inf)
+        high = -low
         for other in curves.values():
             indices, other_indices = match_amplitudes(curve, other)
             value = getattr(other, name)[other_indices]

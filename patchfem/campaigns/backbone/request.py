@@ -173,17 +173,15 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
     if not isinstance(value, str | float | int):
         return []
     written = read_values(axis.key, str(value))
-    text = written.texts[0]
-    is_listed = text in axis.values
+    text, *listed = written.texts + axis.texts
     if written.unit:
-        number = written.values[0]
-        text = format_quantity(number, written.unit, 4)
-        is_listed = np.isclose(axis.values, number, rtol=1e-9, atol=0).any()
+        values = written.values + axis.values
+        text, *listed = [format_quantity(number, written.unit, 4) for number in values]
     note = (
         f"the modes count as measured with {axis.key} = {text}, the value in the scene, which has to be that of the modal "
         "test"
     )
-    if not is_listed:
+    if text not in listed:
         note += "; no curve has this value"
     return [note]
 

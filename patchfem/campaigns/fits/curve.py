@@ -6,14 +6,14 @@ result at its starting points, the other is used.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import NotConverged, PatchfemError, frozen_array
+from ...core import NotConverged, PatchfemError
 from ...formatting import format_length, format_number
 from ...identify.advice import advise_test
 from ...identify.least_squares import Fit
@@ -21,7 +21,6 @@ from ...inputs.tables import TableFormat, read_columns
 from ...inputs.units import RATIO_UNITS
 from ...model.model import Model
 from ...model.source import locate_errors
-from ...response.errors import convergence_error
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
@@ -53,8 +52,6 @@ N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
-# Warning about what the intervals of a fit leave out
-NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
 class MeasuredCurve(NamedTuple):
@@ -278,10 +275,7 @@ class CurveModel(FreeKeys):
             """Return the residual (2k,) of the curve for values of the keys, over the standard deviations."""
             return ((self.compute(values, method) - measured.value) / measured.error).ravel()
 
-        problem = self.make_problem(residual)
-        if start is not None:
-            problem = replace(problem, start=start)
-        return problem.solve(starts, kind)
+        return self.make_problem(residual, start).solve(starts, kind)
 
     def weight_by_scatter(
         self, measured: MeasuredCurve, method: str, fit: Fit
@@ -343,8 +337,10 @@ class CurveModel(FreeKeys):
         return measured, fit.count_earlier_search(first)
 
 
-def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndarray:
-    """Compute frequency [Hz] and damping ratio of a rig at some amplitudes.
+def compute_points(
+    model: Model, amplitudes: np.ndarray, method: str, *, errors: bool = False
+) -> np.ndarray:
+    """Compute frequency [Hz] and damping ratio of a rig at some amplitudes, or their numerical errors.
 
     Parameters
     ----------
@@ -354,6 +350,8 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
         [m]
     method : str
         Of the backbone.
+    errors : bool
+        Whether the errors are returned in place of the values.
 
     Returns
     -------
@@ -366,12 +364,13 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
         If the mode never oscillates.
     """
     with locate_errors(model.source):
-        backbone = compute_backbone(model, "", amplitudes, (method,), errors=False)
+        backbone = compute_backbone(model, "", amplitudes, (method,), errors=errors)
     if method not in backbone.curves:
         raise PatchfemError(backbone.missing[method])
     curve = backbone.curves[method]
     distance = np.abs(np.log(curve.amplitude[:, None] / amplitudes))
-    points = np.array([curve.frequency, curve.damping])[:, distance.argmin(axis=0)]
+    names = [f"{name}_error" if errors else name for name in FITTED_NAMES]
+    points = np.array([getattr(curve, name) for name in names])[:, distance.argmin(axis=0)]
     return np.where(distance.min(axis=0) <= SAME_AMPLITUDE_TOL, points, np.nan)
 
 
@@ -439,9 +438,9 @@ def fit_curve(
         reference = method
         measured, fit = curves.refine(measured, reference, first)
 
-    # The curve of the fit, the effect of modes that the model neglects, and the band beyond the measured amplitudes
+    # The curve of the fit, its numerical error, and the band beyond the measured amplitudes
     fitted = curves.compute(fit.values, reference)
-    widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
+    widened, error_note = _widen_by_numerical_error(fit, curves, measured, reference)
     beyond, advice = extrapolate_curve(curves, measured, widened, reference)
     notes = [
         *(f"the fit is by {reference} alone: {name}: {reasons[name]}" for name in reasons),
@@ -455,7 +454,7 @@ def fit_curve(
         measured=measured,
         model=fitted,
         method=reference,
-        notes=tuple(filter(None, [*notes, mode_note, advice])),
+        notes=tuple(filter(None, [*notes, error_note, advice])),
         n_computed=curves.n_computed,
         beyond=beyond,
     )
@@ -536,52 +535,42 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
     )
 
 
-def _widen_by_missing_modes(
+def _widen_by_numerical_error(
     fit: Fit, curves: CurveModel, measured: MeasuredCurve, method: str
 ) -> tuple[Fit, str]:
-    """Widen the intervals of a fit by the effect of modes that a reduced structure neglects.
+    """Widen the intervals of a fit by the numerical error of the computed curve.
+
+    This error contains that of the modes that a reduced structure neglects.
 
     Parameters
     ----------
     fit : Fit
-        Fit by `method`.
+        Fit, with its intervals.
     curves : CurveModel
-        Models of the scene, with the values of the keys.
+        Curves of the rig.
     measured : MeasuredCurve
-        Curve to which the keys are fitted.
+        Measured curve.
     method : str
-        Method of the fitted curve.
+        Method of the computed curve.
 
     Returns
     -------
-    fit : Fit
-        With wider intervals.
-    note : str
-        "" if no mode is neglected.
+    tuple of Fit and str
+        Fit with wider intervals, and a note on the error.
     """
-    rig_model = curves.build_model(fit.values)
-    richer = rig_model.rig.structure.richer_rig
-    if richer is None:
-        return fit, ""
+    model = curves.build_model(fit.values)
     try:
-        richer_curve = compute_points(replace(rig_model, rig=richer), curves.amplitude, method)
+        error = compute_points(model, curves.amplitude, method, errors=True)
     except PatchfemError as reason:
-        return fit, f"{NO_MODE_ERROR}: {reason}"
+        return fit, f"the intervals do not contain the numerical error of the curve: {reason}"
 
-    # The neglected modes change the computed curve by `error`. A fit to the measured curve less this error shows how far
-    # they shift each value, and the interval of the value is widened by its shift to both sides.
-    reference = curves.compute(fit.values, method)
-    change = np.nan_to_num(richer_curve - reference)
-    error = convergence_error(change, ratio=0.5, order=2.0)
-    moved = curves.solve(measured._replace(value=measured.value - error), method, start=fit.values)
-    shifts = np.abs(moved.values - fit.values)
-    bounds = np.array([(bound.low, bound.high) for bound in curves.ranges])
-    ends = fit.intervals.ends + shifts[:, None] * [-1, 1]
-    ends = frozen_array(np.clip(ends, bounds[:, :1], bounds[:, 1:]))
-
-    frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
+    # The errors of one quantity have the same sign at all amplitudes, so that they are one error of the model.
+    error = np.nan_to_num(error)
+    changes = np.eye(2)[:, :, None] * (error / measured.error)
+    curve = curves.compute(fit.values, method)
+    frequency, damping = 100 * np.max(error / np.abs(curve), axis=1)
     note = (
-        "the intervals contain the error of the modes left out of the structure; a computation "
-        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up to {damping:.2g} %"
+        f"the intervals contain the numerical error of the curve, up to {frequency:.2g} % of the frequency and "
+        f"{damping:.2g} % of the damping ratio"
     )
-    return replace(fit, intervals=replace(fit.intervals, ends=ends)), note
+    return curves.widen(fit, changes.reshape(2, -1)), note

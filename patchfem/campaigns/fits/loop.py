@@ -16,9 +16,11 @@ from ...inputs.loops import Loop, read_loop
 from ...model.gap import find_shape_side
 from ...model.model import Model, build
 from ...model.source import locate_errors
+from ...response.errors import convergence_error
 from ...runs.batch.meshes import SharedMeshes
 from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
+from ...runs.patch.mesh_levels import solve_with_coarser
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
 from ..held_out import select_held_out
@@ -104,7 +106,10 @@ class BenchModel:
         self.say = say
         law = keys.scene.friction.law
         is_rigid = law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
-        self.is_discontinuous = law_has_trait(law, "creeps") or is_rigid
+        # The force of elastic pieces does not jump where the speed does.
+        contact = keys.scene.contact
+        is_elastic = contact is not None and bool(contact.compliance_key)
+        self.is_discontinuous = (law_has_trait(law, "creeps") or is_rigid) and not is_elastic
         self.is_exact = _is_step_independent(keys.scene)
         steps = keys.scene.accuracy.steps_per_cycle
         self.has_fixed_steps = steps is not None
@@ -123,11 +128,13 @@ class BenchModel:
         """
         model = self.keys.build_model(values)
         with locate_errors(model.source):
-            return self._compute_reading(model)
+            return self._compute_reading(model, self._solve_patch(model))
 
-    def _compute_reading(self, model: Model) -> np.ndarray:
-        """Compute the force [N] or the friction ratio [1] (k,) of a model along the measured displacement."""
-        patch = self._solve_patch(model)
+    def _compute_reading(self, model: Model, patch) -> np.ndarray:
+        """Compute the force [N] or the friction ratio [1] (k,) of a model along the measured displacement.
+
+        `patch` is the solved contact patch, or None for a [normal] contact.
+        """
         corner = np.arange(self.time.size) * self.steps_per_row
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, self.time)
@@ -169,18 +176,31 @@ class BenchModel:
                 continue  # the search counts this error as a failed evaluation, too
         return SharedMeshes(models, False)
 
-    def measure_step_error(self, values: np.ndarray) -> float:
-        """Return the largest change of the computed reading when the time steps are halved.
+    def measure_step_change(self, values: np.ndarray) -> np.ndarray:
+        """Return the change (k,) of the computed reading when the time steps are halved.
 
         `values` (n,) are those of the free keys. The change is 0 if the steps have no effect.
         """
-        if self.is_exact:
-            return 0.0
         coarse = self(values)
+        if self.is_exact:
+            return np.zeros_like(coarse)
         self.steps_per_row *= 2
         fine = self(values)
         self.steps_per_row //= 2
-        return np.abs(fine - coarse).max()
+        return fine - coarse
+
+    def measure_mesh_change(self, values: np.ndarray) -> np.ndarray:
+        """Return the change (k,) of the computed reading from the coarser mesh of a patch to its own; 0 without one.
+
+        `values` (n,) are those of the free keys.
+        """
+        model = self.keys.build_model(values)
+        if model.patch is None:
+            return np.zeros(self.time.size)
+        fine, coarse, *_ = solve_with_coarser(model.patch, model.accuracy.tolerance)
+        if coarse is None:
+            return np.zeros(self.time.size)
+        return self._compute_reading(model, fine) - self._compute_reading(model, coarse)
 
     def refine_steps(self, values: np.ndarray) -> None:
         """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
@@ -195,7 +215,7 @@ class BenchModel:
         """
         limit = STEP_FRACTION * self.keys.scene.accuracy.tolerance
         while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
-            if self.measure_step_error(values) <= limit * np.abs(self(values)).max():
+            if np.abs(self.measure_step_change(values)).max() <= limit * np.abs(self(values)).max():
                 return
             self.steps_per_row *= 2
             if self.say:
@@ -258,9 +278,7 @@ def fit_hysteresis_loop(
     loop = read_loop(loop_file)
     held_out = np.zeros(loop.reading.size, bool)
     for selector in options.hold:
-        held_out |= select_held_out(
-            selector, loop.path, loop.labels, _has_label, lambda _, label: label
-        )
+        held_out |= select_held_out(selector, loop.path, loop.labels)
     time, notes = _find_row_times(scene, loop)
     keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
     keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
@@ -289,32 +307,26 @@ def fit_hysteresis_loop(
         fit = replace(problem, start=first.values).solve(1, "series")
         fit = fit.count_earlier_search(first)
 
+    # The intervals contain the numerical error of the force, from half the steps and from a coarser mesh.
+    step_change = bench.measure_step_change(fit.values)
+    changes = np.array(
+        [
+            convergence_error(1.0, ratio=0.5, order=2.0) * step_change,
+            convergence_error(1.0) * bench.measure_mesh_change(fit.values),
+        ]
+    )
+    fit = keys.widen(fit, changes[:, ~held_out] / scale)
+
     # The warnings need the fitted loop, and belong to its keys.
     fitted = FittedLoop(
         keys=keys.make_fitted_keys(fit),
         loop=loop,
         held_out=held_out,
         model=bench(fit.values),
-        step_error=bench.measure_step_error(fit.values),
+        step_error=np.abs(step_change).max(),
         steps_per_row=bench.steps_per_row,
     )
     return replace(fitted, keys=keys.make_fitted_keys(fit, _warn_of_doubtful_fit(fitted)))
-
-
-def _has_label(column: str, label: str, text: str) -> bool:
-    """Return whether a label is that of the option --hold; texts of numbers are compared as numbers.
-
-    `column` is that of the label.
-    """
-    return _parse_label(label) == _parse_label(text)
-
-
-def _parse_label(text: str) -> float | str:
-    """Return the text of a label as a number if it is one, or else unchanged."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:

@@ -154,11 +154,18 @@ class FreeKeys:
                 f"{len(self.ranges)} values and their intervals"
             )
 
-    def make_problem(self, residual: Callable[[np.ndarray], np.ndarray]) -> Problem:
-        """Return the least-squares problem of a residual, a function of the values (n,) [SI] of the keys."""
+    def make_problem(self, residual: Callable[[np.ndarray], np.ndarray], start=None) -> Problem:
+        """Return the least-squares problem of a residual, a function of the values (n,) [SI] of the keys.
+
+        The search begins at the values `start` (n,), or at those of the scene.
+        """
         low = [bound.low for bound in self.ranges]
         high = [bound.high for bound in self.ranges]
-        return Problem(residual, low, high, self.start())
+        return Problem(residual, low, high, self.start() if start is None else start)
+
+    def widen(self, fit: Fit, changes: np.ndarray) -> Fit:
+        """Return a fit with intervals that contain the effect of numerical errors of the model (`Fit.widen`)."""
+        return fit.widen(changes, [(bound.low, bound.high) for bound in self.ranges])
 
     def make_fitted_keys(self, fit: Fit, warnings: Sequence[str] = ()) -> FittedKeys:
         """Return the fitted values with their intervals and all warnings, after those of this kind of fit."""

@@ -7,6 +7,7 @@ from ...core import PatchfemError
 from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
 from ...inputs.tables import read_text
 from ...model.model import build
+from ...scene.files import UNIVERSAL_EXTENSIONS
 from ...scene.scene import Scene
 from ..rows.fit import FittedRows, fit_rows
 from .curve import CURVE_HEADER, CURVE_UNITS, FittedCurve, fit_curve
@@ -83,17 +84,20 @@ def choose_kind(scene: Scene, to: str) -> str:
     if scene.kind not in ("rig", "linear"):
         return "loop"
     path = Path(to)
-    if path.suffix.lower() != ".csv" or not path.is_file():
+    if not path.is_file():
         return "rows"
-    names = read_text(path, "a measured table").names
+    names = []
+    if path.suffix.lower() not in (".mat", *UNIVERSAL_EXTENSIONS):
+        names = read_text(path, "a measured table").names
     columns = {name.lower().removeprefix("decay_") for name in names}
     if columns & (CURVE_UNITS.keys() - COLUMN_UNITS.keys()):
         return "curve"
-    if columns & {*COLUMN_UNITS, "time"}:
+    if columns.intersection(TABLE_FORMAT.required):
         return "rows"
     raise PatchfemError(
         f"{path}:1: a header like `{CURVE_HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
-        f"(response to a sine) is needed, not '{','.join(names)[:80]}'"
+        f"(response to a sine) is needed, not '{','.join(names)[:80]}'; a free decay in records over time "
+        f"is fitted as the table that `patchfem import {path} --decay -o decay.csv` writes"
     )
 
 

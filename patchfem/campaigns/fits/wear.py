@@ -16,6 +16,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...core import Measure, Missing, NotConverged, PatchfemError
+from ...inputs.damage import refuse_damage
 from ...model.model import Model
 from ...runs.patch import mesh_levels
 from ...runs.patch.press import nodal_areas
@@ -137,17 +138,13 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
 
     Raises PatchfemError for a comparison of measured surfaces, whose depth is that of one piece.
     """
-    try:
-        content = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
+    if not path.is_file():
         raise Missing(
             f"{path}: no such file; give --to the JSON file that compare writes for two runs, or "
             "worn_depth_max=VALUE"
-        ) from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise PatchfemError(
-            f"{path}: this is not the JSON file that compare writes ({error})"
-        ) from None
+        )
+    with refuse_damage(f"{path}: this is not the JSON file that compare writes"):
+        content = json.loads(path.read_text("utf-8"))
 
     # compare.json has the depths beside other tables, and summary.json among its measures.
     measures = content if isinstance(content, dict) else {}

@@ -8,16 +8,12 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
-from ...scene.keys.quantities import parse_quantity
-from ..held_out import find_cells, select_held_out
+from ..held_out import EQUAL_TOL, find_cells, format_cell, select_held_out
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
-EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
-# Kind of quantity of each column that belongs to a condition
-CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,7 +75,7 @@ class Readings:
         Examples are "frequency=135 Hz,150 Hz" and "run=143 Hz repeat". Raises PatchfemError for a
         value without a unit, and for a value that no row has.
         """
-        return select_held_out(selector, self.path, self.columns, _cell_matches, _format_cell)
+        return select_held_out(selector, self.path, self.columns)
 
     def group_by_column(self, name: str, selected: np.ndarray) -> dict[str, np.ndarray]:
         """Group the readings of a mask `selected` (n,) by the values of the table column `name`.
@@ -89,7 +85,7 @@ class Readings:
         groups: dict[str, np.ndarray] = {}
         for reading, value in enumerate(find_cells(self.columns, name, self.path)):
             if selected[reading]:
-                group = groups.setdefault(_format_cell(name, value), np.zeros(selected.size, bool))
+                group = groups.setdefault(format_cell(name, value), np.zeros(selected.size, bool))
                 group[reading] = True
         return groups
 
@@ -110,26 +106,6 @@ class Readings:
             ratio = np.log(np.maximum(computed, lower_limit))
             ratio -= np.log(np.maximum(self.measured, lower_limit))
         return np.clip(ratio, -MAX_LOG_RATIO, MAX_LOG_RATIO)
-
-
-def _cell_matches(name: str, value, text: str) -> bool:
-    """Return whether the value of a cell in the column `name` matches a text of the option --hold.
-
-    A flag matches if it contains the text, a frequency or an input if it is equal but for round-off.
-    """
-    if name not in CONDITION_COLUMNS:
-        return text in value if name == "flag" else text == value
-    try:
-        selected = parse_quantity(text, CONDITION_COLUMNS[name])
-    except ValueError as error:
-        raise PatchfemError(f"--hold {name}={text}: {error}") from None
-    return abs(value - selected) <= EQUAL_TOL * abs(selected)
-
-
-def _format_cell(name: str, value) -> str:
-    """Format the value of a cell in the column `name` with its unit."""
-    unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
-    return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
 def _number_values(values) -> np.ndarray:

@@ -159,7 +159,10 @@ def make_menu(answers: Answers, chart: Chart) -> Panel | None:
 
 
 def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
-    """Return a panel with a menu of panels, or the only panel; None without panels."""
+    """Return the first of the panels with a menu of all of them, and with title, caption and style of the chart.
+
+    A single panel has no menu, and its own style. Without panels the panel is None.
+    """
     if not panels:
         return None
     panel = replace(panels[0], title=chart.title, caption=chart.caption)

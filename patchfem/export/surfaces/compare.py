@@ -24,7 +24,7 @@ from . import sentences
 from .sentences import to_answers
 from .variables import band, make_variables, maps
 
-SIDES = ("before", "after")
+SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
 STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
@@ -130,7 +130,7 @@ def make_answer(comparison: Comparison) -> Answer:
             "direction": comparison.direction or None,
             **_describe_place(comparison),
             "other_tracks": [to_answers(other.values) for other in comparison.tracks[1:]],
-            "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
+            "removed": dict(zip(SURFACE_NAMES, comparison.evidence.removed, strict=True)),
             **_compare_roughness(comparison),
             "notes": file_notes,
         },
@@ -176,7 +176,7 @@ def build(
         "verdict": words.verdict[0],
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
         "confidence": LEVEL,
-        **dict(zip(SIDES, sources, strict=True)),
+        **dict(zip(SURFACE_NAMES, sources, strict=True)),
         **to_answers(values),
         "track": to_answers(track) or None,
     }
@@ -261,7 +261,7 @@ def _make_separate(comparison: Comparison) -> Variables:
         return {}
     data = {}
     traces = [level(resample_evenly(each)) for each in (comparison.before, comparison.after)]
-    for side, trace in zip(SIDES, traces, strict=True):
+    for side, trace in zip(SURFACE_NAMES, traces, strict=True):
         data |= make_variables(f"x_{side}", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
     return data | _make_abbott([trace.z for trace in traces])
 

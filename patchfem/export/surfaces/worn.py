@@ -11,7 +11,7 @@ from ...wear.between_runs import Wear
 from .. import quantities
 from ..answer import Answer, Quantity, Variables
 from . import sentences
-from .compare import SIDES, build
+from .compare import SURFACE_NAMES, build
 from .patches import PatchRun, read_patch
 from .sentences import format_value
 from .variables import make_variables, maps
@@ -75,7 +75,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     verdict = describe(runs, wear)
     sides = {}
     warnings = []
-    for side, run in zip(SIDES, runs, strict=True):
+    for side, run in zip(SURFACE_NAMES, runs, strict=True):
         known = {name: run.answer.quantities.get(name) for name in MEASURES}
         measures = {name: q for name, q in known.items() if sentences.is_known(q)}
         outcome = run.answer.details.get("outcome")
@@ -103,10 +103,11 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
             "reference": "run",
             **zero,
             "registration": zero | {"mirrored": False},
-            "removed": dict.fromkeys(SIDES, 0),
+            "removed": dict.fromkeys(SURFACE_NAMES, 0),
             "runs": sides,
             "measures": {
-                name: {side: sides[side]["measures"].get(name) for side in SIDES} for name in names
+                name: {side: sides[side]["measures"].get(name) for side in SURFACE_NAMES}
+                for name in names
             },
             "notes": warnings,
         },
@@ -179,7 +180,7 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
         data |= make_variables("track_end", track_end=ends)
 
     # Pressure of the last frame, and the loop of a patch without strips.
-    for side, run in zip(SIDES, runs, strict=True):
+    for side, run in zip(SURFACE_NAMES, runs, strict=True):
         variables, x = run.answer.data, f"x_pressed_{side}"
         pressure = (variables["normal_stress"].values[-1], "Pa")
         data |= make_variables(x, **{x: run.state.x, f"pressure_{side}": pressure})

@@ -36,9 +36,9 @@ MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
 
 @dataclass(frozen=True, slots=True)
 class EngineChoice:
-    """Algorithm (engine) that sums the bonds of eq. 2.17, with its settings and error bound.
+    """Engine, that is the algorithm that sums eq. 2.17, with its settings and the bound of its error.
 
-    - engine: name of the engine
+    - engine: name of the engine, one of `ENGINES`
     - tail: fraction of the friction limit that the cut-off may lose
     - merge: width [eps_0] up to which strips are merged
     - error: bound of the total error / friction limit

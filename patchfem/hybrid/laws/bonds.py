@@ -52,7 +52,7 @@ def force_and_rates(p, memory, point, s, rates):
         rest_rate = growth / growth_speed * (first_length - bond_length)
         rates[3] = rest_rate + speed / p[4] * (p[2] - bond_length)
 
-    # Moments of the bonds: density, mean stretch and mean square stretch
+    # Rates m', z' and w' of the density and of the first and second moment of the stretch
     breaking = speed / bond_length
     rates[0] = (1 - density) * breaking
     rates[1] = density * v - stretch * breaking

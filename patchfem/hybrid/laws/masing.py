@@ -20,7 +20,7 @@ import numpy as np
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
-HELPERS = ("find_branch",)
+HELPERS = ("find_branch", "forget_loop")
 POINTS = 5  # first of the n + 1 displacements among the numbers
 TURNS_FREELY = (
     -1.0
@@ -63,6 +63,30 @@ def find_branch(memory, point):
         return Branch(count, 1.0, 0.0, direction * q, q)
     last = Memory.STACK + 2 * count - 2
     return Branch(count, 0.5, memory[last + 1], 0.5 * direction * (q - memory[last]), q)
+
+
+def forget_loop(memory, count):
+    """Remove the loop between two successive reversals whose absence changes the later branches least.
+
+    It is that closest to the loops around and inside it.
+
+    Parameters
+    ----------
+    memory : (l,) array
+        Row of `records.State.memory`.
+    count : int
+        Number of reversals on the stack.
+    """
+    end = Memory.STACK + 2 * count - 4
+    least = np.inf
+    first = end
+    for k in range(Memory.STACK + 2, end, 2):
+        gap = abs(memory[k + 2] - memory[k - 2]) * abs(memory[k + 4] - memory[k])
+        if gap < least:
+            least = gap
+            first = k
+    for k in range(first, end):
+        memory[k] = memory[k + 4]
 
 
 def force_and_rates(p, memory, point, s, rates):
@@ -203,9 +227,7 @@ def switch(p, memory, point, s, which):
                 memory[Memory.STACK] = -q
                 memory[Memory.STACK + 1] = -force
             if Memory.STACK + 2 * n + 2 > memory.size:
-                # The stack is full: the two innermost reversals of the oldest are given up.
-                for j in range(Memory.STACK + 2, memory.size - 4):
-                    memory[j] = memory[j + 4]
+                forget_loop(memory, n)
                 n -= 2
             memory[Memory.STACK + 2 * n] = q
             memory[Memory.STACK + 2 * n + 1] = force
@@ -274,9 +296,11 @@ def from_keys(friction, load, speed):
     """
     limit = friction.static * load
     if friction.law == "iwan":
+        from ...friction.laws.iwan import max_yield_displacement
+
         chi = friction.chi
         beta = friction.beta
-        length = limit * (1 + beta) / (friction.stiffness * (beta + (chi + 1) / (chi + 2)))
+        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
         numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
         return LawNumbers("masing", numbers, length=limit / friction.stiffness)
     length = friction.bond_length or limit / friction.stiffness

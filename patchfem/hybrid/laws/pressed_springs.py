@@ -36,15 +36,20 @@ def force_and_rates(p, memory, point, s, rates):
     if side == 0:
         rates[0] = s[1] * v / p[1]
         rates[1] = growth
-        return Friction(p[0] * s[0], 0.0, 0.0)
+        force = p[0] * s[0]
+        slip_rate = 0.0
+    else:
+        # The force follows the load; only a rising load stretches the springs further.
+        elastic = side * max(point.load_rate, 0.0) * p[1] / s[1] if s[1] > 0 else 0.0
+        slip_rate = v - elastic
+        rates[0] = side * point.load_rate
+        rates[1] = growth - max(s[1] - point.load, 0.0) * max(side * slip_rate, 0.0) / p[1]
+        force = side * p[0] * point.load
 
-    # The force follows the load; only a rising load stretches the springs further.
-    elastic = side * max(point.load_rate, 0.0) * p[1] / s[1] if s[1] > 0 else 0.0
-    slip_rate = v - elastic
-    rates[0] = side * point.load_rate
-    rates[1] = growth - max(s[1] - point.load, 0.0) * max(side * slip_rate, 0.0) / p[1]
-    force = side * p[0] * point.load
-    return Friction(force, slip_rate, force * slip_rate)
+    # What the springs do not store, E = mu eps y^2/(2 s), is lost: also where a falling load cuts their force at rest.
+    stretch = s[0] / s[1] if s[1] > 0 else 0.0
+    storing = p[0] * p[1] * stretch * (rates[0] - 0.5 * stretch * rates[1])
+    return Friction(force, slip_rate, force * v - storing)
 
 
 def write_margins(p, memory, point, s, margins):

@@ -181,9 +181,9 @@ def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResult
 
 
 def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults:
-    """Compute the case results of models by marches with more and more steps, and by single runs where these are better.
+    """Compute the case results of models by marches, each with more steps than the one before, or by single runs.
 
-    `report` takes a line of text on the progress of a single run.
+    A single run computes each case that `needs_single_run` names. `report` takes a line of text on its progress.
     """
     begin = perf_counter()
     cases, scales = collect_cases(models)

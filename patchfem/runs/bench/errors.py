@@ -10,9 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
+from ...response.coarser import (
+    CoarserRuns,
+    StepRun,
+    estimate_errors,
+    list_step_runs,
+    second_order_errors,
+)
 from ...response.errors import (
-    FrictionScale,
     convergence_errors,
     finer_errors,
     friction_errors,
@@ -97,10 +102,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
     # The history of step numbers serves the accuracy curve of the report.
-    step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
-    for settings in coarser_runs[0].runs:
-        run = bench_runs[settings]
-        step_runs.append(StepRun(settings.steps, run.seconds, run.values))
+    step_runs = list_step_runs(steps, fine_run, coarser_runs, bench_runs)
     seconds = sum(run.seconds for run in bench_runs.values())
     return BenchErrors(errors, seconds, step_runs)
 
@@ -164,12 +166,10 @@ def find_bond_sum_error(engine) -> float:
 def _estimate_bond_sum_errors(model, fine_run) -> Values:
     """Estimate the errors of the measures due to bond summation."""
     work = np.abs(np.diff(fine_run.ledger[0]))
-    friction = model.friction
-    scale = FrictionScale(
-        friction.static,
-        friction.static * float(fine_run.load.max()),
-        friction.bond_length,
-        float(work.sum()),
-        float(work[fine_run.first :].sum()),
+    return friction_errors(
+        fine_run.values,
+        find_bond_sum_error(fine_run.engine),
+        model.friction,
+        float(fine_run.load.max()),
+        (float(work.sum()), float(work[fine_run.first :].sum())),
     )
-    return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)

@@ -48,10 +48,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         patches = [mesh for mesh in inputs.patches if mesh is not None] or [None]
         error_estimates = estimate_bench_errors(model, patches, fine, steps, inputs.say)
         inputs.seconds["error"] = error_estimates.seconds
-    step_values = [run.values for run in error_estimates.step_runs]
-    measures = add_errors(
-        fine.values, error_estimates.errors, step_values, min_relative_error=1e-10
-    )
+    measures = add_errors(fine.values, error_estimates.errors, min_relative_error=1e-10)
 
     # The friction ratio has one limit only under a constant load.
     settings = Settings(fine.engine.name, steps_per_cycle=steps)

@@ -66,9 +66,6 @@ MAX_WAVE_CELL_RATIO = 2.0
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
 MAX_SEARCHES = 8
-# Largest change of a band, relative to its cell length, at which the search ends; the next search
-# would have the same columns.
-BAND_CHANGE_TOL = 0.1
 MIN_LEVELS = 3  # Smallest number of nested meshes at which the order of convergence is known.
 # Largest predicted CPU time [s] of condensing a mesh, by whether the mesh is a fine one; more
 # expensive meshes are not tried.
@@ -148,8 +145,8 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
     """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
-    contact. The search ends when the cells at all edges are short compared to the contact, or when the
-    bands of short cells no longer change, after MAX_SEARCHES solutions at most.
+    contact. The search ends when the cells at all edges are short compared to the contact, after
+    MAX_SEARCHES solutions at most.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
@@ -188,10 +185,9 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
         if not solved:
             break
         contact = solved[0][1][0]
-        previous_layout = layout
         layout = _merge_layouts([make_column_layout(*one) for one in solved])
 
-        # The next layout follows from these contacts; the search compares the two.
+        # The search ends when this grid has resolved all contacts.
         max_ratio = 1 / (EDGE_CELLS[first.mesh.is_fine] - 1)
         is_resolved = True
         for case, extents in solved:
@@ -199,7 +195,7 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
             zones = extents[0].slip_zones
             is_resolved &= edge_cell_ratio <= max_ratio
             is_resolved &= _resolves_contact(case, pair.grid.x, layout, zones)
-        if is_resolved or _have_bands_converged(layout, previous_layout):
+        if is_resolved:
             break
     return layout, contact
 
@@ -218,16 +214,6 @@ def make_load_variants(patch_model) -> list[PatchModel]:
     if patch_model.mesh.edge_motion != "load" or load is None:
         return []
     return [patch_model.with_loading(load=factor * load) for factor in LOAD_RANGE_FACTORS]
-
-
-def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
-    """Return whether the graded bands of two successive column layouts agree."""
-    if len(layout.bands) != len(previous_layout.bands):
-        return False
-    bands = np.reshape(layout.bands, (-1, 3))
-    previous_bands = np.reshape(previous_layout.bands, (-1, 3))
-    cells = np.minimum(bands[:, 2:], previous_bands[:, 2:])
-    return bool((np.abs(bands - previous_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
 def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:

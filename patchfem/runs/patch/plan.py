@@ -158,21 +158,8 @@ def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
     )
 
 
-def describe_patch_plan(dimensionless_groups: Values, patch_model) -> list[str]:
-    """Describe tilt and asperity layer of a patch in sentences for a plan.
-
-    The tilt is compared with the opening tilt for flat pieces only.
-    """
-    rough = []
-    if patch_model.interface.skin is not None:
-        pieces = patch_model.pieces
-        mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
-        rough = skin.note_on_asperity_stiffness(patch_model, mean_pressure)
-    return [*_describe_tilt(dimensionless_groups, patch_model), *rough]
-
-
-def _describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
-    """Return a list with a sentence on the tilt relative to the tilt at which the contact opens."""
+def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
+    """Return a list with a sentence on the tilt relative to the tilt at which the contact of flat pieces opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:

@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine.
 
 In: a Model. Out: numbers of steps, CPU times, and whether a time integration with constant steps is
 chosen instead of steps from event to event.
@@ -14,9 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import cost_model
-from ...core import Missing
 from ...effects import law_has_trait
-from ...hybrid import cases
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import find_max_frequency_ratio
@@ -24,8 +22,6 @@ from ...structure.drive_sizes import find_max_frequency_ratio
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
 MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
-# Ratio of predicted to possible steps of `hybrid` above which a run is refused at once; the engine itself ends one below.
-MAX_STEPS_EXCESS = 10.0
 HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
 MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
 STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -208,20 +204,3 @@ def prefers_time_steps(model: Model) -> bool:
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
     return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
-
-
-def refuse_long_hybrid_run(model: Model) -> None:
-    """Raise Missing if a run of the engine `hybrid` needs many more steps than the engine takes."""
-    steps = estimate_hybrid_steps(model)
-    cycles = model.rig.drive.cycles
-    max_steps = cases.MAX_STEPS + cases.MAX_CYCLE_STEPS * cycles
-    if steps * cycles > MAX_STEPS_EXCESS * max_steps:
-        march = ""
-        if estimate_march_seconds(model) < estimate_hybrid_seconds(model):
-            march = ', or use accuracy.method = "march"'
-        raise Missing(
-            f"the motion from event to event would need about {steps * cycles:.2g} steps ({steps:.2g} per cycle, set by "
-            f"events, the fastest free vibration and the friction law), far more than the limit of {max_steps:.1g} steps of "
-            f"a run; lower drive.cycles or the stiffness of modes and elements{march}",
-            "",
-        )

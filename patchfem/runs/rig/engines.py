@@ -17,7 +17,6 @@ from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, ComparisonRuns, second_order_errors
 from ...response.errors import (
-    FrictionScale,
     convergence_errors,
     estimate_sampling_errors,
     finer_errors,
@@ -190,19 +189,12 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
 
     def bound_errors(values: Values) -> Values:
         """Return the errors of the measures due to truncation of the sum over bonds."""
-        friction = model.friction
         load = first_interface_load(model, patch)
         window = solution.window
         passed = np.abs(np.diff(window.extra["ledger"][0])).sum()
         span = max(window.time[-1] - window.time[0], 1e-300)
-        scale = FrictionScale(
-            friction.static,
-            friction.static * load,
-            friction.bond_length,
-            solution.book["passed"],
-            passed * model.rig.drive.signal.period / span,
-        )
-        return friction_errors(values, choice.error, scale)
+        works = solution.book["passed"], passed * model.rig.drive.signal.period / span
+        return friction_errors(values, choice.error, model.friction, load, works)
 
     # The change of the motion adds to the bound where strips or the tail are coarse.
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]

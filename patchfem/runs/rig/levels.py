@@ -57,8 +57,8 @@ def add_level_errors(
         }
         sources = estimate_errors(None, level.values, coarser_runs, solved)
         errors = dict(level.errors)
-        for name, causes in split_errors(level.values, sources).items():
-            errors[name] = errors.get(name, 0.0) + sum(causes.parts.values())
+        for name, parts in split_errors(level.values, sources).items():
+            errors[name] = errors.get(name, 0.0) + sum(parts.values())
         levels_with_errors.append(replace(level, errors=errors))
     return tuple(levels_with_errors)
 

@@ -98,26 +98,6 @@ def _is_single_point(run, face: Face) -> bool:
     return is_flat and law is not None and not law_has_trait(law.law, "averaged")
 
 
-def _warn_of_shear_modes(run) -> Iterator[str]:
-    """Warn of a patch whose nodes are replaced by shear modes, because its load changes or it slides over grooves."""
-    model = run.model
-    contact = run.solution.contact
-    reduction = getattr(contact, "reduction", None)
-    if run.patch is None or reduction is None:
-        return
-    if model.rig.friction.load_varies:
-        n_nodes = contact.sets.x.size
-    elif model.grooves is not None and model.partial_slip:
-        n_nodes = reduction.points.size
-    else:
-        return
-    yield (
-        f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
-        f"of elements; {reduction.stiffness.size} tangential modes of the {n_nodes} nodes are used instead (key "
-        "accuracy.shear_modes)"
-    )
-
-
 def _warn_of_engine(run) -> Iterator[str]:
     """Warn of what the engine reports: an unfinished change of the drive, its own messages, and remaining vibration.
 
@@ -229,7 +209,6 @@ def _note_on_end(run) -> Iterator[str]:
 
 WARNINGS = (
     _warn_of_single_points,
-    _warn_of_shear_modes,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
     _warn_of_large_slides,

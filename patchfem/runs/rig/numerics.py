@@ -12,7 +12,7 @@ from ...effects import law_has_trait
 from ...hybrid import cases
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
-from .costs import MARCH_SETTINGS, steps_per_cycle
+from .costs import steps_per_cycle
 from .engines import HYBRID, MARCH, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
@@ -32,7 +32,6 @@ class Numerics:
     - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
-    - pinned: names of settings that the scene fixes.
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window; coarse runs may omit them.
     - local: largest relative error per step of the engine `hybrid`.
@@ -47,7 +46,6 @@ class Numerics:
     cycles: float
     window: int
     shear_modes: int | None
-    pinned: frozenset
     choice: object = None
     whole: bool = True
     local: float = 0.0
@@ -104,8 +102,7 @@ def choose_numerics(model: Model) -> Numerics:
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
-    pinned = frozenset(key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None)
-    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes, pinned)
+    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes)
 
     if engine is HYBRID:
         # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.

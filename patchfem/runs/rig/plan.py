@@ -245,16 +245,3 @@ def _describe_sliding(friction_ratio: float) -> str:
     if friction_ratio > pi / 4:
         return f"D = {friction_ratio:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
     return f"D = {friction_ratio:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
-
-
-def describe_printed_law(model: Model) -> list[str]:
-    """Describe in sentences for a plan that the law as printed in the report holds the block at rest."""
-    if model.friction is None or model.partial_slip:
-        return []
-    if not bond_lists.is_stuck_by_printed_law(model):
-        return []
-    return [
-        "with the law as printed in the report the block hardly slides or does not slide at all: it reverses its "
-        "motion in almost every time step, and each reversal makes the list of bonds longer; set "
-        'friction.reading = "stretch" to give the block a finite stiffness'
-    ]

@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, stationary
-from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun
+from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
 from ...response.decay_curve import DecayCurve
 from ...response.errors import absolute_change, add_errors, add_run_error_estimates
 from ...response.measures import Measures
@@ -24,7 +24,7 @@ from .. import refine
 from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
-from . import bond_lists, costs, decays, flutter, levels
+from . import bond_lists, decays, flutter, levels
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
@@ -106,8 +106,7 @@ def run_rig(inputs: RunInputs) -> Result:
     Raises
     ------
     Missing
-        If the run would need far too many steps, or if its time steps do not resolve the vibration of the block on its
-        bonds.
+        If the time steps do not resolve the vibration of the block on its bonds.
     PatchfemError
         If the drive excites no mode.
     """
@@ -120,9 +119,7 @@ def run_rig(inputs: RunInputs) -> Result:
         )
 
     numerics = choose_numerics(model)
-    if numerics.engine == "hybrid":
-        costs.refuse_long_hybrid_run(model)
-    elif numerics.engine == "march":
+    if numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
     run, shortage = run_refined(inputs, numerics)
 
@@ -232,10 +229,9 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
             inputs.seconds["march"] = solution.seconds
         time_runs = engine.list_time_runs(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
-        step_runs = runner.list_step_runs(numerics, solution, time_runs)
-        step_values = [run.values for run in step_runs]
+        step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
-            solution.values, errors, step_values, min_relative_error=MIN_RELATIVE_ERROR, size=size
+            solution.values, errors, min_relative_error=MIN_RELATIVE_ERROR, size=size
         )
         if solution.levels or model.rig.drive.kind == "free":
             coarser_runs = [*time_runs, *space_runs]
@@ -326,7 +322,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
         return max(0, floor(log(numerics.local / MIN_STEP_ERROR, 100) + 1e-9))
     if (
         not ENGINES[numerics.engine].has_steps
-        or "steps_per_cycle" in numerics.pinned
+        or run.model.accuracy.steps_per_cycle is not None
         or bond_lists.is_bond_list_too_long(run.model, numerics, run.solution.book)
         or run.solution.outcome in EARLY_OUTCOMES
     ):

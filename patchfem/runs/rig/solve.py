@@ -6,7 +6,7 @@ Each coarse run is solved only once.
 
 from dataclasses import replace
 
-from ...response.coarser import ComparisonRuns, SourceErrors, StepRun, estimate_errors
+from ...response.coarser import ComparisonRuns, SourceErrors, estimate_errors
 from ..results.result import N_FRAMES, RunInputs
 from . import event_to_event, march
 from .numerics import Numerics
@@ -112,24 +112,3 @@ class Runner:
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
         return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
-
-    def list_step_runs(
-        self, numerics: Numerics, solution: Solution, time_runs: ComparisonRuns
-    ) -> list[StepRun]:
-        """Return a StepRun of the run and of each run with fewer steps, from fine to coarse.
-
-        If no coarse run has fewer steps, the list contains only the run itself.
-
-        Parameters
-        ----------
-        numerics : Numerics
-            Settings of the run.
-        solution : Solution
-            Solution of the run.
-        time_runs : list of CoarserRuns
-            Runs that are coarser in time, which are already solved.
-        """
-        pairs = [(numerics, solution)]
-        if time_runs and time_runs[0].source == "steps":
-            pairs += [(run, self.solutions[run]) for run in time_runs[0].runs]
-        return [StepRun(settings.steps, run.seconds, run.values) for settings, run in pairs]

@@ -27,8 +27,6 @@ from .evolve import (
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
 N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
-EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
-N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
 # Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
 # which the stiffness of the unworn piece is valid.
 MAX_WORN_FRACTION = 0.2
@@ -410,33 +408,10 @@ def _select_stored_moments(moments) -> np.ndarray:
 
 
 def _collect_wear_history(evolved) -> Arrays:
-    """Return a dict of the wear measures over the cycles (j,).
-
-    The entries `cycle` and `EDGE_PEAK` are included.
-    """
+    """Return a dict of the cycles (j,) and of the wear measures over them."""
     moments = evolved.moments
     history = {"cycle": [moment.cycle for moment in moments]}
     for name in moments[-1].values:
         if all(name in moment.values for moment in moments):
             history[name] = [moment.values[name] for moment in moments]
-    history[EDGE_PEAK] = [compute_edge_pressure_excess(moment.pressure) for moment in moments]
     return {name: np.array(values, float) for name, values in history.items()}
-
-
-def compute_edge_pressure_excess(pressure) -> float:
-    """Return the pressure [Pa] at a contact edge in excess of the pressure inside.
-
-    A contact edge between two nodes moves as the pieces wear, and the element at the edge carries
-    part of the load of its neighbours. The excess is the error of such a pressure peak. It is 0 if
-    the largest pressure is inside, or if the contact ends with the piece. pressure: nodal pressures
-    (m,) [Pa].
-    """
-    pressure = np.asarray(pressure)
-    is_loaded = pressure > 0
-    width = 2 * N_EDGE_NODES + 1
-    padded = np.pad(is_loaded, N_EDGE_NODES, "edge")
-    is_inside = np.convolve(padded, np.ones(width), "valid") > width - 1
-    peak = int(np.argmax(pressure))
-    if is_inside[peak] or not (is_loaded & is_inside).any():
-        return 0.0
-    return float(pressure[peak] - pressure[is_inside].max())

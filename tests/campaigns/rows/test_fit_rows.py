@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_cli
+from measured_rows import make_linear_rows, write_rows
 
 from patchfem import SceneError, run
 from patchfem.campaigns.fits.problem import FitOptions
@@ -14,7 +15,6 @@ from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
 from patchfem.scene import BOUNDS, load, loads, read_assignments
 
-MIL = 25.4e-6
 LINEAR = """
 [structure]
 moving_mass = "1 kg"
@@ -52,7 +52,6 @@ frequency = "143 Hz"
 acceleration = "5 g"
 cycles = 400
 """
-HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 
 
 def write_and_load(tmp_path, text, *sets):
@@ -62,30 +61,6 @@ def write_and_load(tmp_path, text, *sets):
     return load(path, sets)
 
 
-def write_rows(tmp_path, rows, name="rows.csv"):
-    """Write a table of (frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], flag) and return its path."""
-    path = tmp_path / name
-    lines = [
-        f"{f!r},{a / G_N!r},{format_cell(x, G_N)},{format_cell(y, MIL)},{flag}"
-        for f, a, x, y, flag in rows
-    ]
-    path.write_text(HEAD + "\n".join(lines) + "\n", "utf-8")
-    return path
-
-
-def format_cell(value, unit):
-    """Return a value in another unit as text, or "" if it is absent."""
-    return value if value == "" else repr(float(value) / unit)
-
-
-def linear_response(f, level, own=141.0, zeta=0.03):
-    """Return absolute acceleration and relative displacement of a driven oscillator in closed form."""
-    w = 2 * np.pi * f
-    wn = 2 * np.pi * own
-    z = -level / (wn**2 - w**2 + 2j * zeta * wn * w)
-    return float(abs(level - w**2 * z)), float(abs(z))
-
-
 def read_free_keys(*texts):
     """Return the ranges of the free keys."""
     found, wrong = read_assignments(texts, BOUNDS)
@@ -93,26 +68,15 @@ def read_free_keys(*texts):
     return found
 
 
-def fit_to_rows(scene, path, wanted, seed=0, **beside):
+def fit_to_rows(scene, path, wanted, **beside):
     """Fit a scene to rows and return the result."""
     options = FitOptions(**{"starts": 2} | beside)
-    return fit_rows(scene, path, wanted, options, seed=seed)
+    return fit_rows(scene, path, wanted, options, seed=0)
 
 
 LINEAR_FREE = (
     "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",
 )
-
-
-def make_linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
-    """Return rows of an oscillator at five frequencies, with noise and gains."""
-    draw = np.random.default_rng(seed)
-    out = []
-    for f in (120.0, 135.0, 143.0, 150.0, 160.0):
-        a, y = linear_response(f, 20.0)
-        spread = np.exp(noise * draw.standard_normal(2))
-        out.append((f, 20.0, a * scale * spread[0], y * seen * spread[1], ""))
-    return out
 
 
 def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):

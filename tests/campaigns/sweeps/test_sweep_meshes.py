@@ -24,9 +24,15 @@ WORK = WorkerData(
 
 
 def test_exact_meshes_are_chosen_once_for_all_cases():
-    """The mesh of a sweep is chosen once and stored with its work."""
-    work = choose_shared_meshes(WORK)
-    assert choose_shared_meshes(work) is work and len(work.meshes.meshes) == 1
+    """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
+    sizes = []
+    for tolerance in (1e-3, 4e-3):
+        scene = SweepScene(Path("a.toml"), f"{PATCH}[accuracy]\ntolerance = {tolerance}\n")
+        work = choose_shared_meshes(WorkerData(scene, WORK.cases))
+        assert choose_shared_meshes(work) is work
+        ((finest, *_),) = work.meshes.meshes.values()
+        sizes.append(finest[0].x.size)
+    assert sizes[0] / sizes[1] == pytest.approx(2, rel=0.1)
 
 
 @pytest.mark.slow

@@ -59,18 +59,15 @@ def find_multipliers(motion, modes, interfaces) -> np.ndarray:
     return periodic.find_multipliers(case, motion.modal_state)
 
 
-def make_element(limit, length):
-    """Return the law of an elastic-plastic element in the engine `hybrid`."""
-    return LawNumbers("masing", (0.0, -1.0, limit, length, 1, 0.0, length, 0.0, limit))
-
-
 def make_interfaces(group) -> list[cases.Interface]:
     """Return the interfaces of the engine `hybrid` for an elastic-plastic element and a cubic spring of a group."""
     interfaces = []
     for row, law in group.parts:
         slide = row if np.ndim(row) else group.modes.interfaces[row]
         if isinstance(law, Jenkins):
-            numbers = make_element(law.limit, float(law.limit_slide[0]))
+            limit, length = law.limit, float(law.limit_slide[0])
+            numbers = (0.0, -1.0, limit, length, 1, 0.0, length, 0.0, limit)
+            numbers = LawNumbers("masing", numbers)
         else:
             assert law.stiffness == 0 and np.isinf(law.wavelength)
             numbers = LawNumbers("springs", (law.cubic, 0.0, 1.0))
@@ -126,7 +123,7 @@ def test_refuses_start_without_nearby_branch():
 # ---- folds of the rig with a cubic spring
 
 
-def duffing_equation(drive, friction=0.0):
+def duffing_equation(drive):
     """Return the right-hand side of the Duffing equation under a drive."""
 
     def state_derivative(t, y):

@@ -13,15 +13,6 @@ from patchfem.export.answer import Answer, Variable
 from patchfem.export.lab.write import export_histories
 
 
-def read_uff_functions(path):
-    """Return the functions (datasets of type 58) of a universal file by name."""
-    return {
-        dataset["id1"]: dataset
-        for dataset in pyuff.UFF(str(path)).read_sets()
-        if dataset["type"] == 58
-    }
-
-
 def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
     """Histories exported as .uff, .mat and .csv equal those of result.nc to the last bit."""
     with h5netcdf.File(bench_folder / "result.nc", "r") as file:
@@ -34,7 +25,8 @@ def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
     for name in ("a.uff", "a.mat", "a.csv"):
         answer = run_successfully("export", bench_folder, "-o", tmp_path / name, "--histories")
         assert f"{histories['time'].size} rows of relative_displacement" in answer.out, answer.err
-    uff = read_uff_functions(tmp_path / "a.uff")
+    datasets = pyuff.UFF(str(tmp_path / "a.uff")).read_sets()
+    uff = {dataset["id1"]: dataset for dataset in datasets if dataset["type"] == 58}
     mat = loadmat(tmp_path / "a.mat", simplify_cells=True)
     table = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, deletechars="")
     header = (tmp_path / "a.csv").read_text().splitlines()[0]

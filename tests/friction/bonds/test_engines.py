@@ -28,7 +28,6 @@ reading = "{reading}"
 order = {order}
 bond_length = "1 um"
 initial_bonds = 0.0
-{growth}
 """
     + KILOGRAM
     + DRIVE.replace("cycles = 30", "cycles = 3")
@@ -39,10 +38,10 @@ quadrature = "{engine}"
 )
 
 
-def load_rig_scene(tmp_path, engine="auto", reading="report", order=1, growth=""):
+def load_rig_scene(tmp_path, engine="auto", reading="report", order=1):
     """Return the loaded scene of a rig with a bond law."""
     file = tmp_path / "rig.toml"
-    file.write_text(TEXT.format(engine=engine, reading=reading, order=order, growth=growth))
+    file.write_text(TEXT.format(engine=engine, reading=reading, order=order))
     return scene.load(file)
 
 

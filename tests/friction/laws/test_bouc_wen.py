@@ -13,11 +13,6 @@ LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
 LIMIT, EPS = 0.31 * LOAD, 0.31 * LOAD / 1.3e7
 
 
-def law_keys(exponent, shape):
-    """Return the scene keys of a Bouc-Wen law."""
-    return LAW + f"exponent = {exponent}\nshape = {shape}\n"
-
-
 def integrate_rate_equation(slide, exponent, shape):
     """Return the variable z along straight legs of the displacement, integrated from the rate equation."""
     z = [0.0]
@@ -39,7 +34,8 @@ def integrate_rate_equation(slide, exponent, shape):
 def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
     """Force and stored energy on the bench agree with the integrated rate equation, and the energy balance closes."""
     time, slide = shrinking_sine(60)
-    result = run_bench_along_path(law_keys(exponent, shape), time, slide)
+    law = LAW + f"exponent = {exponent}\nshape = {shape}\n"
+    result = run_bench_along_path(law, time, slide)
     z = integrate_rate_equation(slide, exponent, shape)
     assert np.abs(result.force - LIMIT * z).max() <= 1e-6 * LIMIT
     work, stored, dissipated, created = result.ledger

@@ -99,11 +99,9 @@ def test_exact_alternating_load_causes_no_drift(law, tail, load_amplitude):
     assert run.traction[count:, 0] == pytest.approx(traction, abs=1e-15)
 
 
-def load_bench(law, motion, normal):
-    """Return the scene of a bench under 100 N."""
-    text = (
-        f'[normal]\nload = "100 N"\n{normal}\n[friction]\n{law}\nstatic = 0.3\n[slide]\n{motion}\n'
-    )
+def load_bench(motion, normal):
+    """Return the scene of a bench with Coulomb friction under 100 N."""
+    text = f'[normal]\nload = "100 N"\n{normal}\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\n{motion}\n'
     return loads(text, "bench.toml")
 
 
@@ -114,9 +112,7 @@ CONSTANT_SPEED = 'kind = "constant"\nspeed = "1 mm/s"\ndistance = "20 um"'
 @pytest.mark.parametrize("amplitude", ["40 N", "150 N"])
 def test_order_coulomb_work_under_varying_load(amplitude):
     """The friction work of Coulomb's law under a sinusoidal load converges to the integral of the limit over the path."""
-    model = build(
-        load_bench('law = "coulomb"', CONSTANT_SPEED, VARYING_LOAD.replace("40 N", amplitude))
-    )
+    model = build(load_bench(CONSTANT_SPEED, VARYING_LOAD.replace("40 N", amplitude)))
     load_amplitude = float(amplitude.split()[0])
     load = lambda t: max(100 + load_amplitude * np.cos(2 * np.pi * 300 * t + 0.5), 0.0)  # noqa: E731
     expected = 0.3e-3 * quad(load, 0, 0.02, limit=500, epsabs=1e-12)[0]
@@ -136,7 +132,7 @@ def test_order_coulomb_work_under_varying_load(amplitude):
 def test_exact_coulomb_force_at_rest_follows_falling_load():
     """At rest, Coulomb's law keeps its force as far as the smallest limit since the stop allows."""
     motion = 'kind = "dwell"\nspeed = "1 mm/s"\ndistance = "20 um"\nhold = "10 ms"\ndistance_after = "20 um"'
-    model = build(load_bench('law = "coulomb"', motion, VARYING_LOAD))
+    model = build(load_bench(motion, VARYING_LOAD))
     result = law_bench.run_bench(model, None, 800)
     rests = np.flatnonzero(np.diff(result.slide) == 0) + 1
     smallest = np.minimum.accumulate(result.load[rests[0] - 1 : rests[-1] + 1])[1:]

@@ -86,7 +86,7 @@ def test_always_jump_and_rest_give_defined_force():
 # ---- the rig
 
 
-def reference_amplitude(speed, level, cycles, tolerance=1e-10):
+def reference_amplitude(speed, level, cycles):
     """Return half the peak-to-peak displacement of the last two cycles, by scipy from the equation of motion."""
 
     def rate(t, y):
@@ -98,7 +98,7 @@ def reference_amplitude(speed, level, cycles, tolerance=1e-10):
 
     end = cycles * 2 * np.pi / OMEGA
     times = np.linspace(end - 4 * np.pi / OMEGA, end, 8001)
-    y = solve_ivp(rate, (0, end), [0, 0], "LSODA", times, rtol=tolerance, atol=1e-16).y[0]
+    y = solve_ivp(rate, (0, end), [0, 0], "LSODA", times, rtol=1e-10, atol=1e-16).y[0]
     return np.ptp(y) / 2
 
 

@@ -43,7 +43,9 @@ def test_exact_volume_and_place_of_crater():
     assert found.verdict.code == "worn" and found.is_areal
     volume = found.values["worn_volume"]
     true = np.pi / 2 * 3 * UM * (60 * UM) ** 2
-    assert volume.low <= true <= volume.high and volume.value == pytest.approx(true, rel=0.02)
+    assert volume.low <= true <= volume.high and volume.value == pytest.approx(
+        true, rel=0.02, abs=0
+    )
     largest = found.values["worn_depth_max"]
     assert largest.low <= 3 * UM <= largest.high
     placed = found.evidence.placement.values
@@ -97,9 +99,11 @@ def test_always_gain_and_transfer_of_scans_are_named():
     true = worn.sum() * STEP**2
     assert found.values["worn_volume"].low <= true <= found.values["worn_volume"].high
 
-    found = compare_surfaces(*make_pair(worn - np.roll(worn, 60, axis=1), 7))
+    wide = make_crater(2 * UM, 60 * UM, (120, 220))
+    found = compare_surfaces(*make_pair(wide - np.roll(wide, 62, axis=1), 7))
     assert found.verdict.code == "worn_and_grown"
-    assert found.values["grown_volume"].value == pytest.approx(true, rel=0.1)
+    for name in ("worn_volume", "grown_volume"):
+        assert found.values[name].low <= true <= found.values[name].high < 1.05 * true
 
 
 def test_refuses_mixed_and_small_surfaces():

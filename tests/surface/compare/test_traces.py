@@ -242,7 +242,7 @@ def test_exact_pile_up_is_measured_beside_the_track():
     for name, place in (("from", 1600 * UM), ("to", 2400 * UM)):
         assert track[name].low <= place <= track[name].high
     net = track["area_gross"].value - track["pile_up"].value
-    assert track["area_net"].value == pytest.approx(net, rel=1e-9)
+    assert track["area_net"].value == pytest.approx(net, rel=1e-9, abs=0)
 
 
 def test_exact_cut_track_has_no_end_beyond_the_trace():

@@ -154,7 +154,9 @@ def test_exact_dektak_export_agrees(tmp_path):
     )
     assert np.array_equal(utf16_trace.z, found.z)
     in_angstrom = write.make_dektak(z).replace(b"Raw Micrometer", b"Raw A")
-    assert read_content(tmp_path, in_angstrom, "scan.csv").z == pytest.approx(found.z * 1e-4)
+    assert read_content(tmp_path, in_angstrom, "scan.csv").z == pytest.approx(
+        found.z * 1e-4, rel=1e-14, abs=0
+    )
 
 
 class StandIn:
