@@ -53,6 +53,21 @@ def test_force_of_elements_that_slide_on_both_sides_is_their_limit():
     assert record.get_face_extremes(Probe.FORCE)[0] == pytest.approx([-0.8, 0.8], abs=1e-9)
 
 
+def test_elements_slip_in_no_direction_while_all_of_them_stick():
+    """The direction of slip is zero wherever the force is between its limits, also at the start in the middle of a stick, so
+    that the first slip is an event."""
+    period = 2 * np.pi
+    options = {"acceleration": 2.0, "zeta": 0.05, "cycles": 2, "rtol": 1e-9}
+    law = masing.from_elements([0.8 / 0.047], [0.047])
+    case = make_oscillator(law, samples=np.linspace(0, 2 * period, 401), **options)
+    run = runs.run_case(case, start=find_periodic_motion(case).run.final)
+    rows = run.rows[np.isin(run.rows[:, 0], case.samples)]
+    force, direction = rows[:, [1 + case.y.size, 3 + case.y.size]].T
+    sticks = np.abs(force) < 0.8 * (1 - 1e-6)
+    assert 10 < sticks.sum() < 390 and not direction[sticks].any()
+    assert np.array_equal(direction[~sticks], np.sign(force[~sticks]))
+
+
 def test_multipliers_of_a_linear_rig():
     """Without friction they are those of the modes, exp((-zeta +- i sqrt(1 - zeta^2)) omega T)."""
     zeta, omega = 0.02, 0.9

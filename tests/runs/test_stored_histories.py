@@ -15,7 +15,7 @@ CASES = {  # Scene and changes.
     "marched release": (MARCH + FREE, "accuracy.method=march; drive.duration=0.1 s"),
     "levels": (
         POINT + PLASTIC + MODE + DRIVE.replace('acceleration = "5 g"\n', ""),
-        'accuracy.method=march; drive.waveform=levels; drive.levels=["3 g", "6 g"]; drive.cycles=15',
+        'accuracy.method=march; drive.waveform=levels; drive.levels=["4 g", "6 g"]; drive.cycles=15',
     ),
     "step": (
         HYBRID + '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\n',

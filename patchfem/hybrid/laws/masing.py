@@ -118,21 +118,22 @@ def force_and_rates(p, memory, point, s, rates):
     if k >= pieces:
         return Friction(direction * p[2], point.velocity, p[2] * direction * point.velocity)
 
-    # Force and slope of first loading, from the last reversal at half the scale.
+    # Force of first loading from the last reversal at half the scale, and the part of it of elements that slip. While none
+    # does, this part is exactly zero, so that no direction of slip follows from round-off.
     branch = find_branch(memory, point)
     x = branch.x
     if p[1] >= 0:
         scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2)) / p[3]
         power = max(x / p[3], 0.0) ** (p[0] + 1)
-        slope = scale * (p[1] + 1 - power)
         force = scale * x * (p[1] + 1 - power / (p[0] + 2))
+        slipping = scale * x * power * (p[0] + 1) / (p[0] + 2)
     else:
         first = POINTS + k
         values = first + pieces + 1
         slope = (p[values + 1] - p[values]) / (p[first + 1] - p[first])
         force = p[values] + slope * (x - p[first])
+        slipping = p[values] - slope * p[first]
 
-    slipping = force - x * slope
     # Elements without a slip force hold nothing, so that the whole displacement is slip.
     fraction = slipping / p[2] if p[2] > 0 else 1.0
     loss = slipping * direction * point.velocity
