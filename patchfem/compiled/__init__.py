@@ -74,6 +74,8 @@ UNCACHED_FUNCTIONS = set()
 # Lock that lets one thread at a time load code, because loading a function twice at the
 # same time crashes the process.
 CODE_LOADING_LOCK = RLock()
+# Converter of the arguments of all functions, because several functions get the same tuples in turn.
+CONVERTER = machine.ArgumentConverter()
 _MESSAGE_CALLBACKS = []  # callbacks that receive a message when a function is compiled
 ARITHMETIC_OPERATORS = {
     ast.Add: add,
@@ -281,7 +283,6 @@ class KernelFunction:
         self.module = module
         self.name = name
         self.file_prefix = file_prefix
-        self.converter = machine.ArgumentConverter()
         # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
 
@@ -300,7 +301,7 @@ class KernelFunction:
         if IS_JIT_DISABLED:
             return None, b"", arguments
         try:
-            type_codes, words = zip(*map(self.converter.convert, arguments))
+            type_codes, words = zip(*map(CONVERTER.convert, arguments))
         except machine.UnsupportedError:
             return None, b"", arguments
         return type_codes, b"".join(words), arguments
@@ -316,7 +317,7 @@ class KernelFunction:
         last_codes, last_words, last = bound
         if last_codes is None:
             return self(*first, *last)
-        first_codes, first_words = zip(*map(self.converter.convert, first))
+        first_codes, first_words = zip(*map(CONVERTER.convert, first))
         function = self.loaded_functions.get(first_codes + last_codes)
         return function(b"".join(first_words) + last_words) if function else self(*first, *last)
 
@@ -324,7 +325,7 @@ class KernelFunction:
         if IS_JIT_DISABLED:
             return self.get_dispatcher()(*arguments)
         try:
-            type_codes, words = zip(*map(self.converter.convert, arguments))
+            type_codes, words = zip(*map(CONVERTER.convert, arguments))
         except machine.UnsupportedError:
             UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
             return self.get_dispatcher()(*arguments)

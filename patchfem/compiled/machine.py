@@ -30,7 +30,7 @@ NUMBA_SUCCESS_CODES = (0, -2)
 # Type code of `struct` for each type of number that a function takes.
 STRUCT_TYPE_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
 _ARRAY_FORMATS = {}  # `ArrayFormat` for each (dtype, number of dimensions, flags) of an array
-# Number of tuples whose words are cached; a run passes the same few in many calls.
+# Number of tuples whose words are cached. A run passes the same few in many calls, of several functions in turn.
 MAX_CACHED_TUPLES = 12
 
 
@@ -59,20 +59,30 @@ class ArgumentConverter:
         if not isinstance(value, tuple):
             raise UnsupportedError
 
-        # A cached tuple stands as (tuple, type code, words) at its `id`.
-        known = self.known_tuples.get(id(value))
+        # A tuple of numbers is made for a single call and would displace others from the cache.
+        codes = [STRUCT_TYPE_CODES.get(type(element)) for element in value]
+        if None not in codes:
+            return _name_tuple(value, codes), struct.pack("".join(codes), *value)
+
+        # A cached tuple stands as (tuple, type code, words) at its `id`. The one used last is at the end.
+        with self.lock:
+            known = self.known_tuples.pop(id(value), None)
+            if known is not None:
+                self.known_tuples[id(value)] = known
         if known is None:
-            codes, words = zip(*map(self.convert, value)) if value else ((), ())
+            codes, words = zip(*map(self.convert, value))
             # The tuple itself is cached too, so that no other object gets its `id`.
-            known = value, f"{type(value).__name__}({','.join(codes)})", b"".join(words)
-            # A tuple of numbers is made for a single call and would displace others from the cache.
-            if all(map(STRUCT_TYPE_CODES.__contains__, map(type, value))):
-                return known[1:]
+            known = value, _name_tuple(value, codes), b"".join(words)
             with self.lock:
                 self.known_tuples[id(value)] = known
                 while len(self.known_tuples) > MAX_CACHED_TUPLES:
                     del self.known_tuples[next(iter(self.known_tuples))]
         return known[1:]
+
+
+def _name_tuple(value, codes) -> str:
+    """Return the type code of a tuple whose elements have given type codes."""
+    return f"{type(value).__name__}({','.join(codes)})"
 
 
 class ArrayFormat(NamedTuple):

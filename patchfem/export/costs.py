@@ -99,8 +99,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
-    advised = rows[: len(runs)] if knob == TOLERANCE_SETTING else [row]
-    notes = [f"{_describe_miss(one)}: {text}." for one in advised for text in one.run.remedies]
+    notes = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(
@@ -160,12 +159,22 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
     return sentences
 
 
-def _describe_miss(row: Row) -> str:
-    """Return the run for which an advice holds and, if it has a single one, the measure that misses the tolerance."""
-    measure = ""
-    if len(row.run.remedies) == 1 and row.judgement is Judgement.MISSES:
-        measure = f", {row.worst.name.replace('_', ' ')} misses the tolerance"
-    return f"With {row.run.words}{measure}"
+def _describe_advice(rows: list[Row]) -> list[str]:
+    """Return a sentence for each advice of the runs, which names all runs that have it."""
+    runs: dict[tuple[str, str], list[Cost]] = {}
+    for row in rows:
+        # with several advices it is not known which of them belongs to the measure
+        miss = ""
+        if len(row.run.remedies) == 1 and row.judgement is Judgement.MISSES:
+            miss = f", {row.worst.name.replace('_', ' ')} misses the tolerance"
+        for advice in row.run.remedies:
+            runs.setdefault((miss, advice), []).append(row.run)
+
+    sentences = []
+    for (miss, advice), (first, *others) in runs.items():
+        names = ", ".join([first.words, *(run.label for run in others)])
+        sentences.append(f"With {names}{miss}: {advice}.")
+    return sentences
 
 
 def _find_main_measure(runs: list[Cost]) -> str:

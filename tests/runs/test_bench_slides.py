@@ -7,7 +7,7 @@ from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
 from scipy.integrate import solve_ivp
 
-from patchfem import build, plan, run
+from patchfem import build, new, plan, run
 from patchfem.core import PatchfemError
 from patchfem.runs.bench.slides import SlideTask
 from patchfem.runs.run import hash_run
@@ -134,3 +134,12 @@ def test_exact_friction_follows_changing_load_of_each_instant(monkeypatch):
     assert np.ptp(response.load) > 39.0 and np.count_nonzero(moves) > 1000
     expected = 0.3 * response.load[1:] * moves
     assert response.force[1:][moves != 0] == pytest.approx(expected[moves != 0], rel=1e-13)
+
+
+def test_exact_slip_amplitude_includes_what_lies_between_samples():
+    """The slip of bonds turns round between two steps: its amplitude of few steps holds within its error."""
+    few, many = (
+        run(new("bench"), **{"accuracy.steps_per_cycle": steps}).measures["slip_amplitude"]
+        for steps in (200, 3200)
+    )
+    assert abs(few.value - many.value) < few.error < 1e-3 * few.value

@@ -21,6 +21,7 @@ from ...response.measures import (
     compute_ledger_measures,
     compute_step_harmonic,
     energy_balance,
+    interpolate_range,
     work_difference,
 )
 from ..results.patch_rows import Values
@@ -169,10 +170,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
         "friction_force_peak": float(np.abs(force).max()),
         "friction_ratio_end": float(ratio[-1]),
         "friction_ratio_peak": float(np.abs(ratio).max()),
-        "slip_amplitude": float(
-            histories.slip[cycle_start:].max() - histories.slip[cycle_start:].min()
-        )
-        / 2,
+        "slip_amplitude": interpolate_range(histories.slip[cycle_start:])[0] / 2,
         "energy_balance": float(energy_balance(energies)),
         **compute_ledger_measures(histories.ledger),
     }
