@@ -13,6 +13,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
 from .event_kernels import LAST_PROBES, find_root, find_value, find_vertex
+from .laws import LAWS
 from .motion_kernels import (
     copy_values,
     find_phase,
@@ -35,6 +36,7 @@ from .records import (
 )
 from .step_kernels import POINT, RATES, read_curve
 
+PRESSED_SPRINGS = LAWS.index("pressed_springs")  # number of the law
 # Gauss-Lobatto rule of five points on an interval of length 1
 N_NODES = 5
 NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0])
@@ -361,9 +363,12 @@ def write_directions(rig, state, row):
     """
     n_faces = state.memory.shape[0]
     for i in range(n_faces):
-        # A rigid law keeps its direction while it slips; other laws slip with the irreversible part of the velocity.
+        # A rigid law keeps its direction while it slips; other laws slip with the irreversible part of the velocity. New
+        # springs change the mean stretch of those that stick, so that their law has its direction in its regime.
         direction = state.memory[i, Memory.DIRECTION]
-        if rig.faces[i, Face.RIGID] == 0:
+        if rig.faces[i, Face.LAW] == PRESSED_SPRINGS and state.memory[i, Memory.CONTACT] > 0:
+            direction = state.memory[i, Memory.FLAG]
+        elif rig.faces[i, Face.RIGID] == 0:
             direction = np.sign(state.memory[i, Memory.SLIP_RATE])
         row[1 + state.y.size + 2 * n_faces + i] = direction
 

@@ -436,7 +436,7 @@ def write_residual(system, level, dt):
     for p in range(n_ports):
         if is_held(points, p):
             vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
-            vector[p] -= system.options.redundant * moves[Port.FORCE, p]
+            vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
         own = ports.compliance[level, 0, p, p]
         noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         # The normal contact loses no energy, so that its residuals would add up over the steps.
@@ -515,7 +515,7 @@ def write_matrix(system, level):
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
-            matrix[p, p] -= system.options.redundant
+            matrix[p, p] -= ports.redundant[p]
 
 
 @njit(**NJIT_CALL)
@@ -842,7 +842,7 @@ def solve_held(system):
         for k in range(n_ports):
             ports.matrix[p, k] = ports.grip[p, k] if is_held(points, p) else 0.0
         if is_held(points, p):
-            ports.matrix[p, p] *= 1 + system.options.redundant
+            ports.matrix[p, p] *= 1 + ports.redundant[p]
         else:
             ports.matrix[p, p] = 1.0
     solve_linear(ports.matrix, ports.vector, n_ports)

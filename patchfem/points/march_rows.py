@@ -206,6 +206,7 @@ class Ports(NamedTuple):
     - compliance (levels, 2, P, P): displacement [m/N] and velocity [m/(s N)] of a port at the end of a step of each level
       that a constant force on another port takes away; C and G in `march_kernels`
     - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
+    - redundant (P,): compliance of a port at rest relative to its own, which determines the forces of more ports than modes
     - values (14, P): see `Port`
     - matrix (P + r, P + r), vector, step (P + r,): Jacobian, residuals and step of Newton's method for P port forces and r
       shear coordinates
@@ -216,6 +217,7 @@ class Ports(NamedTuple):
     rows: np.ndarray
     compliance: np.ndarray
     grip: np.ndarray
+    redundant: np.ndarray
     values: np.ndarray
     matrix: np.ndarray
     vector: np.ndarray
@@ -255,7 +257,6 @@ class Options(NamedTuple):
     - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
     - scale: force [N] to whose 1e-11 part a step is solved
     - damping: weight of the change of a shear increment
-    - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
     - has_events, has_lists, has_loads: 1 if points have laws without memory, lists of bonds, or loads that change
     """
 
@@ -264,7 +265,6 @@ class Options(NamedTuple):
     travel: float
     scale: float
     damping: float
-    redundant: float
     has_events: int
     has_lists: int
     has_loads: int

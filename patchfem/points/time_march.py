@@ -52,7 +52,8 @@ EVENT_LEVELS = (
 )
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
-REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
+REDUNDANT = 1e-10  # relative compliance of the strongest port at rest if ports outnumber the modes
+MIN_STRENGTH = 0.01  # smallest strength by which ports share a force, relative to the strongest
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
 MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
@@ -299,6 +300,7 @@ def make_system(
         rows,
         np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
         rows @ rows.T / mass,
+        _find_redundant(rows, points),
         np.zeros((len(Port), len(rows))),
         np.zeros((size, size)),
         np.zeros(size),
@@ -318,7 +320,6 @@ def make_system(
         float(travel),
         max(float(contact.limit), 1e-300),
         LIST_DAMPING if has_lists else 0.0,
-        REDUNDANT if len(rows) > n else 0.0,
         int(has_events),
         int(has_lists),
         int(contact.has_loads),
@@ -342,6 +343,31 @@ def make_system(
         _climb_first(system, contact)
     points.trial[:] = points.memory
     return system
+
+
+def _find_redundant(rows, points: Points) -> np.ndarray:
+    """Return the relative compliances (P,) of ports at rest, which are 0 unless ports outnumber the modes.
+
+    Such ports share their forces by the modal forces at which they slip, so that they reach their limits at once.
+
+    Parameters
+    ----------
+    rows : (P, n) array
+        Displacement of the ports per modal coordinate.
+    points : Points
+        Points at the ports, with their loads at the start.
+    """
+    count, n = rows.shape
+    if count <= n:
+        return np.zeros(count)
+    # Modal force at which each port slips, relative to the largest
+    limit = np.zeros(count)
+    friction = points.numbers[1] * points.values[Point.START_LOAD, : points.port.size]
+    np.add.at(limit, points.port, friction * ~points.is_spring)
+    strength = limit * np.linalg.norm(rows, axis=1)
+    largest = strength.max(initial=0.0)
+    share = strength / largest if largest > 0 else np.ones(count)
+    return REDUNDANT / np.maximum(share, MIN_STRENGTH)
 
 
 def _make_points(contact: Contact, n_nodes: int) -> Points:

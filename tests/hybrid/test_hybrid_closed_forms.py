@@ -202,7 +202,7 @@ def test_coulomb_contact_that_lifts_off_follows_the_load():
 
 
 def test_springs_that_a_falling_load_cuts_lose_their_energy_at_rest():
-    """A load that falls to 0 at rest: the work mu s q^2/(2 eps) of the slide before is lost, without any slip."""
+    """A load that falls to 0 at rest: the work mu s q^2/(2 eps) of the slide before is lost, its stretch becomes slip."""
     law = LawNumbers("pressed_springs", (0.5, 1.0), (0.0, 2.5), (2.5, 2.5))
     load = cases.Load(1.0, 1.5, 1.0, 0.0)
     for end, part in ((1.5, 0.0), (3.0, 1.0)):
@@ -210,7 +210,7 @@ def test_springs_that_a_falling_load_cuts_lose_their_energy_at_rest():
         values = runs.run_case(bench).values
         assert values["friction_work"] == pytest.approx(0.025, rel=1e-9)
         assert values["energy_dissipated"] == pytest.approx(part * 0.025, abs=1e-11)
-        assert values["slip_amplitude"] == 0.0
+        assert values["slip_amplitude"] == pytest.approx(part * 0.1, abs=1e-12)
 
 
 def test_release_ends_at_the_largest_travel():

@@ -63,6 +63,42 @@ cycles = 40
 [accuracy]
 method = "march"
 """
+FACE = '[[structure.interface]]\nbetween = [{0}, 0]\nlaw = "coulomb"\nstatic = 0.3\nkinetic = {1}\nload = "{2} N"\n'
+SPRING = '[[structure.spring]]\nbetween = [{}, {}]\nstiffness = "{} N/m"\n'
+DAMPER = '[[structure.damper]]\nbetween = [{}, 0]\ncoefficient = "20 N s/m"\n'
+BASE_STEP = '[drive]\nkind = "base"\nwaveform = "step"\nacceleration = "5 g"\nduration = "0.1 s"\n'
+BLOCK_MASS = "[structure]\nmasses = [{}]\n"
+UNEQUAL = (
+    BLOCK_MASS.format('"1 kg"')
+    + SPRING.format(1, 0, 4e5)
+    + DAMPER.format(1)
+    + FACE.format(1, 0.2, 90)
+    + FACE.format(1, 0.2, 30)
+    + '[drive]\nkind = "base"\nfrequency = "60 Hz"\nacceleration = "42 m/s^2"\ncycles = 12\n'
+)
+PRESSED = """[normal]
+load = "30 N"
+amplitude = "24 N"
+frequency = "1048 Hz"
+phase = "1.474 rad"
+[friction]
+law = "elastic-plastic"
+static = 0.307
+bond_length = "0.4 um"
+[structure]
+moving_mass = "0.67 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "335 Hz"
+damping = 0.05
+slide = 1.0
+base = 0.85
+[drive]
+kind = "force"
+force = "14.3 N"
+frequency = "524 Hz"
+cycles = 10
+"""
 BOND_SUM = (
     POINT
     + NONLOCAL.replace("1 um", "4 um")
@@ -99,6 +135,14 @@ PAIRS = {
     "oscillating load": (
         SLIDING, "", "accuracy.steps_per_cycle=400", "accuracy.steps_per_cycle=6400",
         "friction_force_peak slip_amplitude loop_area", "march march", 1e-4,
+    ),
+    "springs under an oscillating load": (
+        PRESSED, "", "accuracy.method=exact", "accuracy.method=march", "slip_amplitude stick_fraction loop_area",
+        "hybrid march", 1e-3,
+    ),
+    "unequal interfaces on one slide": (
+        UNEQUAL, "", "accuracy.method=exact", "accuracy.method=march; accuracy.steps_per_cycle=800",
+        "slip_amplitude stick_fraction stick_fraction_2 loop_area loop_area_2", "hybrid march", 1e-3,
     ),
     "truncated bonds": (
         BOND_SUM, "friction.order=0.5; accuracy.steps_per_cycle=120", "accuracy.quadrature=truncated; accuracy.tail=0.05",
@@ -249,13 +293,6 @@ def test_exact_load_sweep_keeps_stiffness():
     is_stuck = sweep["stick_fraction"].values == 1
     assert 5 < is_stuck.sum() < 40
     assert sweep["secant_stiffness"].values[is_stuck] == pytest.approx(7e6, rel=1e-6)
-
-
-FACE = '[[structure.interface]]\nbetween = [{0}, 0]\nlaw = "coulomb"\nstatic = 0.3\nkinetic = {1}\nload = "{2} N"\n'
-SPRING = '[[structure.spring]]\nbetween = [{}, {}]\nstiffness = "{} N/m"\n'
-DAMPER = '[[structure.damper]]\nbetween = [{}, 0]\ncoefficient = "20 N s/m"\n'
-BASE_STEP = '[drive]\nkind = "base"\nwaveform = "step"\nacceleration = "5 g"\nduration = "0.1 s"\n'
-BLOCK_MASS = "[structure]\nmasses = [{}]\n"
 
 
 @pytest.mark.parametrize("kinetic", [0.3, 0.1])

@@ -37,19 +37,20 @@ def force_and_rates(p, memory, point, s, rates):
         rates[0] = s[1] * v / p[1]
         rates[1] = growth
         force = p[0] * s[0]
-        slip_rate = 0.0
     else:
-        # The force follows the load; only a rising load stretches the springs further.
+        # The force follows the load; only a rising load stretches the springs further. The others break as they slip.
         elastic = side * max(point.load_rate, 0.0) * p[1] / s[1] if s[1] > 0 else 0.0
-        slip_rate = v - elastic
         rates[0] = side * point.load_rate
-        rates[1] = growth - max(s[1] - point.load, 0.0) * max(side * slip_rate, 0.0) / p[1]
+        breaking = max(s[1] - point.load, 0.0) * max(side * (v - elastic), 0.0) / p[1]
+        rates[1] = growth - breaking
         force = side * p[0] * point.load
 
-    # What the springs do not store, E = mu eps y^2/(2 s), is lost: also where a falling load cuts their force at rest.
+    # The slip is the slide less the mean stretch eps y/s, whose limit as the pieces touch is half of the slide.
     stretch = s[0] / s[1] if s[1] > 0 else 0.0
+    stretch_rate = p[1] * (rates[0] - stretch * rates[1]) / s[1] if s[1] > 0 else 0.5 * v
+    # What the springs do not store, E = mu eps y^2/(2 s), is lost: also where a falling load cuts their force at rest.
     storing = p[0] * p[1] * stretch * (rates[0] - 0.5 * stretch * rates[1])
-    return Friction(force, slip_rate, force * v - storing)
+    return Friction(force, v - stretch_rate, force * v - storing)
 
 
 def write_margins(p, memory, point, s, margins):
