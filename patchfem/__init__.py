@@ -22,7 +22,7 @@ Read the package in this order. A module imports only from its own entry of the 
 18. `structure`    modes and drive of the rig
 19. `hybrid`       motion from event to event by steps of order 8
 20. `points`       steps of order 2: many contact points, and sweeps over many cases
-21. `dynamics`     engines: event-driven solution, time stepping, harmonic balance
+21. `dynamics`     free motions by harmonic balance, limit cycles
 22. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
 23. `response`     measures of a run: outcome, events, levels and free vibration
 24. `wear`         wear depth over many cycles

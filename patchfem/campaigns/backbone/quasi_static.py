@@ -48,8 +48,9 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
         return _compute_from_bench_loops(joint, amplitudes)
 
     def tabulate(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup.
+        """Return the rows amplitude [m], frequency [Hz], damping ratio, loss [J] and force [N] at the output (5, k).
 
+        They follow from the friction loops of a LawGroup.
         `samples` is the number of samples of a loop.
         """
         return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)

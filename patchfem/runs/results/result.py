@@ -321,7 +321,8 @@ class SlipRule(NamedTuple):
     starts_at_rest: bool = False
 
 
-GRADUAL_SLIP_RULE = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
+# Slip rule for laws without a friction limit, if earlier cycles precede the first frame
+GRADUAL_SLIP_RULE = SlipRule()
 
 
 def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP_RULE) -> Arrays:

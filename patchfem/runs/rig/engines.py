@@ -212,7 +212,10 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
 
 
 def _list_hybrid_time_runs(model: Model, numerics) -> ComparisonRuns:
-    """List the comparison run of the engine `hybrid` with larger steps."""
+    """List the run of the engine `hybrid` with larger steps, by comparison with which the step errors are estimated.
+
+    `numerics` are the settings of the run whose errors are estimated.
+    """
     coarse = replace(
         numerics,
         local=hybrid_runs.COARSE * numerics.local,
