@@ -143,3 +143,12 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
             for sign in (1, -1)
         )
         assert (above < 0 < below) if cycle.is_stable else (below < 0 < above)
+
+
+def test_mode_without_friction_has_no_backbone():
+    """Rigid friction that does not act on a mode gives no motion and no warning."""
+    modes = make_shaken_modes([750.0], [0.003], [1.0], [2.0])
+    row = np.zeros(1)
+    with np.errstate(all="raise"):
+        found = limit_cycles.trace_relay_backbone(modes, row, (9.0, 9.0), [1e-4], 0)
+    assert found == [None]
