@@ -46,6 +46,8 @@ class FitIntervals:
     - effects: change of each row (r, n) of the residual per standard deviation of each parameter, in standard deviations
       of the rows; NaN for an undetermined parameter.
     - sensitivity: root mean square change (n,) of the residual per range of each parameter.
+    - shifts: change (n, r) of each parameter, to first order, per change of each row of the residual; 0 for a parameter
+      on a bound or without effect.
     - unknown: undetermined directions (d, n) in parameter space, as relative changes (relative to the
       range if a value is 0).
     - rows: number of independent rows of the residual; NaN without intervals.
@@ -57,6 +59,7 @@ class FitIntervals:
     correlation: np.ndarray
     effects: np.ndarray
     sensitivity: np.ndarray
+    shifts: np.ndarray
     unknown: np.ndarray
     rows: float
 
@@ -171,6 +174,8 @@ def compute_intervals(
     inverse, null_vectors = _invert_normal_matrix(jacobian[:, free], norms[free])
     covariance = np.full((n, n), np.nan)
     covariance[np.ix_(free, free)] = inverse * cost / dof
+    shifts = np.zeros((n, model.rows))
+    shifts[free] = model.space.derivatives(u)[free, None] * (inverse @ jacobian[:, free].T)
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
@@ -219,6 +224,7 @@ def compute_intervals(
         correlation=correlation,
         effects=jacobian * scale / np.sqrt(cost / dof),
         sensitivity=norms / np.sqrt(model.rows),
+        shifts=shifts,
         unknown=_list_unknown_directions(model, u, free, null_vectors / norms[free]),
         rows=rows,
     )
