@@ -309,15 +309,13 @@ def choose_engine(model: Model) -> Engine:
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
-    used = engine
-    if ENGINES[engine].finds_periodic_motion:
-        used = "hybrid"
-    reasons = {
-        "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
-    }
+    # Steady motions are found by integration from event to event.
+    used = "hybrid" if ENGINES[engine].finds_periodic_motion else engine
     sentences = []
     for key in list_fixed_settings(model.accuracy):
         if not has_effect(key, model.kind, used):
-            reason = reasons.get(key, f"for engine '{engine}'")
-            sentences.append(f"accuracy.{key} has no meaning {reason} and is not used")
+            reason = ", which does not use steps of equal length," * (key == "steps_per_cycle")
+            sentences.append(
+                f"accuracy.{key} has no meaning for engine '{engine}'{reason} and is not used"
+            )
     return sentences
