@@ -98,13 +98,18 @@ def test_exact_number_of_steady_motions_is_stated():
 
 
 def test_exact_regimes_of_laws_with_memory():
-    """Bonds stick at a small level and slide at a large one; a nonlinear spring alone has no friction."""
-    for level, regime in (("0.001 g", "stuck"), ("20 g", "slides")):
-        steady = pf.run(
-            POINT + NONLOCAL + MODE + SINE.format(100, 10),
-            **STEADY,
-            **{"drive.acceleration": level},
-        )
+    """Bonds and Iwan's law stick at a small level and slide at a large one, and Iwan's elements slip part by part between
+    them; a nonlinear spring alone has no friction."""
+    iwan = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "3e7 N/m"\nchi = -0.3\nbeta = 0.5\n'
+    for law, level, regime in (
+        (NONLOCAL, "0.001 g", "stuck"),
+        (NONLOCAL, "20 g", "slides"),
+        (iwan, "0.1 g", "stuck"),
+        (iwan, "3 g", "partial slip"),
+        (iwan, "20 g", "slides"),
+    ):
+        scene = POINT + law + MODE + SINE.format(100, 10)
+        steady = pf.run(scene, **STEADY, **{"drive.acceleration": level})
         assert steady.motion.steady.regime == regime
     spring = MODE + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n' + SINE.format(100, 10)
     assert pf.run(spring, **STEADY).motion.steady.regime == "no friction"
