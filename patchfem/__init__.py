@@ -25,7 +25,7 @@ Read the package in this order. A module imports only from its own entry of the 
 21. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
 22. `response`     measures of a run: outcome, events, levels and free vibration
 23. `wear`         wear depth over many cycles
-24. `runs`         patch, bench and rig: static contact, friction and motion combined
+24. `runs`         patch, bench and rig: static contact, friction and dynamics combined
 25. `identify`     parameters from measurements, with confidence intervals
 26. `campaigns`    studies with many runs: fits, error against cost, sweeps
 27. `export`       summary, netCDF, VTK, report
@@ -78,7 +78,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "1.14.0"
+__version__ = "1.15.0"
 __all__ = [
     "FitOptions",
     "Measure",

@@ -1,4 +1,4 @@
-"""CPU times per unit of work, from which engines are selected and runs that would take too long are refused.
+"""CPU times per unit of work, from which the engine of a rig is selected.
 
 The constants were measured on a reference machine with simple scenes and compiled code. The numbers of steps and elements
 are counted in `runs.rig.costs`. `measure_cpu_time` is the clock that decides whether a run is repeated.

@@ -12,7 +12,7 @@ interface under a constant load. Optional features are:
 - `varying-load`: a normal load that changes with the motion;
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
-- `harmonic`: harmonic balance;
+- `harmonic`: steady motions over one period;
 - `march`: time steps with return maps (`points.return_maps_kernels`);
 - `grooves`: grooves whose flanks the surfaces climb;
 
@@ -114,7 +114,7 @@ class Waveform(NamedTuple):
 
     @property
     def has_steady_motion(self) -> bool:
-        """Whether harmonic balance can compute the steady-state motion, or a curve of such motions."""
+        """Whether method `harmonic` can compute the steady-state motion, or a curve of such motions."""
         return self.is_sine or self.is_swept
 
 

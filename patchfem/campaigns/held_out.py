@@ -97,16 +97,14 @@ def format_cell(name: str, cell: float | str) -> str:
 def _has_value(name: str, cell: float | str, text: str) -> bool:
     """Return whether a cell in the column `name` has the value that a text of the option --hold states.
 
-    Labels that are numbers are compared as numbers, and frequencies and inputs but for round-off. The flags of a row need
-    only contain the text.
+    Labels that are numbers are compared as numbers, and frequencies and inputs but for round-off. Other flags of a row
+    need only contain the text.
     """
-    if name == "flag":
-        return text in cell
     if isinstance(cell, str):
         try:
             return float(cell) == float(text)
         except ValueError:
-            return cell == text
+            return text in cell if name == "flag" else text == cell
     try:
         value = parse_quantity(text, NUMBER_UNITS[name][0])
     except ValueError as error:

@@ -286,41 +286,6 @@ class KernelFunction:
         # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
 
-    def bind_arguments(
-        self, *arguments
-    ) -> tuple[tuple[str, ...] | None, bytes, tuple[object, ...]]:
-        """Convert the last arguments of many calls once, for `call_with_bound_args`.
-
-        They must be the same objects in every call, but the content of their arrays may change.
-
-        Returns
-        -------
-        tuple
-            Type codes, words and the arguments themselves. The type codes are None if there are no words.
-        """
-        if IS_JIT_DISABLED:
-            return None, b"", arguments
-        try:
-            type_codes, words = zip(*map(CONVERTER.convert, arguments))
-        except machine.UnsupportedError:
-            return None, b"", arguments
-        return type_codes, b"".join(words), arguments
-
-    def call_with_bound_args(
-        self, bound: tuple[tuple[str, ...] | None, bytes, tuple[object, ...]], *first
-    ):
-        """Call the function with first arguments, and with last ones that `bind_arguments` has converted.
-
-        `bound` has the type codes and the words of the last arguments, and these themselves. Without codes numba
-        converts them.
-        """
-        last_codes, last_words, last = bound
-        if last_codes is None:
-            return self(*first, *last)
-        first_codes, first_words = zip(*map(CONVERTER.convert, first))
-        function = self.loaded_functions.get(first_codes + last_codes)
-        return function(b"".join(first_words) + last_words) if function else self(*first, *last)
-
     def __call__(self, *arguments):
         if IS_JIT_DISABLED:
             return self.get_dispatcher()(*arguments)

@@ -103,7 +103,7 @@ class HolderPosition(NamedTuple):
 class StripModel(NamedTuple):
     """Model of equal strips that are pressed by one rigid holder.
 
-    - compliance: Compliance of the test pieces at the nodes of each strip. It may be zero (rigid pieces) with asperities.
+    - compliance: Compliance [m/N] of the pieces at the nodes of each strip; that of rigid pieces, 0, needs asperities.
     - layout: Nodes of the strips.
     - asperities: Pressure law of the asperities (`asperity_laws`); None if the pieces are bare.
     """

@@ -159,7 +159,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
-        """Return a measure as text, such as "143.2 ± 0.1 Hz"."""
+        """Return a quantity as text with its error, such as "143.21 ± 0.13 Hz"."""
         return quantities.format_quantity(name, measures[name])
 
     curve = backbone.best

@@ -145,6 +145,7 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
         f"{SCENE_JUDGEMENT_WORDS[row.judgement]}{error}."
     ]
 
+    # Runs without error estimates are neither met nor missed.
     met = [one.run for one in rows if one.judgement is Judgement.MEETS]
     if met:
         best = min(met, key=lambda one: one.tolerance)

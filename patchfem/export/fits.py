@@ -437,6 +437,8 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
         warnings.append(
             "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
         )
+
+    # The curve ends at the high bound of the coefficient, and so does the interval.
     max_depth = fit.curve[1][-1]
     if measured.high > max_depth:
         warnings.append(

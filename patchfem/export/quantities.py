@@ -52,7 +52,7 @@ KEY_QUANTITY_NAMES = tuple(
 )
 
 
-# kinds of answers whose quantities are defined in `surfaces.definitions`
+# kinds of answers whose quantities are defined in `surface_definitions`
 SURFACE_ANSWER_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
     # sweep

@@ -267,7 +267,10 @@ def _look_up(value, place: str):
 
 
 def _collect_motion(result: Result) -> Variables:
-    """Return the modal coordinates of a rig, and the normal load over time, which may be constant."""
+    """Return the modal coordinates (time, mode) [m] of a rig and the normal load [N], which may be constant, by name.
+
+    A result without a motion has neither.
+    """
     response = result.response
     if response is None:
         return {}

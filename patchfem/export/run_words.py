@@ -125,7 +125,7 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:
-    """Return the key of HEADLINE_PARTS for a run."""
+    """Return which row of HEADLINE_PARTS lists the measures of the headline of a run, such as "rig" or "wear"."""
     if "worn_volume" in measures or "worn_depth_max" in measures:
         return "wear"
     if "relative_displacement_rms" in measures:
@@ -202,7 +202,7 @@ def _describe_unknown(names: list[str]) -> str:
 
 
 def _describe_stability(result: Result) -> str:
-    """Return the outcome; for a steady motion by harmonic balance with its regime and what becomes of a disturbance."""
+    """Return the outcome; for a steady motion with its regime and what becomes of a disturbance."""
     sentence = result.outcome.sentence
     steady = result.motion.steady
     if steady is None:

@@ -171,44 +171,43 @@ def follow_curve(
     step = settings.first_step
     ended = "points"
 
-    # A step without a solution is halved.
-    while len(points) < settings.max_points:
-        # The scale of the unknowns rises with their size.
-        point = points[-1]
-        unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
-        tangent = point.find_tangent(tangent, unit)
-        try:
+    # A step without a solution is halved. The points found so far are a curve also if the next one costs too much.
+    try:
+        while len(points) < settings.max_points:
+            # The scale of the unknowns rises with their size.
+            point = points[-1]
+            unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
+            tangent = point.find_tangent(tangent, unit)
             taken = _take_step(curve, point, step * tangent, unit, settings.tolerance)
-            if taken is None and curve.restart is not None:
-                curve.restart(point)
-        except NotConverged:
-            ended = "cost"
-            break
-        if taken is None:
-            step /= 2
-            if step < MIN_ARC_STEP:
-                ended = "step"
+            if taken is None:
+                if curve.restart is not None:
+                    curve.restart(point)
+                step /= 2
+                if step < MIN_ARC_STEP:
+                    ended = "step"
+                    break
+                continue
+
+            # The last point lies on the bound that the step passes.
+            after, n_steps = taken
+            w = after.w
+            if not low <= w[-1] <= high:
+                bound = high if w[-1] > high else low
+                guess = point.w + (bound - point.w[-1]) / (w[-1] - point.w[-1]) * (w - point.w)
+                last = find_point(curve, point, np.append(guess[:-1], bound), settings.tolerance)
+                points += [last] * (last is not None)
+                ended = "end" if (bound == high) == forward else "start"
                 break
-            continue
 
-        # The last point lies on the bound that the step passes.
-        after, n_steps = taken
-        w = after.w
-        if not low <= w[-1] <= high:
-            bound = high if w[-1] > high else low
-            guess = point.w + (bound - point.w[-1]) / (w[-1] - point.w[-1]) * (w - point.w)
-            last = find_point(curve, point, np.append(guess[:-1], bound), settings.tolerance)
-            points += [last] * (last is not None)
-            ended = "end" if (bound == high) == forward else "start"
-            break
-
-        is_closed = _is_on_curve(after, points, tangent, unit)
-        points.append(after)
-        folds += _find_folds(points[-2:], tangent, unit, step)
-        if is_closed:
-            ended = "loop"
-            break
-        step = min(step * _step_factor(n_steps), settings.max_step)
+            is_closed = _is_on_curve(after, points, tangent, unit)
+            points.append(after)
+            folds += _find_folds(points[-2:], tangent, unit, step)
+            if is_closed:
+                ended = "loop"
+                break
+            step = min(step * _step_factor(n_steps), settings.max_step)
+    except NotConverged:
+        ended = "cost"
     return CurvePath(points, tuple(folds), ended)
 
 

@@ -60,7 +60,10 @@ FIRST_LOOK = 1e-5  # fraction of an interval, behind a margin that starts at 0
 
 @njit(**NJIT_KERNEL)
 def write_margins(rig, state, t, y, margins):
-    """Write the margins of all interfaces at a state; those of rigid laws need the accelerations.
+    """Write the margins of all interfaces at a state.
+
+    A margin is a function of the state whose zero ends the present regime of a law, such as the distance of the force from
+    the friction limit in stick. Margins of rigid laws need the accelerations.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ class PeriodEquations:
         return PathEquations(jacobian, slope, motion, motion.change, memory)
 
     def _describe(self, shooting: LoopShooting, before: State, change) -> PeriodicMotion:
-        """Return the motion of a point, with its multipliers.
+        """Return the motion over the period from a point of the curve, with its Floquet multipliers.
 
         Parameters
         ----------

@@ -187,9 +187,12 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
     with np.errstate(invalid="ignore", divide="ignore"):
         values = compute_measures(case, state, record)
 
+    # A curve keeps the records of all of its motions, so that the room for further events is released.
+    event_rows = record.events[: int(clock[Clock.N_EVENTS])].copy()
+    record = record._replace(events=event_rows)
+
     # Where a force jumps, a second row follows at the next instant.
     cycles = record.cycles[: int(clock[Clock.N_CYCLES])]
-    event_rows = record.events[: int(clock[Clock.N_EVENTS])]
     is_after = event_rows[:, -1] == Margin.AFTER
     after_rows = event_rows[is_after]
     after_rows[:, 0] = np.nextafter(after_rows[:, 0], np.inf)

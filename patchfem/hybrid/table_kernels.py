@@ -8,11 +8,14 @@ from .laws import LAWS
 
 
 def _choose(number: int, function, other):
-    """Return a compiled function that calls that of a law by its number, or the other one."""
+    """Return a compiled function that calls `function` if a law has this number, and else `other`.
+
+    `other` is such a function for the laws that follow, so that the functions of all laws form a chain.
+    """
 
     @njit(**NJIT_KERNEL)
     def choose(law, *arguments):
-        """Call the function of the law with this number, else the rest of the chain.
+        """Call the function of the law whose number is `law`.
 
         The `arguments` are those of the function, as `laws` describes.
         """

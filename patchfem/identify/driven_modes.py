@@ -66,7 +66,11 @@ class _DrivenRecord:
         return irfft(spectra, self.force.size)[:, self.inner]
 
     def _compute_forced(self, omega: float, rate: float) -> np.ndarray:
-        """Return the response of a mode to the input, with its derivatives (3, k)."""
+        """Return the response of a mode to the input, and its derivatives by `omega` and by `rate`: (3, k) samples.
+
+        `omega` [rad/s] is the damped circular frequency of the mode, and `rate` [1/s] the rate of its decay. The transfer
+        function is 1/(omega^2 + (rate + i w)^2) at the circular frequency w.
+        """
         pole = 1 / (omega**2 + rate**2 - self.omega**2 + 2j * rate * self.omega)
         response = self.input * pole
         by_rate = -2 * (rate + 1j * self.omega) * response * pole

@@ -43,9 +43,9 @@ class FitIntervals:
     - methods: "linear", "profile" or "none" for each parameter.
     - open_ends: whether each end (n, 2) is the bound of the parameter.
     - correlation: correlation matrix (n, n); NaN for an undetermined parameter.
-    - effects: change of each row (r, n) of the residual per standard deviation of each parameter, in standard deviations
-      of the rows; NaN for an undetermined parameter.
     - sensitivity: root mean square change (n,) of the residual per range of each parameter.
+    - shifts: change (n, r) of each parameter, to first order, per change of each row of the residual; 0 for a parameter
+      on a bound or without effect.
     - unknown: undetermined directions (d, n) in parameter space, as relative changes (relative to the
       range if a value is 0).
     - rows: number of independent rows of the residual; NaN without intervals.
@@ -55,10 +55,17 @@ class FitIntervals:
     methods: tuple[str, ...]
     open_ends: np.ndarray
     correlation: np.ndarray
-    effects: np.ndarray
     sensitivity: np.ndarray
+    shifts: np.ndarray
     unknown: np.ndarray
     rows: float
+
+    @property
+    def effects(self) -> np.ndarray:
+        """Change (r, n) of each row per standard deviation of each parameter, in standard deviations of the rows."""
+        # The covariance of the parameters is shifts shifts^T times the variance of the rows.
+        scale = np.linalg.norm(self.shifts, axis=1, keepdims=True)
+        return np.linalg.pinv(self.shifts / np.maximum(scale, 1e-300))
 
 
 class _Minimum(NamedTuple):
@@ -174,6 +181,10 @@ def compute_intervals(
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 
+    # Shift (J^T J)^-1 J^T of the parameters by a change of each row, from the unit cube to their units
+    shifts = np.zeros((n, model.rows))
+    shifts[free] = model.space.derivatives(u)[free, None] * (inverse @ jacobian[:, free].T)
+
     # Linear interval u_k +- t sqrt(cov_kk). To its end the other free parameters change by the multiple cov_ik/cov_kk of
     # u_k; if the sum of squares does not grow as expected on this line, or if u_k is on a bound, its profile is followed.
     half_width = quantile * np.sqrt(np.diag(covariance))
@@ -217,8 +228,8 @@ def compute_intervals(
         methods=tuple(methods),
         open_ends=open_ends,
         correlation=correlation,
-        effects=jacobian * scale / np.sqrt(cost / dof),
         sensitivity=norms / np.sqrt(model.rows),
+        shifts=shifts,
         unknown=_list_unknown_directions(model, u, free, null_vectors / norms[free]),
         rows=rows,
     )

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from scipy.special import stdtrit
 
 from ..core import NotConverged, Outcome
 from .descent import Descent, descend
@@ -93,19 +92,16 @@ class Fit:
             Bounds of the n parameters.
         """
         intervals = self.intervals
-        rows, n = intervals.effects.shape
-        dof = max(intervals.rows - n, 1)
-        deviation = max(self.rms * np.sqrt(rows / dof), 1e-300)
+        sizes = np.abs(intervals.shifts @ np.transpose(changes)).sum(axis=1)
+        ends = np.clip(intervals.ends + sizes[:, None] * [-1, 1], *np.transpose(bounds)[:, :, None])
+        open_ends = intervals.open_ends | (ends == bounds)
 
-        # In standard deviations of the parameters, J is `effects`, and the inverse of J^T J is the correlation.
-        gradients = np.nan_to_num(intervals.effects).T @ np.transpose(changes) / deviation
-        shifts = np.abs(np.nan_to_num(intervals.correlation) @ gradients).sum(axis=1)
-        factors = 1 + shifts / stdtrit(dof, 0.975)
-        values = self.values[:, None]
-        ends = np.clip(
-            values + factors[:, None] * (intervals.ends - values), *np.transpose(bounds)[:, :, None]
-        )
-        return replace(self, intervals=replace(intervals, ends=ends))
+        # Data that exclude neither bound do not determine the parameter.
+        is_unknown = open_ends.all(axis=1)
+        ends[is_unknown] = np.nan
+        methods = tuple(np.where(is_unknown, "none", intervals.methods).tolist())
+        widened = replace(intervals, ends=ends, open_ends=open_ends, methods=methods)
+        return replace(self, intervals=widened)
 
 
 @dataclass(frozen=True, slots=True)

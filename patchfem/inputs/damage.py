@@ -30,7 +30,7 @@ def list_some(texts: Sequence[str]) -> str:
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     """Convert exceptions that are raised while a damaged file is read into a PatchfemError.
 
-    Its message is `message`, the reason in brackets and `remedy`. `PROGRAM_MISTAKES` of the program pass.
+    Its message is `message`, the reason in brackets and `remedy`. `PROGRAM_MISTAKES` pass.
     """
     try:
         yield

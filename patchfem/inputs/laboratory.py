@@ -96,7 +96,7 @@ def _read_universal(
 def _find_quantity(name: str, names: list[str], exported_names: Mapping) -> str:
     """Return the quantity that the name of a column states, or "" if it states none.
 
-    `names` are those of all columns, and `exported_names` those that patchfem gives to columns of its own exports.
+    `names` are those of all columns. `exported_names` maps names of columns in files that patchfem exports to quantities.
     """
     quantity = find_standard_name(name, names, exported_names)
     return quantity if quantity in CHANNEL_UNITS else ""

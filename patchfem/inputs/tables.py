@@ -226,6 +226,30 @@ def parse_number(location: str, cell: str, factor: float) -> float:
     return value
 
 
+def _read_numbers(table: TextTable, factors: dict[str, float]) -> dict[str, np.ndarray]:
+    """Return the columns (k,) of a table that contains only numbers in range, in SI, and else nothing.
+
+    `factors` are those to SI by column. NumPy's reader takes a tenth of the time of `parse_number`, but does not say
+    which cell is wrong.
+    """
+    import numpy as np
+
+    from ..core import frozen_array
+
+    if len(factors) < len(table.names):
+        return {}
+    try:
+        numbers = np.loadtxt(table.lines, delimiter=table.separator, comments=None, ndmin=2)
+    except ValueError:
+        return {}
+    # NumPy leaves out blank lines.
+    scales = np.array(list(factors.values()))
+    is_complete = numbers.shape == (len(table.lines), scales.size)
+    if not is_complete or not (np.abs(numbers) <= MAX_SI_VALUE / scales).all():
+        return {}
+    return {name: frozen_array(column) for name, column in zip(factors, (numbers * scales).T)}
+
+
 def read_columns(path, form: TableFormat) -> Columns:
     """Read a table of numbers; columns that ``form.units`` does not know are kept as text.
 
@@ -258,9 +282,10 @@ def read_columns(path, form: TableFormat) -> Columns:
             f"not {len(table.lines)}"
         )
 
-    values = {}
+    values = _read_numbers(table, factors)
     labels = {}
-    rows = [cells for _, cells in table.iterate_rows()]
+    # Cells are read one by one if there is text among them, or a cell at fault to name.
+    rows = [] if values else [cells for _, cells in table.iterate_rows()]
     for name, cells in zip(table.names, zip(*rows)):
         if name not in factors:
             labels[name] = cells

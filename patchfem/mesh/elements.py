@@ -68,7 +68,7 @@ class Element(NamedTuple):
 
 
 def _make_element(corners, exponents, quadrature, has_centre: bool = False) -> Element:
-    """Return an element from its corners.
+    """Return an element from its corners (c, 2) in local coordinates.
 
     With more monomials than corners it has mid-edge nodes. `exponents` (k, 2) are those of the monomials along both
     coordinates, `quadrature` the points and weights of the integration, and an element with `has_centre` has one more

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from .slide import SlidePath
     from .wear import WearModel
 
-MIN_RIG_REST_SPEED = 1e-12  # smallest default of the rest speed of bonds (2.10) in a rig [m/s]
+# Smallest default [m/s] of the rest speed of bonds in a rig, v_h of eq. 2.10
+MIN_RIG_REST_SPEED = 1e-12
 MAX_EFFECTS_CHARACTERS = 160  # largest number of characters of the effects in the repr of a model
 
 

@@ -661,7 +661,6 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
     seen : (29,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
-    # A point counts as stuck while less than half of its motion is irreversible.
     first = abs(first)
     last = abs(last)
     sticks = first < 0.5

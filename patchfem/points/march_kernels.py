@@ -430,7 +430,8 @@ def write_residual(system, level, dt):
         vector[pitch] += ports.contact[3]
         size = max(size, abs(ports.contact[2]))
 
-    # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
+    # A port that is held has the velocity 0 at the end: its residual is the force that would stop it. Ports that one mode
+    # holds together share their force by the small compliance `redundant`.
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):

@@ -6,7 +6,7 @@ from ..compiled.jit import njit
 
 @njit(**NJIT_CALL)
 def find_set(sets, slot, approach, rotation):
-    """Return -1, which says that there is no contact set.
+    """Return -1, the slot number that stands for no contact set.
 
     The arguments are those of `press_kernels.find_set`, and are not used.
     """

@@ -70,9 +70,8 @@ WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS]
-NUMBER = (
-    -4
-)  # column of the number of the step in a row of a record; the first three of `Energy` follow
+# Column of the number of the step in a row of a record; the first three of `Energy` follow
+NUMBER = -4
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 

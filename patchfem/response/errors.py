@@ -146,8 +146,7 @@ def convergence_errors(
 def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     """Estimate the error of each measure from a run with more modes or bond strips.
 
-    The finer run has twice as many of them, and the coarser run half as many. The truncation error of
-    the Fourier series of a friction force with corners is of second order. Where the change to the
+    The finer run has twice as many of them, and the coarser run half as many. Where the change to the
     finer run is small by accident, the error is that of the change from the coarser run, reduced by
     2**MAX_CONVERGENCE_ORDER.
 

@@ -635,7 +635,7 @@ def error_floor(name: str, size=np.inf):
     name : str
         Name of the measure, with the number of an interface.
     size : float or (n,)
-        Displacement caused by the drive alone [m]; 0 or inf without a drive.
+        Displacement caused by the drive alone [m]. With 0 or inf the floor of a displacement is that of the table.
     """
     definition = find_definition(name)
     floor = definition.floor

@@ -20,6 +20,7 @@ from .patch import mesh_levels
 from .results import notes, patch_rows
 from .results.interfaces import Face, merge_findings
 from .results.result import Advice, Finding, Result
+from .rig import engines
 
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
 PROPOSED_TOLERANCE_RATIO = 0.1
@@ -155,8 +156,9 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     patch_model = face.model.patch
     strips = patch_model.interface.strips
     peak = missed.measures.get("pressure_peak")
-    is_wear_unbounded = "worn_depth_max" in missed.find_names() and peak is not None
-    is_wear_unbounded = is_wear_unbounded and peak.value is None
+    is_wear_unbounded = (
+        "worn_depth_max" in missed.find_names() and peak is not None and peak.value is None
+    )
     # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
     is_zero = (
         max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic
@@ -259,9 +261,11 @@ def _advise_steps(missed: Missed) -> Advice | None:
         return None
     halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_CONVERGENCE_ORDER)
 
-    # A rig doubles its steps while this reduces the errors, or needs none, unless the scene fixes them.
+    # A rig doubles its steps while this reduces the errors, or needs none from event to event, unless the scene fixes them.
     model = missed.model
-    fixed = ["method"] * (model.accuracy.method != "auto")
+    fixed = ["method"] * (
+        model.accuracy.method != "auto" and not engines.HYBRID.find_unsupported_feature(model)
+    )
     if model.accuracy.steps_per_cycle is not None:
         fixed.append("steps_per_cycle")
     if model.kind == "rig" and fixed and halvings > MAX_FIXED_STEP_HALVINGS:

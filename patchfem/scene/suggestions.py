@@ -216,7 +216,10 @@ def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
     similar = _list_similar(key, tables)
 
     def rate(name: str) -> float:
-        """Return the fraction of the keys inside that a table knows, and more for a similar or the same name."""
+        """Return how well the table `name` fits: the fraction of the given keys that it knows, plus a part for its name.
+
+        A name that is similar to the unknown one adds SIMILAR_NAME_RATING, and the same name SAME_NAME_RATING.
+        """
         known = len(inside & list_keys(tables[name]).keys()) / max(len(inside), 1)
         is_same = name.rpartition(".")[2] == key
         return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same

@@ -1,15 +1,17 @@
 """Parameters of each friction law fitted to friction loops, and output and refusals of the fit command."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import read_json, run_cli, run_successfully
 from friction_loops import dahl_force, elastic_plastic_force, write_loop
 
-from patchfem import SceneError, build
+from patchfem import FitOptions, SceneError, build
 from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
+from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.held_out import select_held_out
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
@@ -313,6 +315,13 @@ def test_refuses_invalid_loop_with_line_number(fit_command, text, message, tmp_p
         *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
     )
     assert answer.code == 2 and "loop.csv" in answer.err and message in answer.err, answer.err
+
+
+@pytest.mark.parametrize("text, selected", [("1", [0]), ("01", [0]), ("U", [2, 3])])
+def test_exact_held_out_flags(text, selected):
+    """Flags that are numbers are compared as numbers; others need only contain the text."""
+    mask = select_held_out(f"flag={text}", Path("a.csv"), {"flag": ["1", "10", "U", "U*", ""]})
+    assert np.flatnonzero(mask).tolist() == selected
 
 
 def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -78,6 +79,13 @@ def folders(tmp_path_factory):
         return folder
 
     return find_folder
+
+
+def test_exact_names_of_the_template_exist():
+    """Every name of `quantities` in the template exists: Jinja takes an unknown name as empty."""
+    template = Path(quantities.__file__).with_name("page.html").read_text("utf-8")
+    names = re.findall(r" quantities\.(\w+)", template)
+    assert "SURFACE_ANSWER_KINDS" in names and set(names) <= vars(quantities).keys()
 
 
 @pytest.mark.parametrize("name", SCENES)

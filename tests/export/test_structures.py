@@ -18,7 +18,7 @@ def export_structure(folder, text: str):
     """Return the model of a scene and the path of its export."""
     (folder / "rig.toml").write_text(text)
     answer = run_successfully("export", folder / "rig.toml", "-o", folder / "rig.mat")
-    assert "friction element" in answer.out, answer.err
+    assert "friction element" in answer.out
     return build(pf.load(folder / "rig.toml")), folder / "rig.mat"
 
 

@@ -1,6 +1,5 @@
 """Pages and files of backbones, fits, costs and several results: equal to their files, short, and made again from them."""
 
-import csv
 import re
 import shutil
 
@@ -12,6 +11,7 @@ from friction_loops import elastic_plastic_force, write_loop
 from measured_rows import make_linear_rows, write_rows
 from page_data import find_strange_curves, find_wrong_numbers, read_charts
 from scene_texts import DRIVE, MODE, PLASTIC, POINT
+from sweep_tables import read_rows
 
 BENCH = (
     POINT
@@ -90,7 +90,7 @@ def test_exact_backbone_files_agree(folders):
     """backbone.csv, backbone.nc and backbone.json hold the same curves, and the band contains the recommended one."""
     folder = folders / "backbone"
     curves = read_json(folder / "backbone.json")["curves"]
-    rows = list(csv.DictReader((folder / "backbone.csv").read_text("utf-8").splitlines()))
+    rows = read_rows(folder, "backbone.csv")
     heads = [
         "method",
         "amplitude [m]",
@@ -126,7 +126,7 @@ def test_exact_backbone_files_agree(folders):
 def test_exact_cost_table_agrees_with_json(folders):
     """cost.csv has the columns of the contract, with the numbers of cost.json; the page lists each run."""
     details = read_json(folders / "cost/cost.json")
-    rows = list(csv.DictReader((folders / "cost/cost.csv").read_text("utf-8").splitlines()))
+    rows = read_rows(folders / "cost", "cost.csv")
     assert list(rows[0])[:5] == ["knob", "setting", "seconds", "wall_seconds", "timings"]
     runs = [(knob, run) for knob, part in details.items() for run in part["runs"]]
     for row, (knob, run) in zip(rows, runs, strict=True):

@@ -118,6 +118,19 @@ def test_continuation_ends_with_count_of_steps():
         shooting.relax(10)
 
 
+def test_continuation_keeps_its_points_if_the_bound_costs_too_much():
+    """A curve whose point on the bound takes too many steps ends before the bound with the points found so far."""
+
+    def find_residual(x, p):
+        if p == 1.0:
+            raise NotConverged("too many steps")
+        return x - p
+
+    line = Curve(find_residual, lambda x, p: PathEquations(np.eye(1), np.array([-1.0])))
+    path = follow_curve(line, [0.0], 0.0, (0.0, 1.0))
+    assert path.ended == "cost" and 0.9 < path.points[-1].w[-1] < 1.0
+
+
 def make_sine_case(omega: float) -> cases.Case:
     """Return the case of a period of the rig with a cubic spring at a frequency [rad/s]."""
     return make_case(RIG, DUFFING, SineDrive(LEVEL, omega))

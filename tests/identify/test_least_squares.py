@@ -35,7 +35,8 @@ def solve_linear(design, data):
 def test_exact_linear_fit_has_closed_form_intervals():
     """Values, intervals, correlation and sensitivity of a linear fit agree with the normal equations.
 
-    An error of the model widens the intervals by the shift of the values that the same change of the data causes.
+    An error of the model widens the intervals by the shift of the values that the same change of the data causes, also
+    those of an exact fit. A parameter whose interval then reaches both bounds is not determined.
     """
     values, half_width, covariance, sum_of_squares = solve_linear(DESIGN, NOISY)
     fit = Problem(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5]).solve()
@@ -54,6 +55,11 @@ def test_exact_linear_fit_has_closed_form_intervals():
     shift = np.abs(solve_linear(DESIGN, NOISY + change)[0] - values)
     ends = fit.widen([change], [(-5, 5)] * 3).intervals.ends
     assert np.ptp(ends, axis=1) / 2 == pytest.approx(half_width + shift, abs=1e-8)
+    exact = Problem(lambda v: DESIGN @ (v - 1), [-5] * 3, [5] * 3, [1] * 3).solve()
+    ends = exact.widen([change], [(-5, 5)] * 3).intervals.ends
+    assert exact.rms == 0 and np.ptp(ends, axis=1) / 2 == pytest.approx(shift, abs=1e-8)
+    wide = fit.widen([1e3 * change], [(-5, 5)] * 3)
+    assert np.isnan(wide.intervals.ends).all() and "both ends" in describe_fit(wide, "abc")[0]
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
     assert fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc") == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import TableFormat, measured, read_columns, tables
+from patchfem.inputs import TableFormat, read_columns, tables
 from patchfem.mesh import files as meshes
 from patchfem.structure import arrays, universal
 
@@ -78,7 +78,6 @@ def test_refuses_invalid_cell_with_line_number(write_table, cell, message):
 @pytest.mark.parametrize(
     "name, reader, expected",
     [
-        ("a.csv", measured.read_table, "more than 64 MiB of text"),
         ("a.msh", meshes.read_pieces, "more than 256 MiB"),
         ("a.uff", universal.read_universal, "more than 512 MiB"),
         ("a.mat", arrays.read_arrays, "more than 512 MiB"),

@@ -8,6 +8,7 @@ from scene_runs import find_sentences
 from scene_texts import COULOMB, FORCED, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
+from patchfem.core import NotConverged
 from patchfem.response.rows import AMPLITUDE
 from patchfem.runs.rig.numerics import choose_numerics
 from patchfem.runs.rig.steady import shooting
@@ -74,7 +75,7 @@ def test_always_unstable_steady_state_is_not_converged():
 
 def test_exact_number_of_steady_motions_is_stated():
     """Near 160 Hz a stiffening rig has three steady motions. For the unstable one of them the smallest stable one
-    is shown, and a note says how many are stable."""
+    is shown, and a note says how many are stable. If the search for the others fails, it is shown itself."""
     scene = MODE + '[structure.stiffening]\ncubic = "1.4e10 N/m^3"\n' + STRONG_SWEEP
     model = pf.plan(pf.load(scene, **STEADY, **{"drive.to": "240 Hz"})).model
     finder = shooting.ShootingFinder(model, choose_numerics(model), None)
@@ -87,15 +88,28 @@ def test_exact_number_of_steady_motions_is_stated():
     (sentence,) = find_sentences(found.notes, "3 steady motions exist")
     assert "2 of them stable; the stable motion of smallest amplitude is shown" in sentence
 
+    def fail(drive):
+        raise NotConverged("too many steps")
+
+    finder._list_coexisting_motions = fail
+    found = finder.compute_steady_motion(middle.drive, middle.guess)
+    assert found.outcome == "not_converged" and not found.notes
+    assert found.values[AMPLITUDE] == pytest.approx(middle.values[AMPLITUDE], rel=1e-6)
+
 
 def test_exact_regimes_of_laws_with_memory():
-    """Bonds stick at a small level and slide at a large one; a nonlinear spring alone has no friction."""
-    for level, regime in (("0.001 g", "stuck"), ("20 g", "slides")):
-        steady = pf.run(
-            POINT + NONLOCAL + MODE + SINE.format(100, 10),
-            **STEADY,
-            **{"drive.acceleration": level},
-        )
+    """Bonds and Iwan's law stick at a small level and slide at a large one, and Iwan's elements slip part by part between
+    them; a nonlinear spring alone has no friction."""
+    iwan = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "3e7 N/m"\nchi = -0.3\nbeta = 0.5\n'
+    for law, level, regime in (
+        (NONLOCAL, "0.001 g", "stuck"),
+        (NONLOCAL, "20 g", "slides"),
+        (iwan, "0.1 g", "stuck"),
+        (iwan, "3 g", "partial slip"),
+        (iwan, "20 g", "slides"),
+    ):
+        scene = POINT + law + MODE + SINE.format(100, 10)
+        steady = pf.run(scene, **STEADY, **{"drive.acceleration": level})
         assert steady.motion.steady.regime == regime
     spring = MODE + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n' + SINE.format(100, 10)
     assert pf.run(spring, **STEADY).motion.steady.regime == "no friction"

@@ -108,8 +108,8 @@ def find_strange_curves(text: str, path) -> list[str]:
     path: the netCDF file. The stress in both pieces is from another file.
     """
     with xr.open_dataset(path) as data:
-        arrays = [one.values for one in data.variables.values() if one.dtype.kind in "fi"]
-    numbers = [np.abs(one.astype(float)).ravel() for one in arrays]
+        arrays = [one for one in data.variables.values() if one.dtype.kind in "fi"]
+        numbers = [np.abs(np.ravel(one)) for one in arrays]
     numbers = np.concatenate([one[np.isfinite(one)] for one in numbers])
     scales = [10.0**k for k in range(-12, 13, 3)] + [1 / 9.80665]
     strange = []

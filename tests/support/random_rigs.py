@@ -4,8 +4,8 @@
 drawn by chance: 1 to 5 modes of 60 to 400 Hz with damping ratios of 0.1 to 3 %; 1 to 4 interfaces, each with one of the
 laws; 8 to 20 cycles of a sine, of three tones or of a record, or a release. A third of the rigs whose laws allow it have
 loads that oscillate or follow the motion, of which a third lift off. The values beside a spec are those of
-`tests/support/hybrid_campaign.py` of version 1.10, which integrates the equations by DOP853 from event to event. There the
-slip of elastic-plastic springs under a load that varies became the slide less the mean stretch.
+`tests/support/hybrid_campaign.py` of version 1.10, which integrates the equations by DOP853 from event to event. Since 1.15
+its slip of elastic-plastic springs under a load that varies is the slide minus their mean stretch.
 """
 
 import json

@@ -49,9 +49,9 @@ def make_random_table(points, measures, **more) -> SweepTable:
     return make_table(keys, measures, shape=(len(points),), is_random=True, **more)
 
 
-def read_rows(folder) -> list[dict]:
-    """Return the rows of sweep.csv."""
-    with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
+def read_rows(folder, name="sweep.csv") -> list[dict]:
+    """Return the rows of a table in a results folder."""
+    with open(folder / name, encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 

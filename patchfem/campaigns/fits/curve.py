@@ -571,7 +571,8 @@ def _widen_by_numerical_error(
     error = np.nan_to_num(error)
     changes = np.eye(2)[:, :, None] * (error / measured.error)
     curve = curves.compute(fit.values, method)
-    frequency, damping = 100 * np.max(error / np.abs(curve), axis=1)
+    relative = np.divide(error, np.abs(curve), out=np.zeros_like(error), where=curve != 0)
+    frequency, damping = 100 * relative.max(axis=1)
     note = (
         f"the intervals contain the numerical error of the curve, up to {frequency:.2g} % of the frequency and "
         f"{damping:.2g} % of the damping ratio"

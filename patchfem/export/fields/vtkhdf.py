@@ -138,10 +138,10 @@ def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Data
 
 
 def _write_field(group, name: str, values: np.ndarray) -> None:
-    """Write a field (f, n, ...) with its unit and the meaning of its codes.
+    """Write a field of f frames and n points or cells, (f, n, ...), with its unit and the meaning of its codes.
 
-    `name` is that of the field in `VTK_FIELDS`, whose values are in SI units. A chunk is one component in one frame:
-    neighbours in it are neighbours in space, which compresses well.
+    `group` is the h5py group of the fields of a block. `name` is that of the field in `VTK_FIELDS`, whose values are in SI
+    units. A chunk is one component in one frame: neighbours in it are neighbours in space, which compresses well.
     """
     field = VTK_FIELDS[name]
     flat = values.reshape(-1, *values.shape[2:])

@@ -153,7 +153,7 @@ def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
 
 
 def describe_region(comparison: Comparison) -> str:
-    """Return in words the part of the surface over which the worn depth is averaged, such as "the track"."""
+    """Return in words the part of the surface over which the worn depth is averaged."""
     return "the common area" if comparison.is_areal else "the common length"
 
 

@@ -101,7 +101,7 @@ def list_step(increment, bonds, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_sums(bonds):
-    """Write force [1] and energy [m] of the present state into the rows `STRIP.present_...` and into the status."""
+    """Write force [1] and energy [m] of the present state into the rows of `STRIP` for it, and into the status."""
     strips = bonds.bondlist
     status = bonds.status
     first = int(status[STATUS.first_column])

@@ -116,6 +116,8 @@ def average_pressure(
     if direction < 0:
         return average_pressure(-positions, -nodes[::-1], sigma[::-1], 1.0, length, order)
     is_bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
+    # The incomplete gamma function of order p + 2 bounds the weights of farther nodes: pressures that are linear between
+    # the nodes add a power of s to phi.
     cutoff = length * float(gammainccinv(order + 2, CUTOFF_WEIGHT))
 
     # Blocks of positions bound the memory; nodes whose weight is below round-off are left out

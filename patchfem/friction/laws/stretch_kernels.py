@@ -32,6 +32,7 @@ def relax_stretch(numbers, stretch, increment, dt):
     Returns
     -------
     RelaxedStretch
+        Stretch [m] after the increment, and its derivatives.
     """
     length = numbers[StretchNumber.LENGTH]
     end = length if increment > 0 else -length

@@ -35,7 +35,9 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the velocity in the direction of motion, and z on its side.
+    """Write the margins of a regime: the velocity in the direction of motion, and z times its sign.
+
+    The rate of z has a kink where one of them is 0.
 
     Parameters
     ----------

@@ -207,9 +207,8 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
         is_resolved = True
         for case, extents in solved:
             edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
-            zones = extents[0].slip_zones
             is_resolved &= edge_cell_ratio <= max_ratio
-            is_resolved &= _resolves_contact(case, pair.grid.x, layout, zones)
+            is_resolved &= _resolves_contact(case, pair.grid.x, layout, extents[0].slip_zones)
         if is_resolved:
             break
     return layout, contact

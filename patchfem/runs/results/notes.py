@@ -107,7 +107,7 @@ def _warn_of_creep(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_created_energy(facts: LawFacts) -> Iterator[str]:
-    """Warn if the printed law of the 1985 report has created more than MAX_CREATED_ENERGY_FRACTION of the work exchanged."""
+    """Warn if the law as printed in the 1985 report created energy: more than a fraction of the work that was exchanged."""
     friction = facts.model.friction
     if friction is None or friction.reading != "report":
         return

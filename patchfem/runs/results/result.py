@@ -23,7 +23,6 @@ N_INTERFACE_FRAMES = 16  # Number of frames of the interface fields in the last 
 # Change of slip / largest change; above it, a node without friction limit slips.
 MIN_SLIP_CHANGE_FRACTION = 1e-2
 TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
-# Folder of an absolute path at the start of a remark.
 # Outcomes of motions without a periodic cycle.
 UNBOUNDED_OUTCOMES = (
     Outcome.GROWS,
@@ -31,6 +30,7 @@ UNBOUNDED_OUTCOMES = (
     Outcome.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED,
 )
+# Folder of an absolute path at the start of a remark.
 _FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
 
 
@@ -321,7 +321,8 @@ class SlipRule(NamedTuple):
     starts_at_rest: bool = False
 
 
-GRADUAL_SLIP_RULE = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
+# Slip rule for laws without a friction limit, if earlier cycles precede the first frame
+GRADUAL_SLIP_RULE = SlipRule()
 
 
 def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP_RULE) -> Arrays:

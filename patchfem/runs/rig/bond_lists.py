@@ -71,8 +71,9 @@ def has_bond_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Choose the bond summation (`friction.bonds`) for the requested engine, which may be "auto".
+    """Return how the bonds are summed, as a `friction.bonds.engines.EngineChoice`.
 
+    `engine` is the requested form of the sum, such as "recursion", or "auto" for the cheapest one within the tolerance.
     The error of a summation depends on the stroke between two reversals: 4 times the displacement amplitude of the drive,
     but at most that of a block held by its bonds (`stretch`), both in bond lengths. `numerics` has the steps per cycle.
     """

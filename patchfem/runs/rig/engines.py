@@ -212,7 +212,10 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
 
 
 def _list_hybrid_time_runs(model: Model, numerics) -> ComparisonRuns:
-    """List the comparison run of the engine `hybrid` with larger steps."""
+    """List the run of the engine `hybrid` with larger steps, by comparison with which the step errors are estimated.
+
+    `numerics` are the settings of the run whose errors are estimated.
+    """
     coarse = replace(
         numerics,
         local=hybrid_runs.COARSE * numerics.local,
@@ -306,15 +309,13 @@ def choose_engine(model: Model) -> Engine:
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
-    used = engine
-    if ENGINES[engine].finds_periodic_motion:
-        used = "hybrid"
-    reasons = {
-        "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
-    }
+    # Steady motions are found by integration from event to event.
+    used = "hybrid" if ENGINES[engine].finds_periodic_motion else engine
     sentences = []
     for key in list_fixed_settings(model.accuracy):
         if not has_effect(key, model.kind, used):
-            reason = reasons.get(key, f"for engine '{engine}'")
-            sentences.append(f"accuracy.{key} has no meaning {reason} and is not used")
+            reason = ", which does not use steps of equal length," * (key == "steps_per_cycle")
+            sentences.append(
+                f"accuracy.{key} has no meaning for engine '{engine}'{reason} and is not used"
+            )
     return sentences

@@ -152,7 +152,7 @@ def _make_result(run: CoupledRun) -> Result:
     if model.rig.drive.waveform.is_random:
         notes += stationary.warn_if_short(measures, solution.window)
 
-    # Interfaces with patches of their own have fields of their own.
+    # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
     if inputs.patch is not None:
         fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)

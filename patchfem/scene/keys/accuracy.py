@@ -7,7 +7,7 @@ from .types import Fraction, Table, key, number, optional, whole_number
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
 # Largest number of shear modes; more make the dense matrices too large.
-MAX_HARMONICS_OR_SHEAR_MODES = 10_000
+MAX_SHEAR_MODES = 10_000
 
 
 class Accuracy(Table):
@@ -43,6 +43,6 @@ class Accuracy(Table):
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
     )
     shear_modes: optional(
-        whole_number(1, MAX_HARMONICS_OR_SHEAR_MODES),
+        whole_number(1, MAX_SHEAR_MODES),
         "number of shear modes of the pieces; default: set by the tolerance",
     )

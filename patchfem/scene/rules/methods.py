@@ -111,7 +111,6 @@ ENGINE_SUPPORT = {
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
-# Key of the engine that computes the motion
 ENGINE_KEY = "accuracy.method"
 
 

@@ -34,6 +34,7 @@ def check_needed_keys(draft: SceneDraft) -> None:
 
         # Keys that a selector or another key needs.
         for need, is_required, reason in choices.needs:
+            # A bundle is a group of keys that stand together, of which the first one decides whether it applies.
             used = [bundle for bundle in need.bundles if bundle[0] not in choices.unused]
             _check_need(table, need._replace(bundles=used), reason, is_required=is_required)
         for model, needed_by_key in NEEDED_KEYS.items():

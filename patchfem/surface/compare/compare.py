@@ -501,10 +501,10 @@ def _measure_share(depths: DepthMap) -> Quantity:
 def _name_ends(
     track: dict[str, Quantity], placement: Placement, middle: float
 ) -> dict[str, Quantity]:
-    """Return the mean depth within the longest track, and its ends in both traces.
+    """Return the mean depth within the longest worn track, and the positions of its two ends in both traces, by name.
 
-    `track` are its quantities, `placement` the place of the second trace, and `middle` [m] the middle of the second
-    trace, about which it is stretched.
+    `track` are the quantities of this track, `placement` the place of the second trace, and `middle` [m] the middle of the
+    second trace, about which it is stretched.
     """
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value

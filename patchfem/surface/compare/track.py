@@ -38,7 +38,7 @@ MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surf
 # Largest number of samples in which a flank reaches FITTED_FLANK_DEVIATIONS
 MAX_FLANK_SAMPLES = 400
 SHALLOW_FLANK_SAMPLES = 60  # number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
-MAX_TRIED_ENDS = 80  # number of places that are tried as an end
+MAX_TRIED_ENDS = 80  # number of positions that are tried as an end of a worn track
 # Number of samples beyond the likely places that belong to the interval of an end
 END_INTERVAL_MARGIN_SAMPLES = 2
 # Squared residual of a single depth beyond which it counts no more

@@ -1,6 +1,5 @@
 """Answer and page of a sweep: sentences, quantities and charts agree with sweep.csv."""
 
-import csv
 import shutil
 
 import h5py
@@ -10,6 +9,7 @@ import xarray as xr
 from command_line import read_page, run_successfully
 from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
+from sweep_tables import read_rows
 
 import patchfem as pf
 from patchfem.export import store
@@ -78,8 +78,7 @@ def test_exact_verdict_is_short(folders, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_page_shows_numbers_of_table(folders, kind):
     """The values that the menu of the page draws are those of sweep.csv for every measure, in single precision."""
-    with open(folders[kind] / "sweep.csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_rows(folders[kind])
     answer = store.read_answer(folders[kind])
     n_checked = 0
     for label, traces in read_menu(folders[kind] / "report.html").items():

@@ -115,7 +115,7 @@ the ends of the patch across x.
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
 infinite; any computed value of this peak would depend on the mesh.
 
-**Harmonic balance.** Harmonic balance finds only periodic motions.
+**Steady motions.** Method `harmonic` and backbones find only periodic motions.
 """
 
 

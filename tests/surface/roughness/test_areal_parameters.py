@@ -6,7 +6,7 @@ import pytest
 from patchfem.surface import make_report
 from patchfem.surface.areal import Areal
 from patchfem.surface.roughness.areal import autocorrelation, compute_areal_parameters
-from patchfem.surface.roughness.filter import WIDTH_OVER_CUTOFF, filter_surface, mean_surface
+from patchfem.surface.roughness.filter import filter_surface, mean_surface
 
 UM = 1e-6
 
@@ -88,11 +88,11 @@ def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
 
 
 def test_exact_wave_transmission_of_areal_filter():
-    """The areal filter transmits exp(-pi (alpha cutoff / L)^2) of a wave of length L, half of it at the cut-off."""
+    """The areal filter transmits 2^-(cutoff/L)^2 of a wave of length L, half of it at the cut-off."""
     for wave, degrees in ((40.0, 0.0), (40.0, 30.0), (25.0, 90.0)):
         waves, rough = filter_surface(make_scan(make_plane_wave(240, 240, wave, degrees)), 40 * UM)
         assert waves.z.shape == (200, 200) and waves.x[0] == 20 * UM
-        transmission = np.exp(-np.pi * (WIDTH_OVER_CUTOFF * 40 / wave) ** 2)
+        transmission = 0.5 ** ((40 / wave) ** 2)
         inside = make_plane_wave(240, 240, wave, degrees)[60:-60, 60:-60]
         assert waves.z[40:-40, 40:-40] == pytest.approx(transmission * inside, abs=1e-9)
         assert rough.z[40:-40, 40:-40] == pytest.approx((1 - transmission) * inside, abs=1e-9)
@@ -109,11 +109,8 @@ def test_exact_filter_ignores_holes():
     assert np.array_equal(np.isnan(found), np.isnan(z))
     y, x = np.mgrid[:70, :70]
     for i, j in ((19, 40), (2, 2), (27, 29)):
-        weight = np.where(
-            np.isnan(z),
-            0,
-            np.exp(-np.pi * ((y - i) ** 2 + (x - j) ** 2) / (WIDTH_OVER_CUTOFF * 15) ** 2),
-        )
+        distance = np.hypot(y - i, x - j) / 15
+        weight = np.where(np.isnan(z), 0, np.exp(-((np.pi * distance) ** 2) / np.log(2)))
         assert found[i, j] == pytest.approx(
             (weight * np.nan_to_num(z)).sum() / weight.sum(), abs=1e-9
         )

@@ -199,7 +199,15 @@ class ShootingFinder:
         if not self.may_fold or (motion is not None and (motion.is_stable or motion.grows)):
             return motion, ()
 
-        motions = self._list_coexisting_motions(drive)
+        # All motions under the drive; without them the one that was found remains.
+        try:
+            motions = self._list_coexisting_motions(drive)
+        except NotConverged:
+            if motion is None:
+                raise
+            motions = [motion]
+
+        # Without a stable motion there is nothing to compare.
         stable_motions = [other for other in motions if other.is_stable]
         if not stable_motions:
             motions = motions if motion is None else [motion]
