@@ -8,6 +8,10 @@ omega^2 = omega_0^2 + s^2 K_eq/m and zeta = zeta_0 omega_0/omega + loss/(2 pi m 
 those of the friction loop. A limit cycle has zeta = 0. In a test of phase resonance a force at the output, in phase with
 its velocity, takes the place of the negative damping.
 
+Loads are constant, and all forces change their sign with the motion, so that its second half period is the first one
+with the opposite sign. The map is that of half a period, whose end is given the opposite sign. Its derivatives are the
+square root of those of a period, which the negative damping multiplies by up to exp(4 pi zeta).
+
 The unknowns are the state at phase 0, the frequency, and the damping or the force. A period begins where the
 fundamental of the output vanishes and rises, far from the reversals of the output.
 """
@@ -21,7 +25,7 @@ import numpy as np
 from ..core import ModalBasis, NotConverged
 from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
 from .drives import make_tones
-from .laws import is_rigid
+from .laws import is_rigid, mirror_state
 from .measures import split_integrals
 from .periodic import (
     MAX_KINKED_CHANGE,
@@ -50,7 +54,7 @@ MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the fi
 MAX_NEWTON_STEPS = 20  # Newton steps to a motion
 # Largest ratio of the changes over a period after and before a correction at which the derivatives are updated
 MAX_BROYDEN_RATIO = 0.3
-MAX_DETOURS = 4  # of these, steps that are shortened, or that begin with new derivatives
+MAX_DETOURS = 3  # of these, steps that are shortened, or that begin with new derivatives
 # Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
 LONGEST_STEPS = np.array([0.3, 0.6])
 RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
@@ -59,6 +63,7 @@ RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequenc
 MIN_COSINES = (0.9, 0.5)
 SAME_AMPLITUDE_TOL = 1e-3  # relative difference of amplitudes between which no slope is taken
 MAX_FOLLOWED = 20  # attempts to reach an amplitude from another one, with halved steps where no motion is found
+MIN_FOLLOWED_STEP = 0.01  # shortest of these steps, as a logarithm of the amplitude
 # Amplitudes at which the mode with sticking contacts and that without them are tried as starts, relative to that of the
 # first motion
 STUCK_RATIOS = (1.0, 1e-2, 1e-4, 1e-6)
@@ -146,11 +151,11 @@ class FreeMotion(NamedTuple):
 
     def find_shape(self) -> np.ndarray:
         """Return the first harmonic (n,) of the modal coordinates [m] as complex amplitudes."""
-        times = np.arange(N_SAMPLES) * (self.shooting.period / N_SAMPLES)
+        times = np.arange(N_SAMPLES // 2) * (self.shooting.period / N_SAMPLES)
         case = replace(self.shooting.case, samples=times)
         rows = run_case(case, start=self.shooting.load_loops(self.state)).rows
-        samples = rows[np.isin(rows[:, 0], times), 1 : 1 + case.rig.modes.shape[1]]
-        return np.fft.rfft(samples, axis=0)[1] * (2 / N_SAMPLES)
+        half = rows[np.isin(rows[:, 0], times), 1 : 1 + case.rig.modes.shape[1]]
+        return np.fft.rfft(np.vstack([half, -half]), axis=0)[1] * (2 / N_SAMPLES)
 
     def find_multiplier(self) -> float:
         """Return the magnitude of the largest Floquet multiplier besides that of a shift in time, which is 1."""
@@ -161,13 +166,13 @@ class FreeMotion(NamedTuple):
         is_motion = ~np.isin(linear.columns, shooting.extra)
         multipliers = np.linalg.eigvals(linear.slopes[np.ix_(is_motion, is_motion)])
         shift = np.argmin(np.abs(multipliers - 1))
-        return float(np.abs(np.delete(multipliers, shift)).max(initial=0.0))
+        return float(np.abs(np.delete(multipliers, shift)).max(initial=0.0)) ** 2
 
 
 class FreeShooting(LoopShooting):
-    """Map of a period of a free motion, whose state is extended by two unknowns: frequency and rate.
+    """Map of half a period of a free motion, whose state is extended by two unknowns: frequency and rate.
 
-    The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. Over a period the map adds to the
+    The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. The map adds to the
     frequency what the output misses of its phase, and to the rate what it misses of its amplitude, so that a motion of
     the amplitude is a fixed point. For a limit cycle it sets the rate to 0 instead.
 
@@ -214,17 +219,18 @@ class FreeShooting(LoopShooting):
         super().__init__(Case(arrays, y, empty, empty, empty, rig.n_friction))
 
     def advance(self, state: State) -> State:
-        """Return the state a period after another one, with its further unknowns corrected."""
+        """Return the state half a period after another one with the opposite sign, its further unknowns corrected."""
         omega, rate = state.y[self.extra]
         self._set_excitation(omega, rate)
         state = copy_state(state)
         state.y[self.extra[-1] + 1 :] = 0.0
         end = super().advance(state)
+        mirror_state(self.case.rig, end)
 
         # Half the range of the output, and the cosine part of its fundamental
         cycle = self.record.cycles[0]
-        self.size = (cycle[Cycle.MAX] - cycle[Cycle.MIN]) / 2
-        cosine = omega / np.pi * end.y[Tail.COSINE]
+        self.size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
+        cosine = 2 * omega / np.pi * end.y[Tail.COSINE]
         gain = RATE_SCALE * omega * (self.size / self.amplitude - 1)
         end.y[self.extra] += omega * cosine / self.amplitude, -rate if self.is_cycle else gain
         return end
@@ -242,7 +248,12 @@ class FreeShooting(LoopShooting):
         else:
             damping = self.motions.rig.modes.damping_matrix
             rig = rig._replace(damping=damping - rate * np.eye(len(damping)))
-        self.case = replace(self.case, rig=rig, ends=np.array([self.period]))
+        self.case = replace(self.case, rig=rig, ends=np.array([self.period / 2]))
+
+    def find_ranges(self) -> np.ndarray:
+        """Return the smallest and largest slide (i, 2) of the interfaces over a period [m]."""
+        largest = np.abs(super().find_ranges()).max(axis=1)
+        return np.column_stack([-largest, largest])
 
     def start_from(self, motion: FreeMotion) -> None:
         """Begin at a motion that is extrapolated from another one over the logarithm of the amplitude."""
@@ -292,6 +303,7 @@ class FreeShooting(LoopShooting):
         step = last_residual = np.zeros(0)
         best = np.inf
         n_long = n_maps = 0
+        is_new = False
         for _ in range(MAX_NEWTON_STEPS):
             before = self.state
             self.relax(1)
@@ -302,10 +314,14 @@ class FreeShooting(LoopShooting):
             if not np.isfinite(change):
                 return None
 
-            # After a correction that helped, its residual updates the derivatives (Broyden's method).
+            # After a correction that helped, its residual updates the derivatives (Broyden's method). A correction with new
+            # derivatives that did not help began too far away.
             start = self.pack(before)
             residual = self.pack(self.state) - start
-            if not change < MAX_BROYDEN_RATIO * best:
+            if is_new and not change < best:
+                return None
+            is_new = not change < MAX_BROYDEN_RATIO * best
+            if is_new:
                 n_maps += 1
                 self.map = None
             elif change > MAX_REMAINDER * best:
@@ -346,7 +362,7 @@ class FreeShooting(LoopShooting):
             amplitude=self.size if self.is_cycle else self.amplitude,
             omega=float(omega),
             rate=float(rate),
-            loss=float(work.sum()),
+            loss=2 * float(work.sum()),
             change=change,
             sticks=bool((stuck[rigid] > MIN_STOP * self.period).any()),
             shooting=self,
@@ -386,6 +402,8 @@ class FreeMotions:
         """Return the motion at an amplitude [m], followed from another one `near` in steps as long as possible, or None."""
         targets = [amplitude]
         for _ in range(MAX_FOLLOWED):
+            if abs(np.log(targets[-1] / near.amplitude)) < MIN_FOLLOWED_STEP and len(targets) > 1:
+                return None
             motion = self.solve(targets[-1], near)
             if motion is None:
                 targets.append(float(np.sqrt(near.amplitude * targets[-1])))

@@ -63,10 +63,14 @@ class LoopShooting(Shooting):
         n_modes = self.case.rig.modes.shape[1]
         end = super().advance(self.load_loops(state))
         slides = self.case.rig.rows[0] @ end.y[:n_modes]
-        ranges = self.record.get_face_extremes(Probe.SLIDE)
+        ranges = self.find_ranges()
         for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
             masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
         return end
+
+    def find_ranges(self) -> np.ndarray:
+        """Return the smallest and largest slide (i, 2) of the interfaces in the last period [m]."""
+        return self.record.get_face_extremes(Probe.SLIDE)
 
     def pack(self, state: State) -> np.ndarray:
         """Return the n states of the motion and the reversal points in one array (k,), the last of them at its end."""

@@ -10,7 +10,8 @@ A law has three functions of plain numbers and arrays, which `table_kernels` com
 They may call functions of their module that HELPERS lists. `p` are the numbers of the law, `memory` is a row of
 `records.Memory`. Within a regime force and rates must be smooth. A law needs no tangent, no solver and no error formula.
 `RIGID` says whether it rests without displacement. A law of a table [friction] has `from_law(law, load)`, which returns
-its `records.LawNumbers` from the law of `friction.laws` and a mean load [N].
+its `records.LawNumbers` from the law of `friction.laws` and a mean load [N]. In a motion of the opposite sign the states
+and `memory[FLAG]` have the factors that STATE_SIGNS and FLAG_SIGN list; without them they keep their values.
 
 LAWS lists the modules; the number of a law is its place. LAW_OF_NAME gives the module for each `friction.law`, and
 VARYING_LAW_OF_NAME that under a load that varies.
@@ -19,7 +20,7 @@ VARYING_LAW_OF_NAME that under a load that varies.
 from importlib import import_module
 
 from ...core import MIN_LOAD, PatchfemError
-from ..records import LawNumbers
+from ..records import Face, LawNumbers, Memory, Rig, State
 
 LAWS = (
     "coulomb",
@@ -47,6 +48,15 @@ VARYING_LAW_OF_NAME = {
     "tanh": "tanh",
     "elastic-plastic": "pressed_springs",
 }
+# Columns of the memory that change their sign with the motion, besides the reversal points
+ODD_MEMORY = (
+    Memory.DIRECTION,
+    Memory.FORCE,
+    Memory.SLIP_RATE,
+    Memory.PULL,
+    Memory.ORIGIN,
+    Memory.BEFORE,
+)
 
 
 def make_law(name: str, law, load: float, *, varies: bool = False) -> LawNumbers:
@@ -81,3 +91,25 @@ def make_law(name: str, law, load: float, *, varies: bool = False) -> LawNumbers
 def is_rigid(law: str) -> bool:
     """Return whether a law rests without displacement below its static friction."""
     return import_module(f"{__name__}.{law}").RIGID
+
+
+def mirror_state(rig: Rig, state: State) -> None:
+    """Give a motion the opposite sign.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig, whose loads are constant.
+    state : State
+        Its motion, which is changed.
+    """
+    n_modes = rig.modes.shape[1]
+    state.y[: 2 * n_modes] *= -1
+    for face, memory in zip(rig.faces, state.memory):
+        law = import_module(f"{__name__}.{LAWS[int(face[Face.LAW])]}")
+        signs = getattr(law, "STATE_SIGNS", ())
+        first = 2 * n_modes + int(face[Face.FIRST_STATE])
+        state.y[first : first + len(signs)] *= signs
+        memory[Memory.FLAG] *= getattr(law, "FLAG_SIGN", 1.0)
+        memory[list(ODD_MEMORY)] *= -1
+        memory[Memory.STACK :] *= -1

@@ -14,6 +14,7 @@ from ...exceptions import PatchfemError
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
+STATE_SIGNS = (1.0, -1.0, 1.0, 1.0)
 MIN_DENSITY = 1e-30  # density below which no bond exists that could slip
 DENSITY_SCALE = 1.0  # largest density, to which its error is relative
 

@@ -6,6 +6,8 @@
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
+STATE_SIGNS = (-1.0,)
+FLAG_SIGN = -1.0
 
 
 def force_and_rates(p, memory, point, s, rates):

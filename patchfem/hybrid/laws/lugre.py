@@ -8,6 +8,7 @@ from math import exp
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
+STATE_SIGNS = (-1.0,)
 MAX_RISE_SPEED = 6.0  # largest speed, relative to v_s, at which g exceeds mu_k by more than e^-36
 MIN_LIMIT = 1e-9  # smallest g relative to mu_s; the rate of z divides by it
 
