@@ -48,7 +48,7 @@ from .records import (
 )
 from .runs import COARSE, COARSE_STEP, ERROR_FACTOR, ERROR_FLOOR, run_case
 
-CHANGE_TOL = 1e-9  # change over a period, relative to the motion, that counts as none
+CHANGE_TOL = 1e-10  # change over half a period, relative to the motion, that counts as none
 MAX_STEPS = 1e5  # steps of the engine in the first periods of the search for a motion
 MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the first periods
 MAX_NEWTON_STEPS = 20  # Newton steps to a motion
@@ -94,18 +94,18 @@ FINE = Accuracy(1e-11, MIN_STEPS)
 ROUGH = Accuracy(COARSE * FINE.rtol, MIN_STEPS / COARSE_STEP)
 
 
-def estimate_errors(values, rough, changes) -> np.ndarray:
+def estimate_errors(values, rough, distances=0.0) -> np.ndarray:
     """Return the errors (..., k) of values of k motions from those of motions with larger steps.
 
     Parameters
     ----------
     values, rough : (..., k) array
         Values with FINE and with ROUGH steps.
-    changes : (k,) array
-        Changes of the motions over a period, relative to their size.
+    distances : (..., k) array
+        Changes of the values by the next Newton step of the motions.
     """
     error = ERROR_FACTOR * np.abs(values - rough)
-    return error + (ERROR_FLOOR * FINE.rtol + np.asarray(changes)) * np.abs(values)
+    return error + ERROR_FLOOR * FINE.rtol * np.abs(values) + distances
 
 
 class FreeMotion(NamedTuple):
@@ -114,7 +114,8 @@ class FreeMotion(NamedTuple):
     - amplitude: half the range of the output [m]
     - omega, rate: frequency [rad/s], and damping rate 2 zeta omega [1/s] or a multiple of the force
     - loss: work of friction per cycle [J]
-    - change: largest change of the state over a period, relative to its scale
+    - distance: largest part of the next Newton step, relative to the scale of each unknown; that of the rate is RATE_SCALE
+      omega
     - sticks: whether an interface with rigid friction rests for a part of the cycle
     - shooting: map of a period
     - state: state at its start
@@ -126,7 +127,7 @@ class FreeMotion(NamedTuple):
     omega: float
     rate: float
     loss: float
-    change: float
+    distance: float
     sticks: bool
     shooting: "FreeShooting"
     state: State
@@ -310,7 +311,7 @@ class FreeShooting(LoopShooting):
             change = self.measure_change(before)
             if change < CHANGE_TOL or best <= change < MAX_KINKED_CHANGE:
                 is_near = self._find_cosine(guess, before) > MIN_COSINES[self.motions.is_forced]
-                return self._describe(before, change) if is_near else None
+                return self._describe(before) if is_near else None
             if not np.isfinite(change):
                 return None
 
@@ -351,19 +352,21 @@ class FreeShooting(LoopShooting):
         b = second.y[: 2 * n] * unit
         return float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)))
 
-    def _describe(self, state: State, change: float) -> FreeMotion:
-        """Return the motion that starts with a state and changes it by a fraction of its scale over a period."""
+    def _describe(self, state: State) -> FreeMotion:
+        """Return the motion that starts with a state, from which the last half period was computed."""
         omega, rate = state.y[self.extra]
         n_friction = self.case.n_friction
         work = split_integrals(self.case, self.state.y)[:n_friction, 0]
-        stuck = self.record.faces[:n_friction, Window.STUCK]
+        stuck = self.record.faces[:n_friction, Window.STUCK].copy()
+        size = self.size
+        distance = self.find_multipliers(state)[1]
         rigid = [is_rigid(one.law.law) for one in self.motions.rig.interfaces[:n_friction]]
         return FreeMotion(
-            amplitude=self.size if self.is_cycle else self.amplitude,
+            amplitude=size if self.is_cycle else self.amplitude,
             omega=float(omega),
             rate=float(rate),
             loss=2 * float(work.sum()),
-            change=change,
+            distance=distance,
             sticks=bool((stuck[rigid] > MIN_STOP * self.period).any()),
             shooting=self,
             state=state,
@@ -572,6 +575,6 @@ def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
     rough = cycle and replace(motions, accuracy=ROUGH).solve(guess, cycle, is_cycle=True)
     if rough is None:
         raise NotConverged("a limit cycle was not found between two amplitudes that enclose it")
-    error = estimate_errors(cycle.amplitude, rough.amplitude, cycle.change)
+    error = estimate_errors(cycle.amplitude, rough.amplitude, cycle.distance * cycle.amplitude)
     is_stable = high.rate > 0 and cycle.find_multiplier() < MAX_STABLE_MULTIPLIER
     return LimitCycle(cycle.amplitude, float(error), cycle.omega, is_stable)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...hybrid.cases import UndrivenRig
-from ...hybrid.free_motions import ROUGH, FreeMotion, FreeMotions, estimate_errors
+from ...hybrid.free_motions import RATE_SCALE, ROUGH, FreeMotion, FreeMotions, estimate_errors
 from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 
@@ -105,19 +105,20 @@ def tabulate_motions(
     """
     values = np.full((4, len(motions)), np.nan)
     rough = values.copy()
-    changes = np.zeros(len(motions))
+    distances = np.zeros_like(values)
     for k, motion in enumerate(motions):
         if motion is None or motion.sticks:
             continue
         values[:, k] = _list_values(motion)
-        changes[k] = motion.change
+        scales = _list_values(motion._replace(rate=RATE_SCALE * motion.omega))
+        distances[:, k] = motion.distance * np.abs(scales)
         if has_errors:
             other = replace(motion.shooting.motions, accuracy=ROUGH).solve(motion.amplitude, motion)
             if other is not None:
                 rough[:, k] = _list_values(other)
     if not has_errors:
         return values, ROUND_OFF_ERROR * np.abs(values)
-    return values, estimate_errors(values, rough, changes)
+    return values, estimate_errors(values, rough, distances)
 
 
 def _list_values(motion: FreeMotion) -> np.ndarray:
