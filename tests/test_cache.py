@@ -215,7 +215,7 @@ def test_exact_cache_key_depends_on_kernels(tmp_path):
     own, after_core, *others = compute_keys()
     assert own == after_core == compiled.compute_kernel_key()
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
-    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 35
+    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 30
     assert len({own, *others}) == 1 + len(others)
     metadata = home / "numba-0.0.dist-info/METADATA"
     metadata.parent.mkdir()

@@ -104,7 +104,7 @@ def test_always_installed_numba_supports_inlining():
 def test_always_kernels_use_inlining_decorator():
     """No kernel module uses numba's `njit`, which would compile each function again inside every caller."""
     kernels = list(Path(jit.__file__).parents[1].rglob("*kernels.py"))
-    assert len(kernels) > 30
+    assert len(kernels) > 25
     own = re.compile(r"(?m)^(from numba import .*\bn?jit\b|@numba\b)")
     assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]
 

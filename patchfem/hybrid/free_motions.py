@@ -54,7 +54,7 @@ MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the fi
 MAX_NEWTON_STEPS = 20  # Newton steps to a motion
 # Largest ratio of the changes over a period after and before a correction at which the derivatives are updated
 MAX_BROYDEN_RATIO = 0.3
-MAX_DETOURS = 3  # of these, steps that are shortened, or that begin with new derivatives
+MAX_DETOURS = 3  # Newton steps that are shortened, and Newton steps with new derivatives
 # Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
 LONGEST_STEPS = np.array([0.3, 0.6])
 RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
@@ -256,7 +256,7 @@ class FreeShooting(LoopShooting):
         largest = np.abs(super().find_ranges()).max(axis=1)
         return np.column_stack([-largest, largest])
 
-    def start_from(self, motion: FreeMotion) -> None:
+    def begin_near(self, motion: FreeMotion) -> None:
         """Begin at a motion that is extrapolated from another one over the logarithm of the amplitude."""
         ratio = self.amplitude / motion.amplitude
         unknowns = motion.unknowns + motion.slope * np.log(ratio)
@@ -389,12 +389,24 @@ class FreeMotions:
     is_forced: bool = False
 
     def solve(self, amplitude: float, near: FreeMotion, *, is_cycle: bool = False):
-        """Return the `FreeMotion` at an amplitude [m] from a similar motion `near`, or None.
+        """Find a motion from a similar one.
 
-        With `is_cycle` it is the limit cycle near this amplitude.
+        Parameters
+        ----------
+        amplitude : float
+            Half the range of the output [m].
+        near : FreeMotion
+            Similar motion.
+        is_cycle : bool
+            Whether the limit cycle near this amplitude is to be found.
+
+        Returns
+        -------
+        FreeMotion or None
+            None without convergence.
         """
         shooting = FreeShooting(self, near.shooting.start, amplitude, is_cycle=is_cycle)
-        shooting.start_from(near)
+        shooting.begin_near(near)
         motion = shooting.solve()
         if motion is None or abs(motion.amplitude / near.amplitude - 1) < SAME_AMPLITUDE_TOL:
             return motion

@@ -117,20 +117,22 @@ def find_static_motions(
         raise PatchfemError(SPEED_MESSAGE)
     stiffness = rig.stiffness
 
-    def find_mode(slides, amplitude: float) -> tuple[float, np.ndarray, list[SteadyLoop]]:
-        """Return frequency, coordinates at an amplitude, and loops of the mode with the secants at slides (i,) [m]."""
-        loops = [
-            find_loop(one, u, rtol) if u > 0 else SteadyLoop(0.0, 0.0)
-            for u, one in zip(slides, rig.interfaces)
-        ]
-        secants = [loop.force / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]
-        omega, shape = modes.compute_stuck_mode(rows, np.array(secants), mode)
-        return omega, shape * (amplitude / abs(float(row @ shape))), loops
+    def find_motion(slides, amplitude: float) -> StaticMotion:
+        """Return the motion of the mode at an amplitude [m], with the secants of the loops at slides (i,) [m]."""
+        secants = stiffness.copy()
+        loss = 0.0
+        for k, (u, one) in enumerate(zip(slides, rig.interfaces)):
+            if u > 0:
+                loop = find_loop(one, u, rtol)
+                secants[k] = loop.force / u
+                loss += loop.area
+        omega, shape = modes.compute_stuck_mode(rows, secants, mode)
+        return _make_motion(modes, omega, shape * (amplitude / abs(float(row @ shape))), loss)
 
     # The slides of the mode must be those of its secants.
     motions = []
     for amplitude in amplitudes:
-        stuck = np.abs(rows @ find_mode(np.zeros(stiffness.size), amplitude)[1])
+        stuck = np.abs(rows @ find_motion(np.zeros(stiffness.size), amplitude).z)
         unit = np.maximum(stuck, 1e-300)
 
         def find_residual(x, amplitude=amplitude, unit=unit) -> np.ndarray:
@@ -145,13 +147,13 @@ def find_static_motions(
             unit : (i,) array
                 Slides of the stuck mode [m].
             """
-            return np.abs(rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
+            return np.abs(rows @ find_motion(np.abs(x) * unit, amplitude).z) / unit - x
 
         solution = root(find_residual, stuck / unit, tol=SLIDE_ROOT_TOL)
-        omega, z, loops = find_mode(np.abs(solution.x) * unit, amplitude)
-        if not (omega and (np.abs(solution.fun) <= SLIDE_TOL).all()):
-            omega = np.nan
-        motions.append(_make_motion(modes, omega, z, sum(loop.area for loop in loops)))
+        motion = find_motion(np.abs(solution.x) * unit, amplitude)
+        if not (motion.omega and (np.abs(solution.fun) <= SLIDE_TOL).all()):
+            motion = motion._replace(omega=np.nan, zeta=np.nan)
+        motions.append(motion)
     return motions
 
 
@@ -187,4 +189,5 @@ def _make_motion(modes, omega: float, z, loss: float) -> StaticMotion:
     """
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
     work = 2 * np.pi * omega**2 * modes.mass * float(z @ z)
-    return StaticMotion(omega, (loss + viscous) / work, z, float(loss))
+    zeta = (loss + viscous) / work if work else np.nan
+    return StaticMotion(omega, zeta, z, float(loss))

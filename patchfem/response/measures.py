@@ -27,6 +27,7 @@ STEP_FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
 MAX_RESTING_SLIDE_RANGE = 1e-15
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_CURVATURE_RATIO = 4.0
+PLATEAU_TOL = 1e-12  # Difference of samples that count as equal, relative to the range of all.
 
 
 def energy_balance(energies: Values):
@@ -248,8 +249,9 @@ def interpolate_peak(samples) -> tuple[float, float]:
     samples : (k,)
         Equally spaced samples.
     """
-    largest = int(np.argmax(samples))
-    value = float(samples[largest])
+    # A constant stretch, as of the slip of a contact that sticks, begins at its first sample, whatever its round-off.
+    value = float(np.max(samples))
+    largest = int(np.argmax(samples >= value - PLATEAU_TOL * np.ptp(samples)))
     last = len(samples) - 1
     if last < 2:
         return value, 0.0

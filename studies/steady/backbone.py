@@ -90,16 +90,16 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     amplitude = size * np.asarray(shares)
     rig = make_undriven_rig(model, choose_numerics(model), patch)
     motions = FreeMotions(rig, 0).find(amplitude)
-    pairs = [
-        (np.nan, np.nan) if one is None else (one.omega / (2 * np.pi), one.zeta) for one in motions
-    ]
-    free = tuple(np.array(pairs).T)
+    free = np.full((2, amplitude.size), np.nan)
+    for k, motion in enumerate(motions):
+        if motion is not None:
+            free[:, k] = motion.omega / (2 * np.pi), motion.zeta
     w = modes.omega[0]
     zeta = modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)
     damping = zeta * w / omega + area / (2 * np.pi * modes.mass * omega**2 * amplitude**2)
-    return Row(name, amplitude, (omega / (2 * np.pi), damping), free)
+    return Row(name, amplitude, (omega / (2 * np.pi), damping), tuple(free))
 
 
 def main(names=tuple(CASES), path: Path | None = FOLDER / "backbone.svg", **how) -> list:

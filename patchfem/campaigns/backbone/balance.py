@@ -127,9 +127,21 @@ def _list_values(motion: FreeMotion) -> np.ndarray:
 
 
 def tabulate_free_motions(rig: UndrivenRig, joint: JointMode, amplitudes) -> np.ndarray:
-    """Return frequency [Hz], damping ratio and loss [J] (3, k) of a mode at amplitudes (k,) [m] of the output.
+    """Tabulate the free motions of a mode without their errors.
 
-    `rig` has the laws of the interfaces on one mesh, and `joint` is the mode. Without a motion they are NaN.
+    Parameters
+    ----------
+    rig : UndrivenRig
+        Laws of the interfaces on one mesh.
+    joint : JointMode
+        The mode and its contact.
+    amplitudes : (k,) array
+        Amplitudes of the output [m].
+
+    Returns
+    -------
+    (3, k) array
+        Frequency [Hz], damping ratio and loss [J]; NaN without a motion.
     """
     motions = FreeMotions(rig, joint.mode).find(amplitudes)
     return tabulate_motions(motions, has_errors=False)[0][:3]

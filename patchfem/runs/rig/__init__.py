@@ -8,7 +8,7 @@ record for each engine with its comparison runs. `scene.rules.methods.ENGINE_SUP
 and `runs.memory` the memory of its histories.
 
 Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, and the folder `steady`), which prepares the
-integration in `dynamics` or `hybrid` and contains the measures that the engine computes itself. `evaluation` converts a
+integration in `hybrid` or `points` and contains the measures that the engine computes itself. `evaluation` converts a
 run to a Solution, and `levels` continues a run from drive level to drive level. `joints` makes the laws and contact
 models of each engine from the friction of a patch. `numerics` has the numerical settings. `costs` has the predicted
 cost, on which the choice of an engine and a refusal are based. `bond_lists` has the length of a bond list, and the
