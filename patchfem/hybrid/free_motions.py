@@ -16,13 +16,15 @@ The unknowns are the state at phase 0, the frequency, and the damping or the for
 fundamental of the output vanishes and rises, far from the reversals of the output.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ..core import ModalBasis, NotConverged
+from ..core import ModalBasis, NotConverged, PatchfemError
 from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
 from .drives import make_tones
 from .laws import is_rigid, mirror_state
@@ -34,6 +36,7 @@ from .periodic import (
     copy_state,
 )
 from .periodic_curves import N_FIRST, LoopShooting
+from .quasi_static import find_static_motions
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
@@ -66,8 +69,10 @@ MAX_FOLLOWED = 20  # attempts to reach an amplitude from another one, with halve
 MIN_FOLLOWED_STEP = 0.01  # shortest of these steps, as a logarithm of the amplitude
 # Amplitudes at which the mode with sticking contacts and that without them are tried as starts, relative to that of the
 # first motion
-STUCK_RATIOS = (1.0, 1e-2, 1e-4, 1e-6)
-FREE_RATIOS = (1.0, 3.0, 10.0)
+STUCK_RATIOS = (1e-2, 1e-4, 1e-6)
+FREE_RATIOS = (3.0, 10.0)
+STATIC_RATIOS = (1.0, 0.5, 2.0)  # the same for quasi-static motions
+STATIC_RTOL = 1e-6  # step tolerance of the friction loops of these motions
 N_SAMPLES = 64  # samples of a period for the shape of its motion
 MIN_STOP = 1e-9  # shortest rest of rigid friction that is seen, in periods
 
@@ -76,6 +81,9 @@ MIN_STOP = 1e-9  # shortest rest of rigid friction that is seen, in periods
 MIN_CYCLE_RATIO = 1e-6
 MAX_CYCLE_RATIO = 4.0
 N_AMPLITUDES = 48
+AMPLITUDE_TOL = 1e-12  # relative error of the amplitude of a limit cycle at which its search ends
+SLOPE_RATIO = 1.001  # ratio of the amplitudes between which the slope of the damping is taken
+NO_CYCLE_MESSAGE = "a limit cycle was not found between two amplitudes that enclose it"
 NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
@@ -170,33 +178,43 @@ class FreeMotion(NamedTuple):
         return float(np.abs(np.delete(multipliers, shift)).max(initial=0.0)) ** 2
 
 
+class LinearMotion(NamedTuple):
+    """Motion of a linear mode, or of one with the secant stiffness of friction loops, from which a search begins.
+
+    - omega: frequency [rad/s]
+    - shape: (n,) modal coordinates of any size
+    - zeta: damping ratio
+    """
+
+    omega: float
+    shape: np.ndarray
+    zeta: float = 0.0
+
+
 class FreeShooting(LoopShooting):
     """Map of half a period of a free motion, whose state is extended by two unknowns: frequency and rate.
 
     The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. The map adds to the
     frequency what the output misses of its phase, and to the rate what it misses of its amplitude, so that a motion of
-    the amplitude is a fixed point. For a limit cycle it sets the rate to 0 instead.
+    the amplitude is a fixed point.
 
     Parameters
     ----------
     motions : FreeMotions
         Rig, accuracy and excitation.
-    start : (float, (n,) array)
-        Frequency [rad/s] and shape of a linear mode, from which the first motion begins.
+    start : LinearMotion
+        Motion from which the search begins.
     amplitude : float
-        Half the range of the output [m]; for a limit cycle about that.
-    is_cycle : bool
-        Whether the motion is a limit cycle, whose amplitude is unknown.
+        Half the range of the output [m].
     """
 
-    def __init__(self, motions: "FreeMotions", start, amplitude: float, *, is_cycle: bool = False):
+    def __init__(self, motions: "FreeMotions", start, amplitude: float):
         self.motions = motions
         self.start = start
         self.amplitude = amplitude
-        self.is_cycle = is_cycle
         rig = motions.rig
         modes = rig.modes
-        omega, shape = start
+        omega, shape, zeta = start
         reach = float(modes.output @ shape)
         sizes = (amplitude, amplitude * omega)
         rtol, n_steps = motions.accuracy
@@ -213,7 +231,7 @@ class FreeShooting(LoopShooting):
         place = y.size - N_INTEGRALS - N_FACE_INTEGRALS * len(rig.interfaces)
         self.extra = np.array([place, place + 1])
         scales = np.insert(arrays.scales, [place, place], [omega, RATE_SCALE * omega])
-        y = np.insert(y, [place, place], [omega, 0.0])
+        y = np.insert(y, [place, place], [omega, 2 * zeta * omega])
         y[modes.omega.size : 2 * modes.omega.size] = shape * sizes[1] / reach
         arrays = arrays._replace(scales=scales)
         empty = np.zeros(0)
@@ -233,7 +251,7 @@ class FreeShooting(LoopShooting):
         self.size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
         cosine = 2 * omega / np.pi * end.y[Tail.COSINE]
         gain = RATE_SCALE * omega * (self.size / self.amplitude - 1)
-        end.y[self.extra] += omega * cosine / self.amplitude, -rate if self.is_cycle else gain
+        end.y[self.extra] += omega * cosine / self.amplitude, gain
         return end
 
     def _set_excitation(self, omega: float, rate: float) -> None:
@@ -358,11 +376,10 @@ class FreeShooting(LoopShooting):
         n_friction = self.case.n_friction
         work = split_integrals(self.case, self.state.y)[:n_friction, 0]
         stuck = self.record.faces[:n_friction, Window.STUCK].copy()
-        size = self.size
         distance = self.find_multipliers(state)[1]
         rigid = [is_rigid(one.law.law) for one in self.motions.rig.interfaces[:n_friction]]
         return FreeMotion(
-            amplitude=size if self.is_cycle else self.amplitude,
+            amplitude=self.amplitude,
             omega=float(omega),
             rate=float(rate),
             loss=2 * float(work.sum()),
@@ -388,7 +405,7 @@ class FreeMotions:
     accuracy: Accuracy = FINE
     is_forced: bool = False
 
-    def solve(self, amplitude: float, near: FreeMotion, *, is_cycle: bool = False):
+    def solve(self, amplitude: float, near: FreeMotion):
         """Find a motion from a similar one.
 
         Parameters
@@ -397,15 +414,13 @@ class FreeMotions:
             Half the range of the output [m].
         near : FreeMotion
             Similar motion.
-        is_cycle : bool
-            Whether the limit cycle near this amplitude is to be found.
 
         Returns
         -------
         FreeMotion or None
             None without convergence.
         """
-        shooting = FreeShooting(self, near.shooting.start, amplitude, is_cycle=is_cycle)
+        shooting = FreeShooting(self, near.shooting.start, amplitude)
         shooting.begin_near(near)
         motion = shooting.solve()
         if motion is None or abs(motion.amplitude / near.amplitude - 1) < SAME_AMPLITUDE_TOL:
@@ -436,7 +451,8 @@ class FreeMotions:
         """Find the motions at increasing amplitudes (k,) [m] of the output.
 
         They are followed upwards from the mode with sticking contacts, then downwards from the mode without the contact.
-        Each pass ends where no motion is found, or where rigid friction rests for a part of the cycle.
+        Where this fails, the search begins at a quasi-static motion. A pass ends where rigid friction rests for a part of
+        the cycle.
 
         Parameters
         ----------
@@ -461,27 +477,46 @@ class FreeMotions:
         free_mode = (modes.omega[self.mode], np.eye(modes.omega.size)[self.mode])
         upwards = range(len(amplitudes))
         passes = ((upwards, stuck_mode, STUCK_RATIOS), (upwards[::-1], free_mode, FREE_RATIOS))
-        for order, (omega, shape), ratios in passes:
+        for order, mode, ratios in passes:
             near = None
+            linear = [(ratio, LinearMotion(*mode)) for ratio in (1.0, *ratios)]
             for k in order:
                 if out[k] is None and near is not None:
                     out[k] = self.follow(amplitudes[k], near)
-                elif out[k] is None and omega and modes.output @ shape:
-                    out[k] = self._follow_linear_mode(amplitudes[k], (omega, shape), ratios)
+                if out[k] is None:
+                    static = self._list_static_motions(amplitudes[k])
+                    starts = chain(linear[:1], static, linear[1:])
+                    out[k] = self._follow_linear_motion(amplitudes[k], starts)
                 near = out[k]
-                if near is None or near.sticks:
+                linear = []
+                if near is not None and near.sticks:
                     break
         return out
 
-    def _follow_linear_mode(self, amplitude: float, start, ratios) -> FreeMotion | None:
-        """Return the motion at an amplitude [m] that is followed from a linear mode `start`, or None.
+    def _list_static_motions(self, amplitude: float) -> Iterator[tuple[float, LinearMotion]]:
+        """Yield the quasi-static motions at STATIC_RATIOS of an amplitude [m], as starts."""
+        amplitudes = amplitude * np.array(STATIC_RATIOS)
+        row = self.rig.modes.output
+        if not row[self.mode] or any(is_rigid(one.law.law) for one in self.rig.interfaces):
+            return
+        try:
+            found = find_static_motions(self.rig, self.mode, amplitudes, row, STATIC_RTOL)
+        except (NotConverged, PatchfemError):
+            return
+        for ratio, motion in zip(STATIC_RATIOS, found):
+            if np.isfinite(motion.omega):
+                yield ratio, LinearMotion(motion.omega, motion.z, motion.zeta)
 
-        The mode is tried at amplitudes of which `ratios` are those to the amplitude.
+    def _follow_linear_motion(self, amplitude: float, starts) -> FreeMotion | None:
+        """Return the motion at an amplitude [m] that is followed from the first of `starts` that leads to one, or None.
+
+        A start is the ratio of its amplitude to this one, and a `LinearMotion`.
         """
-        for ratio in ratios:
-            motion = FreeShooting(self, start, ratio * amplitude).solve()
-            if motion is not None:
-                return self.follow(amplitude, motion)
+        for ratio, linear in starts:
+            if linear.omega and self.rig.modes.output @ linear.shape:
+                motion = FreeShooting(self, linear, ratio * amplitude).solve()
+                if motion is not None:
+                    return self.follow(amplitude, motion)
         return None
 
 
@@ -577,16 +612,36 @@ def find_limit_cycles(rig: UndrivenRig, limit: float) -> tuple[list[LimitCycle],
 def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
     """Return the limit cycle between two free motions whose dampings have different signs.
 
-    It is stable if the damping rises over the amplitude and no other perturbation of the motion grows.
+    It is the free motion without damping. It is stable if the damping rises over the amplitude and no other perturbation
+    of the motion grows.
     """
-    share = low.rate / (low.rate - high.rate)
-    guess = low.amplitude + share * (high.amplitude - low.amplitude)
-    near = min((low, high), key=lambda motion: abs(motion.amplitude - guess))
-    motions = near.shooting.motions
-    cycle = motions.solve(guess, near, is_cycle=True)
-    rough = cycle and replace(motions, accuracy=ROUGH).solve(guess, cycle, is_cycle=True)
-    if rough is None:
-        raise NotConverged("a limit cycle was not found between two amplitudes that enclose it")
-    error = estimate_errors(cycle.amplitude, rough.amplitude, cycle.distance * cycle.amplitude)
+    known = [low, high]
+
+    def find_rate(level: float) -> float:
+        """Return the damping rate [1/s] at the logarithm of an amplitude, followed from the nearest known motion."""
+        amplitude = np.exp(level)
+        near = min(known, key=lambda motion: abs(np.log(motion.amplitude) - level))
+        motion = near
+        if abs(np.log(near.amplitude) - level) > AMPLITUDE_TOL:
+            motion = near.shooting.motions.follow(amplitude, near)
+        if motion is None:
+            raise NotConverged(NO_CYCLE_MESSAGE)
+        known.append(motion)
+        return motion.rate
+
+    ends = np.log([low.amplitude, high.amplitude])
+    brentq(find_rate, *ends, xtol=AMPLITUDE_TOL)
+    cycle = min(known, key=lambda motion: abs(motion.rate))
+
+    # An error of the rate moves its root by the ratio to the slope over the amplitude.
+    motions = cycle.shooting.motions
+    rough = replace(motions, accuracy=ROUGH).solve(cycle.amplitude, cycle)
+    above = motions.solve(SLOPE_RATIO * cycle.amplitude, cycle)
+    if rough is None or above is None:
+        raise NotConverged(NO_CYCLE_MESSAGE)
+    slope = (above.rate - cycle.rate) / (above.amplitude - cycle.amplitude)
+    rate_error = abs(cycle.rate) + RATE_SCALE * cycle.omega * cycle.distance
+    rate_error += estimate_errors(cycle.rate, rough.rate)
+    error = rate_error / abs(slope) + ERROR_FLOOR * FINE.rtol * cycle.amplitude
     is_stable = high.rate > 0 and cycle.find_multiplier() < MAX_STABLE_MULTIPLIER
     return LimitCycle(cycle.amplitude, float(error), cycle.omega, is_stable)
