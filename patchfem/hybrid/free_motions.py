@@ -615,23 +615,19 @@ def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
     It is the free motion without damping. It is stable if the damping rises over the amplitude and no other perturbation
     of the motion grows.
     """
-    known = [low, high]
+    known = {float(np.log(motion.amplitude)): motion for motion in (low, high)}
 
     def find_rate(level: float) -> float:
         """Return the damping rate [1/s] at the logarithm of an amplitude, followed from the nearest known motion."""
-        amplitude = np.exp(level)
-        near = min(known, key=lambda motion: abs(np.log(motion.amplitude) - level))
-        motion = near
-        if abs(np.log(near.amplitude) - level) > AMPLITUDE_TOL:
-            motion = near.shooting.motions.follow(amplitude, near)
-        if motion is None:
-            raise NotConverged(NO_CYCLE_MESSAGE)
-        known.append(motion)
-        return motion.rate
+        if level not in known:
+            near = known[min(known, key=lambda other: abs(other - level))]
+            motion = near.shooting.motions.follow(float(np.exp(level)), near)
+            if motion is None:
+                raise NotConverged(NO_CYCLE_MESSAGE)
+            known[level] = motion
+        return known[level].rate
 
-    ends = np.log([low.amplitude, high.amplitude])
-    brentq(find_rate, *ends, xtol=AMPLITUDE_TOL)
-    cycle = min(known, key=lambda motion: abs(motion.rate))
+    cycle = known[brentq(find_rate, *known, xtol=AMPLITUDE_TOL)]
 
     # An error of the rate moves its root by the ratio to the slope over the amplitude.
     motions = cycle.shooting.motions

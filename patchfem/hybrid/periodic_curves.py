@@ -234,7 +234,10 @@ class PeriodEquations:
         return residual
 
     def differentiate(self, x, parameter: float) -> PathEquations:
-        """Return the derivatives of the change over a period, and the `PeriodicMotion` as their details."""
+        """Return the derivatives of the change over a period, and the `PeriodicMotion` as their details.
+
+        They are NaN far from any motion, where that of the next period is not finite.
+        """
         shooting, before = self._advance(x, parameter)
         linear, change = shooting.differentiate(before)
         columns = linear.columns
@@ -252,7 +255,8 @@ class PeriodEquations:
 
         # The reversal points m follow from the unknowns: (M - 1) dm + ... = -change.
         is_kept = np.append(is_motion, True)
-        own = np.linalg.pinv(matrix[~is_motion][:, ~is_kept])
+        own = matrix[~is_motion][:, ~is_kept]
+        own = np.linalg.pinv(own) if np.isfinite(own).all() else np.nan * own.T
         gain = -matrix[is_motion][:, ~is_kept] @ own
         reduced = matrix[is_motion][:, is_kept] + gain @ matrix[~is_motion][:, is_kept]
 
