@@ -118,7 +118,11 @@ def draw_backbone(dataset, ax=None):
 
 
 def _make_quantities(backbone: Backbone) -> Quantities:
-    """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
+    """Return the key numbers of a backbone by name.
+
+    They are the natural frequencies, frequency, damping and force at both ends of the recommended curve, its largest
+    damping, the exponents of its damping, and the amplitude above which the motion grows, each if it exists.
+    """
     frequencies = backbone.frequencies
     out = {}
     curve = backbone.best
@@ -156,7 +160,10 @@ def _make_point_quantity(curve: Curve, name: str, k: int) -> Quantity:
 
 
 def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
-    """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
+    """Return the sentences of the verdict.
+
+    They state the ends of the recommended curve, the natural frequencies, the largest damping, and which curve to use.
+    """
 
     def show(name: str) -> str:
         """Return a quantity as text with its error, such as "143.21 ± 0.13 Hz"."""
@@ -215,11 +222,12 @@ def _exceeds(quantity: Quantity, other: Quantity) -> bool:
 
 
 def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Variables:
-    """Return frequency, damping ratio and force of each method over the amplitude, and the band of the recommended one.
+    """Return frequency, damping ratio and force of each method over the amplitude as variables.
 
-    Names begin with that of the method, such as balance_frequency. A single backbone has the band also as
-    band_frequency_low and so on. Several backbones, one for each value of the key `axis`, have the recommended curves
-    alone, on the union of their amplitudes; NaN stands where a backbone has no motion.
+    Names begin with that of the method, such as balance_frequency, and end in _low and _high for the interval of the
+    recommended method. A single backbone has this interval also as band_frequency_low and so on. Several backbones, one
+    for each value of the key `axis`, have the recommended curves alone, on the union of their amplitudes; NaN stands where
+    a backbone has no motion.
     """
     data = {}
     if axis is not None:
@@ -257,7 +265,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
 
 
 def _find_unit(name: str) -> str:
-    """Return the SI unit of a column, such as "force_frequency" or "damping_low"."""
+    """Return the SI unit of a column of a curve, whose name may end in "_low", "_high" or "_error"."""
     return BACKBONE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 

@@ -145,7 +145,7 @@ def draw_cells(axes, drawn: DrawnPieces, stress: np.ndarray, **style):
     cells = PolyCollection([], antialiaseds=False, rasterized=True, **style)
 
     def show(index: int) -> None:
-        """Change positions and colours to those of a frame."""
+        """Move the cells to their positions in a frame, and colour them by the stress in it."""
         cells.set_verts(drawn.places[index][drawn.cells[drawn.is_inside]])
         cells.set_array(stress[index, drawn.is_inside])
         axes.set_title(drawn.captions[index])
@@ -206,7 +206,7 @@ def draw_pieces(
     panels[0].figure.colorbar(cells, ax=panels, extend=extend, label=label, shrink=0.7)
 
     def show(index: int) -> None:
-        """Change the figure to a frame."""
+        """Change title, positions and colours of the figure to those of a frame."""
         figure.suptitle(f"{title}, {frames.times[numbers[index]]:.6g} s")
         for change in changes:
             change(index)

@@ -154,7 +154,10 @@ def split_error(measure: Measure, name: str) -> Values:
 
 
 def find_axis(measure: Measure, name: str) -> str:
-    """Return the axis with the largest share of the error of a measure, such as "mesh"; "own" if none is known."""
+    """Return the discretization that contributes most to the error of a measure, such as "mesh", "steps" or "modes".
+
+    It is "own" if no contribution is known.
+    """
     parts = split_error(measure, name)
     axis = max(parts, key=parts.get, default="own")
     return axis if parts.get(axis, 0.0) > 0 else "own"
@@ -282,7 +285,7 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
 
 
 def is_main(name: str) -> bool:
-    """Return whether a run is refined until this measure meets the tolerance; warnings are about all measures."""
+    """Return whether a measure is one of those for whose sake a run is refined; warnings are about all measures."""
     row = PATCH_TABLE.get(name) or rows.MOTION_TABLE.get(name)
     return row is not None and row.has("main")
 
@@ -324,7 +327,7 @@ def _refine_mesh(patch_model):
 
 
 def _can_refine(patch_model) -> bool:
-    """Return whether the mesh of a patch follows from the tolerance and belongs to this run alone."""
+    """Return whether the program chooses the mesh of a patch, and for this run alone: not the scene, and no sweep."""
     return (
         patch_model is not None
         and patch_model.mesh.is_automatic

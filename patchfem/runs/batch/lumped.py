@@ -165,7 +165,7 @@ def refusal_reason(model: Model) -> str:
 
 
 def group_key(model: Model) -> tuple[int, str]:
-    """Return a hashable key; models with equal keys are computed together."""
+    """Return a key that is equal for models that one call of the kernel computes: number of cycles, and friction law."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
@@ -199,7 +199,10 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
 
 
 def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
-    """Return models with one law and number of cycles as cases, with their scales."""
+    """Return the numbers of models with the same law and number of cycles as arrays over the models.
+
+    The second record has their tolerances and the reference quantities of their errors.
+    """
     columns = collect_columns(models, _list_numbers)
     first, second = len(Number), len(Number) + N_NUMBERS
     memory = columns[second : -1 - len(Scales._fields)]
@@ -211,7 +214,11 @@ def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
 
 
 def _list_numbers(model: Model) -> tuple:
-    """Return the parameters, law, memory, reference stiffness and scales of a model."""
+    """Return the numbers of a model as a flat tuple, which `collect_cases` takes apart again.
+
+    They are the parameters of the rig (`Number`), those of the friction law, its memory at rest, the stiffness of the
+    first mode at the contact, and the fields of `Scales`.
+    """
     rig, friction = model.rig, model.friction
     load = model.point.load
     # Bonds of a batch do not grow.
@@ -244,7 +251,7 @@ def _list_numbers(model: Model) -> tuple:
 
 
 def _may_create_energy(model: Model):
-    """Return whether the force of the law may have the direction of the motion."""
+    """Return whether the friction force may act along the motion, instead of against it, and so create energy."""
     friction = model.friction
     if friction.law == "lugre":
         kinetic = friction.static if friction.kinetic is None else friction.kinetic
@@ -339,7 +346,7 @@ def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.n
 
 
 def _select(record, rows):
-    """Return some of the rows of all arrays of a record or dict."""
+    """Return the given rows of all arrays of a record or dict, which may contain dicts of arrays."""
     if isinstance(record, dict):
         return {name: value[rows] for name, value in record.items()}
     return type(record)(

@@ -163,7 +163,7 @@ def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
     """
 
     def make() -> CondensedPair:
-        """Condense the pieces and delete their factors."""
+        """Condense the pieces to their interface, and delete factors of stiffness matrices that are not needed again."""
         pair = condense(patch_model, grid, upper_grid)
         for piece in (pair.piece, pair.upper):
             if not piece.round_off_error:

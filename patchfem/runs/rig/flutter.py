@@ -55,10 +55,10 @@ class Flutter(NamedTuple):
 
 
 def compute_flutter_amplitude(run) -> Flutter:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig, above which a motion grows.
+    """Compute the amplitude above which friction does not limit a mode with negative damping, so that a motion grows.
 
-    `run` is the `rig.CoupledRun` of the rig, whose model has a mode of negative damping. Without an unstable cycle the
-    measure has no value, but the reason.
+    It is the amplitude of the largest unstable limit cycle. `run` is the `rig.CoupledRun` of the rig. Without an unstable
+    cycle the measure has a reason instead of a value.
     """
     model = run.model
     unit = MOTION_TABLE[FLUTTER_MEASURE].unit
@@ -124,9 +124,9 @@ class LimitCycles(NamedTuple):
 def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface.
 
-    A law of rigid friction is a relay, and harmonic balance finds the limit cycles of all other laws. If none can be
-    computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and `patch` is the pressed patch of
-    the interface, or None for an interface without one.
+    A law of rigid friction is a relay, whose limit cycles have equations of their own; those of all other laws follow from
+    harmonic balance. If none can be computed, `LimitCycles.reason` says why. `numerics` are the settings of the run, and
+    `patch` is the pressed patch of the interface, or None for an interface without one.
     """
     rig = model.rig
     law = model.friction

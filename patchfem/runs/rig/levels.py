@@ -200,7 +200,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         return run, Level(level, evaluator.is_stuck(run), values, errors)
 
     def run_level(number: int, level: float) -> Level:
-        """Run a level from the final state of level `number`, or from rest if it is -1."""
+        """Run the drive at an amplitude `level` [m s-2] from the final state of level `number`, or from rest if it is -1."""
         return solve(level, runs[number] if number >= 0 else None)[1]
 
     # Each level goes on from the end of the one before; a run that ends early is the last one.
@@ -224,7 +224,7 @@ def _report_fraction(progress, runs, n_levels: int, fraction: float) -> None:
 
 
 def join_runs(runs, duration: float):
-    """Join the runs of successive drive levels to a single run.
+    """Join the runs of successive drive levels, each of `duration` [s], to a single run with histories over all of them.
 
     The window and the friction loop are those of the last level.
     """

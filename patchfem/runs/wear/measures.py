@@ -316,9 +316,10 @@ def _warn_of_friction_table(model, evolved) -> list[str]:
 
 
 def _relative_slip_change(moment, motion: Measures) -> float:
-    """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
+    """Return the relative difference of the slip amplitude in the last jump of the wear and in the final run.
 
-    The final run, on the worn patch, may have used smaller time steps.
+    `moment` is the last WearMoment, and `motion` has the measures of the final run, on the worn patch, which may have used
+    smaller time steps.
     """
     wear_amplitude = moment.values.get("slip_amplitude")
     final_amplitude = motion.get("slip_amplitude")
