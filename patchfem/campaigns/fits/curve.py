@@ -79,7 +79,7 @@ class MeasuredCurve(NamedTuple):
     method: str
 
     def scale_assumed_errors(self, curve, n_values: int) -> "MeasuredCurve":
-        """Return the measured curve with assumed errors equal to the scatter around a fitted curve (2, k).
+        """Return the measured curve with its missing errors replaced by the scatter around a fitted curve (2, k).
 
         The `n_values` fitted values take up as many degrees of freedom, half of them of each quantity.
         """

@@ -20,7 +20,7 @@ STEADY_METHOD = "accuracy.method=harmonic"
 
 
 class ConditionModels(FreeKeys):
-    """Free keys of a rig under sinusoidal base motion at the measured conditions.
+    """Free keys of a rig, and its models under the sines of the base at which the responses were measured.
 
     The rows were measured in steady state. If the scene does not set a method, the steady-state method 'harmonic' is
     therefore used where it supports the scene, and `notes` reports this.
