@@ -70,7 +70,10 @@ def compute_answer(
 
 
 def make_answer(backbone: Backbone, source: Source) -> Answer:
-    """Return the answer of one backbone of a mode of the scene `source`."""
+    """Return the answer of one backbone: frequency, damping and force of a mode against its amplitude.
+
+    `source` is the scene of the mode.
+    """
     measures = _make_quantities(backbone)
     return Answer(
         kind="backbone",
@@ -85,7 +88,7 @@ def make_answer(backbone: Backbone, source: Source) -> Answer:
 
 
 def _make_sentence(text: str) -> str:
-    """Return a clause as a sentence."""
+    """Return a clause with a capital at its start and a full stop."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
@@ -233,6 +236,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
     all_bands = [backbone.band for backbone in backbones]
+    # Each method has its own amplitudes. Of several backbones only the recommended curves are shown.
     for method in CURVE_METHODS:
         bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
@@ -321,7 +325,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
 
 
 def _list_notes(cases: BackboneCases) -> list[str]:
-    """Return the notes of all backbones, those that they do not share with the value of the key."""
+    """Return the notes of all backbones; a note that not all of them have begins with the value of the key."""
     axis = cases.axis
     notes_by_case = [case_backbone.notes for case_backbone in cases.backbones]
     shared = [note for note in notes_by_case[0] if all(note in notes for notes in notes_by_case)]
@@ -344,6 +348,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     if first.best is None or last.best is None:
         missing = axis.texts[0] if first.best is None else axis.texts[-1]
         return (f"No method found frequency and damping for {axis.key} = {missing}.",), {}
+    # Indices of the amplitudes that both curves have.
     here, there = match_amplitudes(first.best, last.best)
     if not here.size:
         return (f"{subject}: the curves have no common amplitude.",), {}
@@ -358,6 +363,8 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     if point is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
+
+    # The changes at this amplitude as quantities, each with the sum of both errors.
     amplitude = start.amplitude[point]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():

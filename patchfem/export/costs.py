@@ -45,12 +45,12 @@ SCENE_JUDGEMENT_WORDS = {
 
 
 class Row(NamedTuple):
-    """A run of a curve of cost, and its least accurate measure.
+    """A run whose cost and accuracy are compared with those of other runs, and its least accurate measure.
 
-    - knob: what varies along the curve: TOLERANCE_SETTING, or the name of a numerical setting.
+    - knob: what varies among these runs: TOLERANCE_SETTING, or the name of a numerical setting.
     - run: the run.
-    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
-      curve do not count.
+    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any of these
+      runs do not count.
     """
 
     knob: str

@@ -117,6 +117,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     scene : Scene
         Scene before the fit.
     """
+    # Sentence on the residual, details, scores and arrays of this kind of fit.
     parts = _DESCRIBE_FUNCTIONS[type(fit)](fit)
     details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
     if isinstance(fit, FittedCoefficient):

@@ -74,6 +74,7 @@ def magnify_pieces(
         Factor of the motion; by default one that makes it visible.
     """
     lower, upper, line = (frames.blocks[name] for name in ("lower", "upper", "interface"))
+    # Displacements in the chosen frames. The slide of the holder is drawn with a factor of its own.
     low_motion, motion, face_motion = (
         block.point_data["displacement"][numbers, :, :2].astype(float)
         for block in (lower, upper, line)
@@ -285,6 +286,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
         )
     if out.suffix == ".mp4":
         rcParams["animation.ffmpeg_path"] = _find_ffmpeg(out)
+    # `show` draws the frame with a given number in the figure.
     figure, show = draw_pieces(frames, numbers, title, magnify)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # so that the panels stay at their places

@@ -25,7 +25,7 @@ RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcd
 
 
 def make_answer(result: Result) -> Answer:
-    """Return the answer of a run."""
+    """Return the answer of a run: its measures, verdict, arrays and warnings, from its result."""
     run_plan = result.plan
     source = run_plan.model.source
     measures = make_quantities(result.measures)
