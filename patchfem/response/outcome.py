@@ -141,7 +141,7 @@ def judge_outcome(
 
 
 def _count_window_cycles(solution, drive) -> int:
-    """Return the number of cycles in the window of a run."""
+    """Return the number of drive cycles in the window of a run, the last part from which its measures follow."""
     time = solution.window.time
     return max(1, round((time[-1] - time[0]) / drive.period))
 

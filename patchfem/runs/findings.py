@@ -142,7 +142,10 @@ def _format_error(measure) -> str:
 
 
 def _find_static(missed: Missed) -> list[Finding]:
-    """Return the findings on the static measures of one interface, with the advice to split its trace."""
+    """Return the findings on the static measures of one interface: their advice, and that to split its profile.
+
+    The waves of a profile that the mesh does not resolve can be represented by a layer of asperities instead.
+    """
     from .patch import trace_split
 
     (face,) = missed.faces

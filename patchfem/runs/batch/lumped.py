@@ -107,7 +107,10 @@ class Refined(NamedTuple):
 
 
 def refusal_reason(model: Model) -> str:
-    """Return why a model is not one mode with one point under a sine that steps can follow, or ""."""
+    """Return why the batch kernel cannot compute a model, or "" if it can.
+
+    The kernel steps one mode with one contact point under a sine, and a constant load.
+    """
     rig = model.rig
     if rows.SINGLE_RUN_ROWS:
         return f"the measure {rows.SINGLE_RUN_ROWS[0].name} is computed only by single runs"
@@ -528,7 +531,7 @@ def needs_single_run(
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
-    """Store the warnings and notes that follow from the models."""
+    """Store the warnings and notes that follow from the models alone in `results`, by case."""
     creeps = law_has_trait(models[0].friction.law, "creeps")
     for case, model in enumerate(models):
         if warnings := [*model.source.remarks, *model.rig.structure.notes]:

@@ -203,7 +203,7 @@ def uses_parallel_elements(model) -> bool:
 
 
 def nodal_element_limit(model, patch):
-    """Return the tractions (m,) [Pa] at which the nodes slip, if parallel elements compute the slip.
+    """Return the tractions (m,) [Pa] at which the nodes of a pressed patch slip, if parallel elements compute the slip.
 
     The result is None for other methods.
     """

@@ -163,7 +163,7 @@ def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
     """
 
     def make() -> CondensedPair:
-        """Condense the pieces to their interface, and delete factors of stiffness matrices that are not needed again."""
+        """Condense the pieces to their interface, and delete their factors, except those with a round-off error above 0."""
         pair = condense(patch_model, grid, upper_grid)
         for piece in (pair.piece, pair.upper):
             if not piece.round_off_error:

@@ -220,7 +220,10 @@ def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
 
 
 def is_too_expensive(patch_model, bodies) -> bool:
-    """Return whether condensing meshes of the pieces takes more CPU time than the finest mesh of a patch may take."""
+    """Return whether condensing the pieces on given meshes takes more CPU time than the finest mesh of a patch may take.
+
+    To condense a piece is to compute its compliance at the interface nodes. `bodies` are the meshes of both pieces.
+    """
     return predict_condensing_seconds(bodies) > choose_density(patch_model).max_condensing_seconds
 
 

@@ -166,7 +166,7 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
 
 
 def tabulate_static_motions(modes, motions) -> np.ndarray:
-    """Return amplitude, frequency, damping ratio, loss and force (5, k) of quasi-static motions."""
+    """Return amplitude [m], frequency [Hz], damping ratio, loss [J] and force [N] of quasi-static motions, (5, k)."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]

@@ -273,10 +273,10 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 
 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
-    """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows.
+    """List the comparison runs of a steady motion on coarser meshes.
 
-    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them. `solution` is the steady motion,
-    with the errors that its finder knows by measure.
+    The first entry has no runs, but the errors that the solver of the motion knows by measure (`solution.errors`).
+    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]

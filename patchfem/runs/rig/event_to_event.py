@@ -154,7 +154,7 @@ def run_from_event_to_event(
 
 
 class LumpedEvaluator(RunEvaluator):
-    """Runs of the engine `hybrid` and their evaluation."""
+    """Evaluator that computes runs of the engine `hybrid`, and measures from them."""
 
     def __init__(self, model, numerics, patch, joints: Joints):
         super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
@@ -523,7 +523,7 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
 
 
 def _find_even_samples(window: Response) -> np.ndarray:
-    """Return which samples (k,) of a window are of equal distances, and not of events."""
+    """Return which samples (k,) of a window lie at equal distances in time; the others are those of events."""
     position = (window.time - window.time[0]) / np.diff(window.time).max()
     return np.abs(position - np.round(position)) <= 1e-6
 

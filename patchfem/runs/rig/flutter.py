@@ -63,6 +63,7 @@ def compute_flutter_amplitude(run) -> Flutter:
     model = run.model
     unit = MOTION_TABLE[FLUTTER_MEASURE].unit
     floor = MOTION_TABLE[FLUTTER_MEASURE].floor
+    # Limit cycles by increasing amplitude, why no unstable one is known, and the smallest amplitude [m] of the search.
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
 
     end_notes = []

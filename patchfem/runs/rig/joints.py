@@ -70,13 +70,13 @@ class Joint(NamedTuple):
         return self.make_law().element(self.load.mean)
 
     def make_point_law(self) -> point_laws.PointLaw:
-        """Return the law under its mean load in the form of the march."""
+        """Return the law under its mean load as a PointLaw, the form for the time integration with equal steps."""
         if self.stiffness is not None:
             return point_laws.make_elements(self.stiffness, self.yields)
         return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
-        """Return the law in the form of the engine `hybrid`."""
+        """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
         if self.stiffness is not None:
             return from_elements(self.stiffness, self.yields)
         load = self.load

@@ -128,7 +128,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
     def find(run) -> Onset | None:
-        """Return the onset in a run."""
+        """Return the onset of slip in a run with drive levels, or None if no level reaches it."""
         return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
     onset = find(solution)
@@ -145,7 +145,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
 
 
 def convert_to_scene_units(rig, drive_levels) -> tuple[Level, ...]:
-    """Return the Levels with their amplitudes [m s-2] in the unit of the scene, [m s-2] or [N] for a force."""
+    """Return the drive levels of a run with their amplitudes in the unit of the scene: [m s-2], or [N] for a force."""
     unit, factor = _find_level_unit(rig)
     return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in drive_levels)
 
@@ -214,6 +214,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         if run.outcome is not None:
             break
 
+    # One run has the histories of all levels; `run_level` computes further levels in the search for the onset of slip.
     joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 

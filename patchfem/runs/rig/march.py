@@ -49,7 +49,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 
 class MarchEvaluator(RunEvaluator):
-    """Runs that are integrated with constant time steps, and their evaluation."""
+    """Evaluator that computes runs with equal time steps, and measures from them."""
 
     def __init__(self, model, numerics, patch, contact):
         stick_tolerance = 0.0

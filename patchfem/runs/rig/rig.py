@@ -213,6 +213,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
         return refine.Refined(CoupledRun(inputs, numerics, first, measures))
 
+    # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
     space_runs = [
         *engine.list_space_runs(model, numerics, inputs.patch, inputs.coarse[0], first),
         *list_runs_with_other_modes(model, numerics),
@@ -290,6 +291,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     max_passes = _count_finer_passes(run)
     if not max_passes:
         return refine.Verdict(0.0)
+    # Work of the run: steps times nodes, and more if each step presses the patch.
     counters = run.solution.book
     pressed = [face.patches[0] for face in run.inputs.faces]
     nodes = max(
@@ -301,6 +303,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_STEP_WORK_RATIO
 
+    # All measures count in a run that takes little time, else the main ones.
     tolerance = run.model.accuracy.tolerance
     measures = set_final_floors(complete_measures(run).measures, tolerance)
     if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:

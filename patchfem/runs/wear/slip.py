@@ -103,7 +103,7 @@ class _PointSlip(NamedTuple):
 
     @property
     def path(self) -> np.ndarray:
-        """Paths (p,) [m] over all samples."""
+        """Slip paths (p,) [m] of the points over all samples."""
         return self.integrate_path(np.arange(len(self.slip)))
 
     def estimate_reversal_error(self, force) -> float:

@@ -128,6 +128,7 @@ class ShootingFinder:
         leaves them.
         """
         begin = perf_counter()
+        # A run from rest shows whether the lifted mass leaves its grooves; then no motion is steady.
         run = self._leave_grooves(drive)
         if run is not None:
             solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
@@ -135,6 +136,7 @@ class ShootingFinder:
             periodic_data = SteadyData("leaves its grooves", np.zeros(0))
             return replace(solution, errors=errors, periodic=periodic_data)
 
+        # The periodic motion is run once more from its state, for histories and frames.
         motion, notes = self._find_stable_motion(drive, guess)
         state = None if motion.grows else motion.run.final
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
@@ -153,6 +155,7 @@ class ShootingFinder:
             if not dissipated:
                 errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
 
+        # An unstable motion is no result, because a rig would not stay in it.
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.grows or motion.is_stable
         outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
@@ -187,6 +190,7 @@ class ShootingFinder:
         guess : State, PathPoint or None
             State of a similar motion, or the point of a response curve that has this drive.
         """
+        # A point of a response curve has its periodic motion already; else it is found from the guess.
         if isinstance(guess, PathPoint):
             motion = guess.equations.details
         else:
@@ -312,8 +316,10 @@ class ShootingFinder:
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, starting from a neighbouring motion or from rest.
 
-        Without friction it has a closed form, except for an undamped resonance.
+        Without friction it has a closed form, except for an undamped resonance. `drive` is the `SineDrive` of the
+        point, and `guess` is the state of the neighbouring motion, None for rest.
         """
+        # Two motions need no search: that of a linear rig, and that of a mass that leaves its grooves.
         is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
         point = self._compute_linear_point(drive) if is_linear else None
         if point is not None:
@@ -332,6 +338,7 @@ class ShootingFinder:
         if motion.grows:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
+        # An interface sticks if it slips by no more than the tolerance.
         values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
         slips = np.ptp(motion.run.record.get_face_extremes(Probe.SLIP), axis=1)
         slips = slips[: len(self.joints.laws)]
