@@ -47,6 +47,7 @@ class ConditionModels(FreeKeys):
     ):
         _require_sines_of_base(scene, ranges, measured)
 
+        # Keys that the scene leaves out: the file of the measurements, and a steady method where the scene allows it.
         sets = []
         notes = []
         if scene.measured is None and any(bound.key.startswith("measured.") for bound in ranges):
@@ -66,6 +67,7 @@ class ConditionModels(FreeKeys):
 
         self.instrument = self.base.scene.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
+        # The rig under the drive of each measured condition.
         self.rigs = []
         for frequency, level in conditions:
             drive = [

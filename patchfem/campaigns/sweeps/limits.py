@@ -38,7 +38,7 @@ KEYS_WITHOUT_LIMIT = ("drive.", "slide.", "accuracy.", "wear.cycles")
 
 
 class KeyLimit(NamedTuple):
-    """Value of a key up to which the change of a measure stays within its limit, in SI.
+    """Value of a swept key up to which a measure changes by no more than a given amount, in SI.
 
     Attributes
     ----------
