@@ -81,7 +81,7 @@ class SurfaceRuns(NamedTuple):
 
 
 def _measure_to_dict(measure: Measure | None) -> dict | None:
-    """Return value, error and unit of a measure; None if there is no measure."""
+    """Return {"value", "error", "unit"} of a measure; None if there is no measure."""
     if measure is None:
         return None
     return {"value": measure.value, "error": measure.error, "unit": measure.unit}

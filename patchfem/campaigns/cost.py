@@ -37,7 +37,7 @@ MIN_SECONDS_TIMED_ONCE = 0.3
 
 
 class Judgement(StrEnum):
-    """Judgement of the errors of a run: within its tolerance, one beyond it, or none known beyond it."""
+    """Whether the errors of a run are within its tolerance: all are, one exceeds it, or some errors are not known."""
 
     MEETS = "meets its tolerance"
     MISSES = "misses its tolerance"
@@ -257,10 +257,10 @@ def find_measures_with_error(runs: list[Cost]) -> list[str]:
 
 
 def find_coarsest_run(runs: list[Cost], tolerance: float) -> Cost | None:
-    """Return the coarsest of the runs, from coarse to fine, that is within a tolerance; None if there is none.
+    """Return the coarsest run within a tolerance; None if there is none.
 
-    A coarse run that is accurate by chance is excluded: those of all finer values must be within the tolerance as well. The
-    automatic setting, which is the last one, is judged independently of the others.
+    `runs` are sorted from coarse to fine. A coarse run that is accurate by chance is excluded: all finer values must be
+    within the tolerance as well. The automatic setting, which is the last one, is judged independently of the others.
     """
     names = find_measures_with_error(runs)
     coarsest = None

@@ -16,7 +16,7 @@ NUMBER_UNITS = {"frequency": ("frequency", "Hz"), "input": ("acceleration", "m/s
 
 
 def find_cells(columns: Mapping[str, Sequence], name: str, path: Path) -> Sequence:
-    """Return the cells of a column by which rows can be selected.
+    """Return the cells of a column by which rows of a measured table can be selected.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def _find_count(model: Model, name: str) -> int:
 
 
 def _scale_count(middle: int, factors: tuple[float, ...], limits: tuple[float, float]) -> list[int]:
-    """Return a count, `middle`, and its products with factors that are within limits, in rising order."""
+    """Return a count, `middle`, and its products with factors, without those outside of limits, in rising order."""
     low, high = limits
     scaled = (max(1, round(middle * factor)) for factor in factors)
     return sorted({middle, *(count for count in scaled if low <= count <= high)})

@@ -141,6 +141,7 @@ def sweep(
             "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
 
+    # read_sweep returns what all cases share, and the cases with the values of their keys.
     by = by or WorkerOptions()
     part = by.part()
     output = output_options.into(f"{scene.stem}-sweep")
@@ -157,6 +158,8 @@ def sweep(
                 note(text)
         place = run.SweepTarget(target, resume, keep or "", part, not output.no_page)
         answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.quiet)
+
+    # The exit code tells a script whether all cases failed, or some of them.
     if answer is not None:
         present(answer, output)
         counts = answer.details["cases"]

@@ -46,7 +46,7 @@ class AsperityProblem(NamedTuple):
     - asperities: Pressure law of the layer.
     - compliance: Compliance of the pieces.
     - area (n,): Nodal areas [m2].
-    - contact: Gap, motions and loads, with motions that close no node by more than 1.
+    - contact: Gap, motions and loads; the motions are scaled so that none closes a node by more than 1.
     """
 
     asperities: SmoothAsperities

@@ -278,7 +278,7 @@ def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.nd
 
 
 def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Correct forces so that they have the prescribed resultants and are nonnegative.
+    """Correct nonnegative nodal forces so that their resultants are the prescribed load and moments.
 
     Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
 

@@ -216,9 +216,10 @@ def refine_columns(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def take_slot(sets):
-    """Return a free slot of the stored contact sets, or that of the oldest set other than the present one.
+    """Return the row in `sets.stored` for a new contact set, its slot.
 
-    A slot is a row of the arrays of `sets.stored`. A set that loses its slot also leaves the list of sets of equal hash.
+    It is a free one, or that of the oldest set other than the present one, which also leaves the list of sets of equal
+    hash.
     """
     stored = sets.stored
     n_slots = stored.hashes.size

@@ -195,7 +195,7 @@ class Piece:
         return self.computed.get("round_off_error", 0.0)
 
     def _stiffness_blocks(self) -> list[CellBlock]:
-        """Return the stiffnesses of the cells."""
+        """Return the stiffness matrices of the cells, one CellBlock for each kind of element."""
         out = []
         constants = self.layers.lame_constants(self.mesh.is_coating)
         n_cells = 0

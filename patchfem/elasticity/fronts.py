@@ -159,7 +159,7 @@ class _Stiffness(NamedTuple):
 
 
 def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
-    """Halve cells at positions (t, 2) across the longer side of each part.
+    """Halve cells at positions (t, 2) across the longer side of each part, until the parts (leaves) are small.
 
     Returns
     -------
@@ -269,7 +269,8 @@ def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
 def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers (n_nodes,) of the first and the last leaf that contains a cell of each node.
 
-    `leaves` lists the cells of each leaf, numbered through all `blocks` (CellBlock).
+    A leaf is a smallest part of the mesh. `leaves` lists the cells of each leaf, numbered through all `blocks`
+    (CellBlock).
     """
     leaf = np.empty(sum(len(block.nodes) for block in blocks), np.int64)
     for number, cells in enumerate(leaves):

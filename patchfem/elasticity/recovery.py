@@ -53,7 +53,7 @@ class Cells:
 
 
 def get_cells(piece: Piece) -> Cells:
-    """Return the cells of a piece."""
+    """Return the cells of a piece with their nodes and materials."""
     mesh = piece.mesh
     return Cells(mesh.points, mesh.blocks, mesh.is_coating, piece.layers)
 

@@ -70,7 +70,10 @@ def compute_answer(
 
 
 def make_answer(backbone: Backbone, source: Source) -> Answer:
-    """Return the answer of one backbone of a mode of the scene `source`."""
+    """Return the answer of one backbone: frequency, damping and force of a mode against its amplitude.
+
+    `source` is the scene of the mode.
+    """
     measures = _make_quantities(backbone)
     return Answer(
         kind="backbone",
@@ -85,7 +88,7 @@ def make_answer(backbone: Backbone, source: Source) -> Answer:
 
 
 def _make_sentence(text: str) -> str:
-    """Return a clause as a sentence."""
+    """Return a clause with a capital at its start and a full stop."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
@@ -118,7 +121,11 @@ def draw_backbone(dataset, ax=None):
 
 
 def _make_quantities(backbone: Backbone) -> Quantities:
-    """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
+    """Return the key numbers of a backbone by name.
+
+    They are the natural frequencies, frequency, damping and force at both ends of the recommended curve, its largest
+    damping, the exponents of its damping, and the amplitude above which the motion grows, each if it exists.
+    """
     frequencies = backbone.frequencies
     out = {}
     curve = backbone.best
@@ -156,7 +163,10 @@ def _make_point_quantity(curve: Curve, name: str, k: int) -> Quantity:
 
 
 def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
-    """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
+    """Return the sentences of the verdict.
+
+    They state the ends of the recommended curve, the natural frequencies, the largest damping, and which curve to use.
+    """
 
     def show(name: str) -> str:
         """Return a quantity as text with its error, such as "143.21 ± 0.13 Hz"."""
@@ -215,16 +225,18 @@ def _exceeds(quantity: Quantity, other: Quantity) -> bool:
 
 
 def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Variables:
-    """Return frequency, damping ratio and force of each method over the amplitude, and the band of the recommended one.
+    """Return frequency, damping ratio and force of each method over the amplitude as variables.
 
-    Names begin with that of the method, such as balance_frequency. A single backbone has the band also as
-    band_frequency_low and so on. Several backbones, one for each value of the key `axis`, have the recommended curves
-    alone, on the union of their amplitudes; NaN stands where a backbone has no motion.
+    Names begin with that of the method, such as balance_frequency, and end in _low and _high for the interval of the
+    recommended method. A single backbone has this interval also as band_frequency_low and so on. Several backbones, one
+    for each value of the key `axis`, have the recommended curves alone, on the union of their amplitudes; NaN stands where
+    a backbone has no motion.
     """
     data = {}
     if axis is not None:
         data["case"] = Variable(("case",), np.array(axis.texts), "", axis.key)
     all_bands = [backbone.band for backbone in backbones]
+    # Each method has its own amplitudes. Of several backbones only the recommended curves are shown.
     for method in CURVE_METHODS:
         bands = [band if band and band.method == method else None for band in all_bands]
         curves = [backbone.curves.get(method) for backbone in backbones]
@@ -257,7 +269,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
 
 
 def _find_unit(name: str) -> str:
-    """Return the SI unit of a column, such as "force_frequency" or "damping_low"."""
+    """Return the SI unit of a column of a curve, whose name may end in "_low", "_high" or "_error"."""
     return BACKBONE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
@@ -313,7 +325,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
 
 
 def _list_notes(cases: BackboneCases) -> list[str]:
-    """Return the notes of all backbones, those that they do not share with the value of the key."""
+    """Return the notes of all backbones; a note that not all of them have begins with the value of the key."""
     axis = cases.axis
     notes_by_case = [case_backbone.notes for case_backbone in cases.backbones]
     shared = [note for note in notes_by_case[0] if all(note in notes for notes in notes_by_case)]
@@ -336,6 +348,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     if first.best is None or last.best is None:
         missing = axis.texts[0] if first.best is None else axis.texts[-1]
         return (f"No method found frequency and damping for {axis.key} = {missing}.",), {}
+    # Indices of the amplitudes that both curves have.
     here, there = match_amplitudes(first.best, last.best)
     if not here.size:
         return (f"{subject}: the curves have no common amplitude.",), {}
@@ -350,6 +363,8 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     if point is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
+
+    # The changes at this amplitude as quantities, each with the sum of both errors.
     amplitude = start.amplitude[point]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():

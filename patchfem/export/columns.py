@@ -66,7 +66,11 @@ def list_cells(variable: Variable) -> list[str | float]:
 
 
 def _stack_curves(answer: Answer) -> list[Cells]:
-    """Return the points of the curves of all methods, and of all values of a key, below each other."""
+    """Return the points of all curves of a backbone, one below the other, as rows of a table.
+
+    There is a curve for each method, and for each value of a key that was varied. A row has the labels of its curve, the
+    method, and the columns of the curve.
+    """
     details = answer.details
     rows = []
     for case in details.get("cases", [details]):
@@ -104,7 +108,10 @@ def format_curves(answer: Answer) -> dict[str, str]:
 
 
 def _list_columns(rows: list[Cells], file: CsvFile) -> Lists:
-    """Return the columns of a CSV file that at least one row has."""
+    """Return the columns of a CSV file by heading, without those that no row has.
+
+    The file definition names the columns, or else the rows have them.
+    """
     lists = {}
     used_names = dict.fromkeys(name for row in rows for name in row)
     columns = [Column(name, name, "bare") for name in used_names]
@@ -166,7 +173,7 @@ def make_tables(answer: Answer) -> list[Table]:
 
 
 def _find_heading(answer: Answer, column: Column) -> str:
-    """Return the text above a column of a table."""
+    """Return the text above a column of a table; the heading "*" stands for the description of the variable."""
     heading = answer.data[column.name].text if column.heading == "*" else column.heading
     return heading.replace("_", " ")
 

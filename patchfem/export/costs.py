@@ -45,12 +45,12 @@ SCENE_JUDGEMENT_WORDS = {
 
 
 class Row(NamedTuple):
-    """A run of a curve of cost, and its least accurate measure.
+    """A run whose cost and accuracy are compared with those of other runs, and its least accurate measure.
 
-    - knob: what varies along the curve: TOLERANCE_SETTING, or the name of a numerical setting.
+    - knob: what varies among these runs: TOLERANCE_SETTING, or the name of a numerical setting.
     - run: the run.
-    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any run of the
-      curve do not count.
+    - worst: accuracy of the least accurate measure of this run. Measures without an error estimate in any of these
+      runs do not count.
     """
 
     knob: str
@@ -161,7 +161,7 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
 
 
 def _describe_advice(rows: list[Row]) -> list[str]:
-    """Return a sentence for each advice of the runs, which names all runs that have it."""
+    """Return a sentence for each piece of advice in the runs, which names all runs that have it."""
     runs: dict[tuple[str, str], list[Cost]] = {}
     for row in rows:
         # with several advices it is not known which of them belongs to the measure
@@ -179,7 +179,10 @@ def _describe_advice(rows: list[Row]) -> list[str]:
 
 
 def _find_main_measure(runs: list[Cost]) -> str:
-    """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
+    """Return the name of the measure that the charts and the verdict show.
+
+    It is the least accurate key quantity in the first and coarsest run; without key quantities, of all measures.
+    """
     names = find_measures_with_error(runs)
     names = [name for name in quantities.KEY_QUANTITY_NAMES if name in names] or names
     return rate_run(runs[0], names, runs[0].tolerance).name or names[0]

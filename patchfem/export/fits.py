@@ -117,6 +117,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     scene : Scene
         Scene before the fit.
     """
+    # Sentence on the residual, details, scores and arrays of this kind of fit.
     parts = _DESCRIBE_FUNCTIONS[type(fit)](fit)
     details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
     if isinstance(fit, FittedCoefficient):
@@ -180,13 +181,13 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
 
 
 def _describe_coefficient(fit: FittedCoefficient) -> dict[str, JsonObject]:
-    """Return the wear coefficient as the only fitted value of fit.json."""
+    """Return {key of the wear coefficient: value, unit, interval and bounds}, the fitted values of fit.json."""
     value = {"value": fit.value, "unit": WEAR_COEFFICIENT_UNIT, "interval": [fit.low, fit.high]}
     return {COEFFICIENT_KEY: value | {"bounds": [fit.bounds.low, fit.bounds.high]}}
 
 
 def _describe_search(keys: FittedKeys) -> JsonObject:
-    """Return values with intervals, outcome and counts of a search, and what the data do not determine, for fit.json."""
+    """Return what fit.json says of a search: values with intervals, outcome, counts, and what the data leave open."""
     fit = keys.fit
     intervals = fit.intervals
     values = {}
@@ -218,7 +219,7 @@ def _describe_search(keys: FittedKeys) -> JsonObject:
 
 
 def describe_loop_fit(fit: FittedLoop) -> Parts:
-    """Return the parts of a fit to a friction loop."""
+    """Return what the answer of a fit to a friction loop contains: residuals, loops and their variables."""
     loop = fit.loop
     unit = LOOP_FORCE_UNITS[loop.quantity]
     peak = np.abs(loop.reading).max()
@@ -270,7 +271,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
 
 
 def describe_curve_fit(fit: FittedCurve) -> Parts:
-    """Return the parts of a fit to measured frequency and damping against amplitude."""
+    """Return what the answer of a fit to measured frequency and damping against amplitude contains."""
     measured = fit.measured
     n_rows = measured.amplitude.size
     errors = 2 * measured.error  # half the width of a 95 % interval
@@ -315,9 +316,9 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
 
 
 def describe_rows_fit(fit: FittedRows) -> Parts:
-    """Return the parts of a fit to a table of measured responses.
+    """Return what the answer of a fit to a table of measured responses contains.
 
-    Scores are root mean squares of ln(computed/measured).
+    Its scores are root mean squares of ln(computed/measured).
     """
     search = fit.keys.fit
     scores = fit.compute_scores()
@@ -348,7 +349,7 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
 
 
 def _describe_instrument(fit: FittedRows) -> JsonObject:
-    """Return settings and gains of the sensors: those of the scene, fitted values, or defaults."""
+    """Return settings and gains of the sensors by name: fitted values, else those of the scene, else defaults."""
     instrument = {
         name: getattr(fit.instrument, name, default)
         for name, default in DEFAULT_SENSOR_SETTINGS.items()
@@ -361,7 +362,7 @@ def _describe_instrument(fit: FittedRows) -> JsonObject:
 
 
 def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
-    """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
+    """Return measured and computed readings of each row, twice: as objects of fit.json, and as arrays with their ratios."""
     cells = fit.cells
     entries = [asdict(row) for row in cells.rows]
     is_held = np.zeros(len(entries), bool)
@@ -404,7 +405,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
 
 
 def describe_wear_fit(fit: FittedCoefficient) -> Parts:
-    """Return the parts of a fitted wear coefficient."""
+    """Return what the answer of a wear coefficient that was fitted to a measured depth contains."""
     measured = fit.measured
     ends = {"value": measured.value, "low": measured.low, "high": measured.high}
     name = measured.name.replace("_", " ")

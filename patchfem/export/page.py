@@ -133,7 +133,10 @@ def _read_all(folders: list[Path]) -> Answers:
 
 
 def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], list[str]]:
-    """Return name, texts in all answers and definition of each measure, and the names of those that are zero in all."""
+    """Return the rows of the table of measures of a page, and the names of the measures that are zero in all answers.
+
+    A row has the name of a measure, its text in each answer, and its definition.
+    """
     rows = []
     zeros = []
     for name in dict.fromkeys(name for answer in answers.values() for name in answer.quantities):
@@ -152,7 +155,7 @@ def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], 
 
 
 def _find_uncertainty(quantity: Quantity) -> float:
-    """Return the half-width of the interval of a quantity, but at least its floor."""
+    """Return the half-width of the interval of a quantity, but at least its floor, the smallest value that is not 0."""
     if None in (quantity.low, quantity.high):
         return quantity.floor
     return max((quantity.high - quantity.low) / 2, quantity.floor)

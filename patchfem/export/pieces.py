@@ -74,6 +74,7 @@ def magnify_pieces(
         Factor of the motion; by default one that makes it visible.
     """
     lower, upper, line = (frames.blocks[name] for name in ("lower", "upper", "interface"))
+    # Displacements in the chosen frames. The slide of the holder is drawn with a factor of its own.
     low_motion, motion, face_motion = (
         block.point_data["displacement"][numbers, :, :2].astype(float)
         for block in (lower, upper, line)
@@ -145,7 +146,7 @@ def draw_cells(axes, drawn: DrawnPieces, stress: np.ndarray, **style):
     cells = PolyCollection([], antialiaseds=False, rasterized=True, **style)
 
     def show(index: int) -> None:
-        """Change positions and colours to those of a frame."""
+        """Move the cells to their positions in a frame, and colour them by the stress in it."""
         cells.set_verts(drawn.places[index][drawn.cells[drawn.is_inside]])
         cells.set_array(stress[index, drawn.is_inside])
         axes.set_title(drawn.captions[index])
@@ -206,7 +207,7 @@ def draw_pieces(
     panels[0].figure.colorbar(cells, ax=panels, extend=extend, label=label, shrink=0.7)
 
     def show(index: int) -> None:
-        """Change the figure to a frame."""
+        """Change title, positions and colours of the figure to those of a frame."""
         figure.suptitle(f"{title}, {frames.times[numbers[index]]:.6g} s")
         for change in changes:
             change(index)
@@ -285,6 +286,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
         )
     if out.suffix == ".mp4":
         rcParams["animation.ffmpeg_path"] = _find_ffmpeg(out)
+    # `show` draws the frame with a given number in the figure.
     figure, show = draw_pieces(frames, numbers, title, magnify)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # so that the panels stay at their places

@@ -237,7 +237,7 @@ def collect_data(result: Result) -> Variables:
 
 
 def _read_row(result: Result, name: str, row: Row) -> Variables:
-    """Return the variable of a row with values from a run, or {} if the run has no such values.
+    """Return the variable of a row by its name, with values from a run, or {} if the run has no such values.
 
     Codes become small integers, and names become strings. `row` has the places of the values in the run, with dimensions
     and unit.
@@ -255,7 +255,10 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
 
 
 def _look_up(value, place: str):
-    """Return what a dotted place of attributes, keys and indices contains, or None."""
+    """Return the content of a place below an object, such as "window.extra.ledger.0", or None if it does not exist.
+
+    The parts of the place are names of attributes, keys of dicts and indices.
+    """
     for name in place.split("."):
         if isinstance(value, dict):
             value = value.get(name)
@@ -298,7 +301,10 @@ def _collect_motion(result: Result) -> Variables:
 
 
 def _collect_loop(result: Result) -> Variables:
-    """Return the friction loop of the last cycle, of each interface for a rig of masses; and a measured loop."""
+    """Return the friction loop of the last cycle as variables: slide [m] and friction force [N].
+
+    A rig of masses has a loop for each interface. A bench whose slide is a measured loop also has that loop.
+    """
     window = result.window
     if window is None or not np.any(window.force) or np.ptp(window.slide) == 0:
         return {}
@@ -350,7 +356,10 @@ def _collect_measured_loop(result: Result) -> Variables:
 
 
 def _collect_patch(result: Result) -> Variables:
-    """Return the fields along the interface of a solved patch; the states of wear have frames of their own."""
+    """Return pressure, gap, shear stress and slip along the interface of a patch as variables.
+
+    The states of wear have frames of their own.
+    """
     surface = patch_surface(result.patch, result.fields)
     if surface is None:
         return {}
@@ -412,7 +421,7 @@ def _collect_face(face) -> Variables:
 
 
 def _collect_levels(result: Result) -> Variables:
-    """Return the results at the end of each level of the drive."""
+    """Return the measures at the end of each level of a drive whose amplitude changes in steps, as variables."""
     levels = result.motion.levels
     if not levels:
         return {}
@@ -435,7 +444,7 @@ def _collect_levels(result: Result) -> Variables:
 
 
 def _collect_regimes(result: Result) -> Variables:
-    """Return the regimes and the folds of a curve of steady motions."""
+    """Return the regime at each point of a response curve, such as "stick-slip", and where the curve turns back."""
     curve = None if result.motion.steady is None else result.motion.steady.curve
     if curve is None:
         return {}
@@ -460,7 +469,7 @@ def _collect_frequency_response(result: Result) -> Variables:
 
 
 def _collect_wear(result: Result) -> Variables:
-    """Return the measures over the cycles of wear."""
+    """Return the measures over the cycles of wear as variables, such as wear_worn_volume."""
     if result.wear is None:
         return {}
     columns = {

@@ -89,7 +89,10 @@ def run_into(
 
 
 def draw_page(folder: Path) -> BaseException | None:
-    """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
+    """Write report.html into the folder of a run; return the error that prevents it, or None.
+
+    The results of a long run are kept without their page.
+    """
     try:
         page.write_report(folder)
     except BaseException as fault:
@@ -98,7 +101,10 @@ def draw_page(folder: Path) -> BaseException | None:
 
 
 def _partial_result(error: NotConverged) -> Result:
-    """Return the partial result of a run that did not converge, with the reason as a warning."""
+    """Return what a run that did not converge has computed, with the reason as a warning.
+
+    NotConverged is raised again if it has computed nothing.
+    """
     result = error.partial_result
     if result is None:
         raise NotConverged(

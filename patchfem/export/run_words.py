@@ -192,7 +192,7 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
 
 
 def _describe_unknown(names: list[str]) -> str:
-    """Return the sentence on measures of which nothing is known, because the run did not converge."""
+    """Return the sentence that names the measures whose errors are as large as their values."""
     *first, last = names
     if not first:
         error = f"error of {last} is as large as the value"
@@ -202,7 +202,7 @@ def _describe_unknown(names: list[str]) -> str:
 
 
 def _describe_stability(result: Result) -> str:
-    """Return the outcome; for a steady motion with its regime and what becomes of a disturbance."""
+    """Return the sentence on the outcome of a run; for a steady motion with its regime and whether a disturbance decays."""
     sentence = result.outcome.sentence
     steady = result.motion.steady
     if steady is None:
@@ -236,21 +236,22 @@ def _describe_bench_outcome(measures: Quantities, details: JsonObject) -> str:
 
 
 def _find_error(quantity: Quantity) -> float:
-    """Return the error of a quantity, or its floor if the error is unknown."""
+    """Return the error of a quantity, or its floor (the smallest value that is not 0) if the error is unknown."""
     return quantity.floor if quantity.error is None else quantity.error
 
 
 def _describe_no_slip(has_patch: bool, cycles: str) -> str:
-    """Return the sentence for an interface without slip.
+    """Return the sentence that an interface does not slip.
 
-    At an edge where the pressure of a patch ends, any force causes slip; a mesh may not show it.
+    `cycles` says when, such as "cycle" or "10 cycles". At an edge where the pressure of a patch ends (`has_patch`), any
+    force causes slip, which the mesh may not show.
     """
     limit = " beyond the error of this mesh; a slip zone smaller than an element cannot be detected"
     return f"The interface sticks: no slip in the last {cycles}{limit * has_patch}."
 
 
 def _describe_stuck_outcome(measures: Quantities) -> str:
-    """Return the sentence for an interface that sticks as a whole."""
+    """Return the sentence for an interface that sticks as a whole, with the largest slip or loss if a part of it slips."""
     has_patch = "contact_fraction" in measures
     part = "part of the patch slips" if has_patch else "part of it slips"
     force, motion = (
@@ -340,7 +341,7 @@ def list_readings(result: Result) -> list[JsonObject]:
 
 
 def describe_accuracy(result: Result, measures: Quantities) -> str:
-    """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
+    """Return the sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
     tolerance = result.plan.model.accuracy.tolerance
     if result.outcome is Outcome.GROWS and result.response is not None:
         end = format_quantity(result.response.time[-1], "s", 3)

@@ -25,7 +25,7 @@ RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcd
 
 
 def make_answer(result: Result) -> Answer:
-    """Return the answer of a run."""
+    """Return the answer of a run: its measures, verdict, arrays and warnings, from its result."""
     run_plan = result.plan
     source = run_plan.model.source
     measures = make_quantities(result.measures)
@@ -120,7 +120,7 @@ def list_versions() -> dict[str, str]:
 
 
 def make_details(result: Result) -> JsonObject:
-    """Return the further keys of summary.json for a run."""
+    """Return the further keys of summary.json for a run, such as outcome, effects, seconds, cycles and readings."""
     details = {
         "outcome": str(result.outcome),
         "effects": _list_effects(result),
@@ -170,7 +170,10 @@ def _list_effects(result: Result) -> list[JsonObject]:
 
 
 def _find_contact(result: Result) -> JsonObject:
-    """Return the ends of the interface and of each part in contact [m], for a solved patch without strips."""
+    """Return {"from", "to": ends of the interface [m], "stretches": (start, end) [m] of each part in contact}.
+
+    The dict is empty for a patch without contact or with strips.
+    """
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
         return {}
@@ -183,7 +186,10 @@ def _find_contact(result: Result) -> JsonObject:
 
 
 def _find_run_away(result: Result) -> JsonObject:
-    """Return the drive of an unsettled motion and the largest one that friction can limit [m s-2], if it is larger."""
+    """Return drive and limit [m s-2] of a motion that friction cannot bound, {} for other motions.
+
+    The keys are "drive" and "knee", the largest drive at which friction bounds the resonance.
+    """
     if result.outcome not in (Outcome.TRANSIENT, Outcome.GROWS):
         return {}
     levels = rig_plan.find_drive_and_knee(result.plan.model)

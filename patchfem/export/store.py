@@ -120,6 +120,7 @@ def read_answer(folder: Path) -> Answer:
             details = json.loads((folder / DETAIL_FILES[summary.kind]).read_text("utf-8"))
         if (folder / SCENE_FILE).is_file():
             origin = origin | {"resolved": (folder / SCENE_FILE).read_text("utf-8")}
+        # Arrays of the answer by name; the CPU times of a run are kept among the details.
         path = folder / name_data_file(summary.kind)
         data = read_netcdf(path)[0] if path.is_file() else {}
         if CPU_TIMES_VARIABLE in details:

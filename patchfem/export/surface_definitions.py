@@ -10,7 +10,7 @@ RENAMED_TRACK_QUANTITIES = {"depth_mean": "track_depth"}
 
 
 def name_in_track(name: str) -> str:
-    """Return the name in an answer of a quantity of a track."""
+    """Return the name that a quantity of a wear track has in the answer of a comparison, such as "track_depth"."""
     return RENAMED_TRACK_QUANTITIES.get(name, f"track_{name}")
 
 

@@ -205,6 +205,7 @@ def make_rig(
         if load.amplitude and load.omega:
             shortest = min(shortest, 2 * np.pi / load.omega)
             ratio = load.omega * signal.period / (2 * np.pi)
+            # A cycle can repeat only if the load has a whole number of periods in it.
             repeat = repeat if abs(ratio - round(ratio)) < 1e-12 * ratio else 0
 
     settings = np.zeros(len(Setting))
@@ -265,10 +266,10 @@ def make_start(rig: Rig, interfaces, start=None) -> np.ndarray:
 
 
 def make_schedule(cycles: float, period: float, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the cycles [s], and their windows.
+    """Return the ends of the cycles [s], and a code for each of them, its window.
 
-    The window is 0 for the last cycles, -1 for the others, and -2 for the cycles before the window of which each is
-    computed, even if the motion repeats.
+    The code is 0 for the last cycles, in which measures are recorded (the window), and -1 for cycles before, which may
+    be skipped if the motion repeats. It is -2 for cycles just before the window that are computed in any case.
 
     Parameters
     ----------
@@ -362,7 +363,7 @@ def make_rig_case(
 
 
 def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[float, float]:
-    """Return the displacement [m] and speed [m/s] that drive and start alone give to slides and output.
+    """Estimate displacement [m] and speed [m/s] of the slides and the output, as if there were no friction.
 
     A mode above the frequency of the drive follows it by its stiffness, one below by its inertia.
 
@@ -371,9 +372,9 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     modes : ModalBasis
         Modes of the structure without the contact.
     signal : Signal
-        Pieces and tones of the drive.
+        Drive in the form of the engine, which has the period.
     drive
-        Drive of the signal.
+        Drive of the signal, which has the largest acceleration.
     start : InitialState, optional
         Modal coordinates [m] and velocities [m/s]; at rest by default.
     """
@@ -389,7 +390,7 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
 
 
 def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
-    """Return the state at the start of a case and its empty record, with room for a number of events."""
+    """Return the State at the start of a case, and its empty Record with rows for `n_events` events."""
     rig = case.rig
     n_faces = rig.faces.shape[0]
     n = case.y.size

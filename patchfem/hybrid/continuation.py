@@ -83,7 +83,7 @@ class PathPoint(NamedTuple):
     equations: PathEquations
 
     def border(self, row, unit) -> np.ndarray:
-        """Return the scaled derivatives with a further row, (N + 1, N + 1).
+        """Return the derivatives of the equations by scaled unknowns and parameter with a further row, (N + 1, N + 1).
 
         Parameters
         ----------
@@ -155,6 +155,7 @@ def follow_curve(
     """
     settings = settings or PathSettings()
     low, high = bounds
+    # A point w has the unknowns x, then the parameter p. `unit` has the scale of each entry, `along` the direction of p.
     w = np.append(np.asarray(x, float), float(p))
     unit = np.full(w.size, float(np.linalg.norm(x)) or 1.0)
     unit[-1] = high - low
@@ -212,7 +213,10 @@ def follow_curve(
 
 
 def _step_factor(n_steps: int) -> float:
-    """Return the factor for the next step; few steps of a correction show that the curve is nearly straight."""
+    """Return the ratio of the next step to the last one, whose correction took `n_steps` steps of Broyden's method.
+
+    It is above 1 for a few steps, because the curve is nearly straight then.
+    """
     if n_steps <= 5:
         return 1.5
     return 1.1 if n_steps <= 7 else 0.6
@@ -235,17 +239,17 @@ class Guess(NamedTuple):
 def correct_point(
     curve: Curve, point: PathPoint, guess: Guess, tolerance: float, *, max_step: float = np.inf
 ) -> tuple[PathPoint, int] | None:
-    """Correct a guess, and again with the derivatives at the point found until its own residual has vanished.
+    """Move a guess onto the curve by Broyden's method, and repeat this with new derivatives until the residual has vanished.
 
-    Beyond a kink of the curve the derivatives at another point may lead to a place where the equations do not hold. If
-    they lead nowhere, the correction begins with the derivatives at the guess.
+    Beyond a kink of the curve, the derivatives at `point` may lead to a place where the equations do not hold. If they
+    lead nowhere, the correction begins again with the derivatives at the guess.
 
     Parameters
     ----------
     curve : Curve
         Equations of the curve.
     point : PathPoint
-        Point near the guess.
+        Point near the guess, whose derivatives are used first.
     guess : Guess
         Guess that is corrected.
     tolerance : float
@@ -325,7 +329,9 @@ def find_point(curve: Curve, point: PathPoint, w, tolerance: float) -> PathPoint
 def _take_step(
     curve: Curve, point: PathPoint, step, unit, tolerance: float
 ) -> tuple[PathPoint, int] | None:
-    """Return the point after a step along the curve as `correct_point` does, or None if it fails or jumps.
+    """Return the corrected point after a step along the curve, and the number of corrections.
+
+    The result is None if the correction fails or moves the point away from the direction of the step.
 
     Parameters
     ----------
@@ -351,9 +357,10 @@ def _take_step(
 
 
 def _is_on_curve(point: PathPoint, points: list[PathPoint], direction, unit) -> bool:
-    """Return whether a point lies on an earlier step between the points of a curve, along which the curve goes again.
+    """Return whether a point lies on an earlier step of the curve, so that the curve has closed and would be followed again.
 
-    `direction` (N + 1,) is that of the last step, and the distances are scaled by `unit` (N + 1,).
+    `points` are those of the curve in their order, `direction` (N + 1,) is that of the last step, and the distances are
+    scaled by `unit` (N + 1,).
     """
     places = np.array([other.w for other in points]) / unit
     starts = places[:-2]

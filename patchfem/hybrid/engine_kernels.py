@@ -77,10 +77,10 @@ REPEAT_TOL = (
 
 @njit(**NJIT_KERNEL)
 def update_scales(rig, state):
-    """Raise the scales of the errors to the magnitudes of a state.
+    """Update the magnitudes of the entries of a state, to which the error of a step is relative.
 
-    Those of `rig.scales` are the smallest. The error of a mode counts by what it adds to the slides and to the output,
-    relative to their magnitudes, and to the friction force of laws without states.
+    They grow with the motion, from `rig.scales` on. The error of a mode counts by what it adds to the slides and to the
+    output, relative to their magnitudes, and to the friction force of laws without states.
     """
     n = rig.modes.shape[1]
     y = state.y
@@ -403,9 +403,10 @@ def skip_cycles(rig, state, record, cycle, count):
 
 @njit(**NJIT_KERNEL)
 def count_repeated(rig, state, record, cycle):
-    """Return the number of cycles without a window that follow in the same piece of the drive.
+    """Return how many of the next cycles can be skipped if the motion repeats.
 
-    If this cycle has no samples from which those of later cycles can be repeated, only cycles without samples count.
+    They lie before the window and in the present piece of the drive. If this cycle has no samples from which those of
+    later cycles can be copied, only cycles without samples count.
 
     Parameters
     ----------
@@ -437,7 +438,9 @@ def count_repeated(rig, state, record, cycle):
 
 @njit(**NJIT_KERNEL)
 def drop_cut_extremes(cycle, point):
-    """Remove the friction force at an extreme slide that lies at an end of a cycle, but is no reversal.
+    """Replace the friction force at the largest or smallest slide of a cycle by NaN if it is no reversal.
+
+    Such an extreme lies at an end of the cycle, which cuts the motion.
 
     Parameters
     ----------

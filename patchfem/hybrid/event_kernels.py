@@ -179,7 +179,10 @@ def write_probes(rig, state, t, y, probes):
 
 @njit(**NJIT_KERNEL)
 def find_value(rig, state, x, i, k):
-    """Return a margin of interface i, or a scalar of the probes for i < 0, at the fraction x of a step.
+    """Return a value at the fraction x of the present step: a margin of interface i, or a probe if i < 0.
+
+    A margin is a function of the state that is positive in the present regime of a law. A probe is a scalar that is
+    observed, such as a slide or a force.
 
     Parameters
     ----------
@@ -206,7 +209,7 @@ def find_value(rig, state, x, i, k):
 
 @njit(**NJIT_KERNEL)
 def find_margin_root(rig, state, i, k, left, right):
-    """Return the fraction of a step at which a margin vanishes between two fractions.
+    """Return the fraction of a step at which a margin vanishes, so that the regime of a law ends.
 
     Parameters
     ----------
@@ -299,7 +302,7 @@ def find_vertex(a, b, c):
 
 @njit(**NJIT_KERNEL)
 def find_event(rig, state):
-    """Return the first event of a step.
+    """Return the first event of a step: the fraction at which a margin first becomes negative, with its interface.
 
     Row 0 of the margins is that of the start of the step.
     """

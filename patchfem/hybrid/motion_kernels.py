@@ -48,13 +48,13 @@ def project(row, vector):
 
 @njit(**NJIT_KERNEL)
 def find_integrals(rig, y):
-    """Return the index of the first integral of the first interface in the state."""
+    """Return the index in the state y of the first integral over time of the first interface, its friction work."""
     return y.size - N_INTEGRALS - N_FACE_INTEGRALS * rig.faces.shape[0]
 
 
 @njit(**NJIT_KERNEL)
 def find_phase(piece, tau):
-    """Return phase and circular frequency of a piece of the drive at a time tau after its start."""
+    """Return phase [rad] and circular frequency [rad/s] of the sine in a piece of the drive, `tau` [s] after its start."""
     growth = piece[Piece.GROWTH]
     grown = piece[Piece.OMEGA]
     turned = grown * tau
@@ -98,7 +98,10 @@ def find_drive(rig, clock, t):
 
 @njit(**NJIT_KERNEL)
 def prescribed_load(face, t):
-    """Return the normal load [N] at a time without heave, which may be negative, and its rate."""
+    """Return the normal load [N] of an interface at a time t [s] without heave, and its rate [N/s].
+
+    It may be negative, as if the surfaces pulled.
+    """
     phase = face[Face.RATE] * t + face[Face.PHASE]
     return (
         face[Face.MEAN] + face[Face.SWING] * np.cos(phase),
@@ -108,7 +111,7 @@ def prescribed_load(face, t):
 
 @njit(**NJIT_KERNEL)
 def look(rig, state, i, t, y):
-    """Return the `Point` of an interface at a state.
+    """Return the `Point` of an interface: its load, slide and velocity at a state, and what holds it at rest.
 
     Parameters
     ----------
@@ -216,7 +219,7 @@ def find_rates(rig, state, t, y, rates):
 
 @njit(**NJIT_KERNEL)
 def rests(memory):
-    """Return whether an interface is held at rest by rigid friction."""
+    """Return whether an interface is held at rest by rigid friction, from its row of `State.memory`."""
     return memory[Memory.DIRECTION] == 0 and memory[Memory.CONTACT] > 0
 
 
@@ -278,9 +281,10 @@ def add_friction(rig, state, i, t, y, rates):
 
 @njit(**NJIT_KERNEL)
 def hold(rig, state, acceleration):
-    """Add the forces that keep the resting interfaces at rest.
+    """Add the forces that keep the resting interfaces at rest to the accelerations of the modes.
 
-    Further passes remove the acceleration that the small compliance SHARED_GRIP leaves.
+    They are the relative accelerations without them, times `state.grip`. Further passes remove the acceleration that
+    the small compliance SHARED_GRIP leaves.
 
     Parameters
     ----------
@@ -312,7 +316,7 @@ def hold(rig, state, acceleration):
 
 @njit(**NJIT_KERNEL)
 def find_strength(rig, i):
-    """Return the largest modal force [N] of a rigid interface at rest under its mean load.
+    """Return the static friction of a rigid interface under its mean load, as the norm of its modal forces [N].
 
     Parameters
     ----------
@@ -327,7 +331,10 @@ def find_strength(rig, i):
 
 @njit(**NJIT_KERNEL)
 def update_grip(rig, state):
-    """Invert the compliance of the resting interfaces by the Gauss-Jordan method."""
+    """Compute `state.grip`, the forces that hold the resting interfaces per unit of their relative accelerations.
+
+    It is the inverse of their compliance matrix, by the Gauss-Jordan method.
+    """
     n = rig.faces.shape[0]
     grip = state.grip
     # More interfaces than modes share their forces by their strengths, so that they reach their limits at once.

@@ -98,18 +98,21 @@ class Motion:
         n = rig.modes.shape[1]
         n_faces = rig.faces.shape[0]
         m = self.case.n_friction
+        # Columns of a row: time, state y (coordinates, rates, states of laws, integrals), forces, loads, directions.
         time = rows[:, 0]
         z = rows[:, 1 : 1 + n]
         rate = rows[:, 1 + n : 1 + 2 * n]
         integrals = split_integrals(self.case, rows[:, 1 : 1 + self.case.y.size])
         forces = rows[:, 1 + self.case.y.size :][:, :n_faces]
 
+        # Relative displacement and velocity of each friction interface.
         slides = z @ rig.rows[0, :m].T
         slide_rates = rate @ rig.rows[0, :m].T
         # The velocity of a rigid interface at rest is round-off.
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
 
+        # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
         work = integrals[:, :m, 0]
         loss = integrals[:, :m, 2]
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
@@ -129,6 +132,7 @@ class Motion:
                 "slips": slips,
             }
 
+        # Without friction the slide of the modes stands for an interface that carries no force.
         zeros = np.zeros(time.size)
         interface = (z @ modes.slide, rate @ modes.slide, zeros, zeros)
         if m:

@@ -48,7 +48,7 @@ def _join(name: str):
 
 
 def _compile_helpers(law: str) -> None:
-    """Replace the functions that the functions of a law call by compiled ones."""
+    """Replace the Python functions in the list HELPERS of the module of a law by compiled ones."""
     module = import_module(f"{__package__}.laws.{law}")
     for name in getattr(module, "HELPERS", ()):
         setattr(module, name, njit(**NJIT_KERNEL)(getattr(module, name)))

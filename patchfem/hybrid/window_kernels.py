@@ -52,10 +52,10 @@ EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an eve
 
 @njit(**NJIT_KERNEL)
 def raise_extreme(rig, state, fraction, column, sign, known):
-    """Return the largest (sign 1) or smallest (-1) of a known value and the values of a scalar in a step, and its place.
+    """Return the largest (sign 1) or smallest (-1) value of a probe so far, and where in the step it lies.
 
-    The scalar is known at the nodes. If the result lies in this step, its place is a fraction of the step, and the last
-    evaluation is there; otherwise the place is -1.
+    `known` is the extreme before this step, and the probe is known at a few points of the step. The position is a
+    fraction of the step, at which the probes were evaluated last; it is -1 if the extreme does not lie in this step.
 
     Parameters
     ----------
@@ -72,6 +72,7 @@ def raise_extreme(rig, state, fraction, column, sign, known):
     known : float
         Value that is known already.
     """
+    # The best of the known points; if it lies far below the extreme so far, nothing is searched.
     best = 0
     for node in range(1, N_NODES):
         if sign * state.probes[node, column] > sign * state.probes[best, column]:
@@ -93,6 +94,7 @@ def raise_extreme(rig, state, fraction, column, sign, known):
         if vertex < 0:
             vertex = 0.0 if a < c else 2.0
 
+        # The vertex becomes the middle of a narrower parabola.
         at = middle + (vertex - 1) * width
         found = sign * find_value(rig, state, fraction * at, -1, column)
         gain = found - value
@@ -138,7 +140,7 @@ def observe_cycle(rig, state, fraction, cycle):
 
 @njit(**NJIT_KERNEL)
 def add_output(rig, y, cycle):
-    """Add the output of a state to the extremes of a cycle.
+    """Update the smallest and largest output of a cycle by the output at a state.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without J
 class Descent(NamedTuple):
     """Result of a local least-squares search (descent).
 
-    - u: final point (n,) in the unit cube.
+    - u: final point (n,) in the unit cube, to which the ranges of the parameters are mapped.
     - cost: final sum of squares; infinite if the evaluation at the start failed.
     - is_converged: whether the descent converged.
     - rows: number of rows of the residual.

@@ -62,7 +62,7 @@ class _DrivenRecord:
         )
 
     def _transform(self, *spectra) -> np.ndarray:
-        """Return the fitted samples (n, k) of n spectra."""
+        """Return the inverse Fourier transforms of n spectra at the samples that are fitted, (n, k)."""
         return irfft(spectra, self.force.size)[:, self.inner]
 
     def _compute_forced(self, omega: float, rate: float) -> np.ndarray:
@@ -77,10 +77,11 @@ class _DrivenRecord:
         return self._transform(response, -2 * omega * response * pole, by_rate)
 
     def find_starts(self, fit: SinusoidFit) -> list[np.ndarray]:
-        """Return initial poles (2,) at the frequency where the input explains most of the residual.
+        """Return initial poles, (angular frequency [rad/s], decay rate [1/s]), of a further mode.
 
-        This part of the power of a line is |G_xf|^2 / G_ff times the coherence, averaged over windowed segments. It is
-        the H1 estimator of Bendat and Piersol, Random Data, ch. 6.
+        Their frequency is that at which the input explains most of the residual of `fit`, and several decay rates are
+        tried. The explained part of the power of a spectral line is |G_xf|^2 / G_ff times the coherence, averaged over
+        windowed segments: the H1 estimator of Bendat and Piersol, Random Data, ch. 6.
         """
         size = 2 * (self.force.size // (2 * N_RECORD_SEGMENTS))
         records = (self.force[self.inner], fit.residual)

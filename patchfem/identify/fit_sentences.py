@@ -40,6 +40,7 @@ def describe_fit(fit: Fit, names) -> list[str]:
     in_combination = intervals.unknown.any(axis=0)
     min_sensitivity = MIN_SENSITIVITY * max(np.max(intervals.sensitivity), fit.rms)
 
+    # An interval that ends at a bound, no effect on the data, or an interval over the whole range.
     for i, name in enumerate(names):
         if np.isfinite(intervals.ends[i]).all():
             if intervals.open_ends[i].any() and not fit.at_bound[i]:

@@ -105,6 +105,7 @@ def find_half_cycles(time, value) -> HalfCycles:
         )
         raise PatchfemError(f"fewer than three half cycles of a free decay are found: {reason}")
 
+    # Errors due to noise are at least the error of a sine as the model of a half cycle.
     best = min(candidates, key=lambda sines: sines.compute_noise().mean())
     noise = best.compute_noise()
     size = np.abs(best.size)
@@ -251,6 +252,7 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
     _FittedSines or None
         None if there are too few samples, or if the midpoint is too far from its prediction.
     """
+    # c + exp(-rate t) (a sin + b cos) is fitted around the midpoint, which moves until b vanishes.
     predicted = middle
     for _ in range(MAX_MIDPOINT_ITERATIONS):
         low, high = np.searchsorted(time, (middle - length / 2, middle + length / 2))

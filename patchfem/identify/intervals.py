@@ -62,7 +62,7 @@ class FitIntervals:
 
     @property
     def effects(self) -> np.ndarray:
-        """Change (r, n) of each row per standard deviation of each parameter, in standard deviations of the rows."""
+        """Change (r, n) of each row of the residual, in standard deviations, per standard deviation of each parameter."""
         # The covariance of the parameters is shifts shifts^T times the variance of the rows.
         scale = np.linalg.norm(self.shifts, axis=1, keepdims=True)
         return np.linalg.pinv(self.shifts / np.maximum(scale, 1e-300))
@@ -83,7 +83,10 @@ class _Minimum(NamedTuple):
     growth: float
 
     def is_linear(self, direction) -> bool:
-        """Return whether the sum of squares grows as in a linear model up to u -+ direction (n,)."""
+        """Return whether the sum of squares at u - direction and u + direction is that of a linear model.
+
+        `direction` (n,) is a step in the unit cube to the end of a linear interval.
+        """
         for end in (self.u - direction, self.u + direction):
             if (end < 0).any() or (end > 1).any():
                 return False

@@ -253,10 +253,10 @@ def _assemble_fit(
 
 
 def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarray, float]:
-    """Move parameters near a bound onto it, unless the sum of squares increases.
+    """Move parameters that are near a bound onto it, and fit the others again, unless the sum of squares increases.
 
-    A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are fitted again.
-    `u` (n,) is a point in the unit cube, and `cost` its sum of squares. The function returns both at the end.
+    A parameter is moved only if the sum of squares decreases towards the bound. `u` (n,) is a point in the unit cube,
+    and `cost` its sum of squares. Returned are both after the move.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
     belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)

@@ -123,6 +123,7 @@ def identify_driven_modes(
     if input_name == "base_acceleration" and response_name == "acceleration":
         response = response - excitation
 
+    # Frequencies, damping ratios and residues of the modes. Residues give the shapes and, under a force, the modal mass.
     modes = fit_driven_modes(step, excitation, response, response_name, band)
     rows, mass, notes = (
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)

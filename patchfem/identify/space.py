@@ -141,7 +141,7 @@ class UnitCubeResidual:
         return np.inf if residual is None else residual @ residual
 
     def evaluate_or_penalize(self, u) -> np.ndarray:
-        """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
+        """Return the residual (r,) at u (n,), or, if the evaluation fails, rows larger than any residual before."""
         residual = self(u)
         if residual is None:
             return np.full(self.rows, FAILED_RESIDUAL_FACTOR * max(self.largest, 1e-300))

@@ -49,9 +49,9 @@ class TaggedMesh(NamedTuple):
     tag_help: str
 
     def select(self, kinds, *tags: str) -> list[TaggedBlock]:
-        """Return the members of the blocks of given kinds, or of other kinds than the plane elements, that have a tag.
+        """Return the cells with one of the tags, block by block: only plane elements, or only lines and vertices.
 
-        `kinds` is `ELEMENTS` for the plane elements, and None for the other ones, which are lines and vertices.
+        `kinds` is `ELEMENTS` for the plane elements, and None for lines and vertices.
         """
         out = []
         for kind, cells, names in self.blocks:
@@ -184,6 +184,7 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
     """
     tagged = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
     used = np.unique(np.concatenate([block.cells.ravel() for block in tagged]))
+    # Coordinates along the interface and depths below it, which are >= 0 in both pieces.
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
     blocks = {}
     is_coating = []

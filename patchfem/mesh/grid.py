@@ -139,7 +139,7 @@ class TensorGrid:
 
     @property
     def cell_positions(self) -> np.ndarray:
-        """Column and row (t, 2) of each cell, by which the grid is divided for its elimination."""
+        """Column and row (t, 2) of each cell, by which condensation to the interface halves the grid into parts."""
         nx, ny = self.shape
         return np.indices((nx - 1, ny - 1)).reshape(2, -1).T
 

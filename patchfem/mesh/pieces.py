@@ -116,7 +116,7 @@ class PieceMesh:
 
     @property
     def cell_positions(self) -> np.ndarray:
-        """Centres of the cells (t, 2) [m], by which the mesh is divided for its elimination."""
+        """Centres of the cells (t, 2) [m], by which condensation to the interface halves the mesh into parts."""
         parts = []
         for kind, cells in self.blocks.items():
             parts.append(self.points[cells[:, : ELEMENTS[kind].n_corners]].mean(axis=1))
@@ -204,9 +204,9 @@ def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
 
 
 def _tag_inner_points(tagged: list[np.ndarray], n_points: int) -> list[np.ndarray]:
-    """Extend `tagged`, a bool (N,) per tag, to `n_points`.
+    """Extend masks of tagged points to `n_points` points; the new ones lie inside the mesh, and have no tag.
 
-    The new points are inside and have no tag.
+    `tagged` has a mask (N,) for each tag.
     """
     return [np.append(part, np.zeros(n_points - part.size, bool)) for part in tagged]
 

@@ -41,11 +41,10 @@ MAX_EFFECTS_CHARACTERS = 160  # largest number of characters of the effects in t
 class MeasuredFile(NamedTuple):
     """File with measured responses that are compared with the results.
 
+    - path: path of the file.
     - gains: factors of the acceleration and of the displacement.
-    - reading: kind of the values.
+    - reading: kind of the values, as `measured.reading` of the scene.
     - cutoff: cut-off frequency [Hz] of the instrument.
-
-    `path` is the file.
     """
 
     path: Path
@@ -55,7 +54,12 @@ class MeasuredFile(NamedTuple):
 
 
 class _SceneLaw(NamedTuple):
-    """Friction law of the first interface of a scene, with the fields of `Model`."""
+    """Friction law of the first interface of a scene.
+
+    - friction: effective keys of the law, or None.
+    - spread: spread [m] of the friction over the pad (2.15), or None.
+    - pad: width [m] of the pad across the path, or None.
+    """
 
     friction: Friction | None = None
     spread: float | None = None

@@ -205,7 +205,7 @@ def end_at_event(q, v, dt, hold, case, now, numbers, memory, j):
 
 @njit(**NJIT_KERNEL)
 def count_halvings(part):
-    """Return after how many halvings a step is shorter than a part of it, which is at least 1."""
+    """Return how often a step must be halved so that it is not much longer than the fraction `part` of it; at least once."""
     count = 1
     while part < 0.5 and count < LEVELS:
         part *= 2
@@ -450,7 +450,7 @@ def add_energies(waves, dt, work, case, start, now):
 
 @njit(**NJIT_KERNEL)
 def find_turn(dt, value, rate, last_value, last):
-    """Return the extreme of a cubic in a step, where its rate, a parabola, is 0.
+    """Return the extreme [m] of the slide in a step, a cubic whose rate is 0 there.
 
     The rates at both ends differ in sign.
 
@@ -514,7 +514,7 @@ def observe_extremes(dt, start, now, seen, observes):
 
 @njit(**NJIT_KERNEL)
 def find_acceleration(sine, q, v, force, case):
-    """Return the absolute acceleration at the output.
+    """Return the absolute acceleration [m s-2] at the output: that of the base plus that of the slide.
 
     Parameters
     ----------
@@ -807,7 +807,7 @@ def observe_forces(dt, work, share, start, now, numbers, j, load, seen):
 
 @njit(**NJIT_KERNEL)
 def start_window(now, seen):
-    """Start the observation of the last cycles."""
+    """Reset `seen`, what is observed of a case, at the start of the last cycles, over which its measures are taken."""
     seen[:] = 0.0
     seen[Seen.MIN_SLIP] = seen[Seen.MAX_SLIP] = now[Now.SLIP]
     seen[Seen.START_SLIDE] = now[Now.SLIDE]
@@ -816,7 +816,7 @@ def start_window(now, seen):
 
 @njit(**NJIT_KERNEL)
 def end_cycle(now, seen, history):
-    """Record extremes and phasor of a cycle, and those that belong to the window.
+    """Write extremes and phasor of a cycle to `history`, and add its range and secant stiffness to `seen`.
 
     Parameters
     ----------

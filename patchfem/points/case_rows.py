@@ -150,7 +150,8 @@ class Cases(NamedTuple):
     """Cases of one mode and one contact point under a sinusoidal drive.
 
     - parameters (c, 12): see `Number`
-    - numbers (k, c), memory (m, c): law and its state at the start, see `return_maps_kernels`
+    - numbers (k, c), memory (m, c): parameters of the friction law and its state at the start, see
+      `return_maps_kernels`
     - reference (c,): stiffness of the first mode at the contact [N/m], 0 if unknown
     """
 

@@ -31,7 +31,7 @@ class CaseMarch(NamedTuple):
 def list_parameters(
     modes: ModalBasis, drive: SineDrive, load, cycles: int, window: int, start=None
 ) -> tuple[float | np.ndarray, ...]:
-    """Return the columns of `Cases.parameters`, in the order of `Number`.
+    """Return the parameters of cases as the columns of `Cases.parameters`, in the order of `Number`.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def make_responses(columns, steps: int) -> np.ndarray:
 
 
 def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
-    """Return the measures (c,) of a sweep row by name.
+    """Return the measures (c,) of cases by name, from what the march has observed.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ _FILES = ContextVar("checkpoint_files", default=None)
 
 @dataclass
 class CheckpointFiles:
-    """Checkpoint files of a run, one for each of its marches.
+    """Checkpoint files of a run, one for each of its marches (time integrations).
 
     - path_of_march: path_of_march(number) -> Path of the file of a march.
     - key: identifies the scene and its numerical settings.
@@ -120,7 +120,7 @@ def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
 
 
 def convert_to_tuples(value, model):
-    """Return nested lists as the nested tuples of a model."""
+    """Return nested lists, as read from JSON, as tuples of the same types as those nested in `model`."""
     if isinstance(model, tuple):
         return type(model)(*map(convert_to_tuples, value, model))
     return value

@@ -39,7 +39,7 @@ class BondSum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PointSet:
-    """Points that act on one port.
+    """Contact points that act on one port, that is, on one displacement of the rig such as the slide of an interface.
 
     - law: laws of the m points under their loads at the start
     - row (n,): displacement of the port per modal coordinate
@@ -103,13 +103,13 @@ class Contact:
 
     @property
     def has_loads(self) -> bool:
-        """Whether the loads of points change."""
+        """Whether the load of a point changes, by the motion, with time, or as it slides."""
         parts = (self.sets, self.load, self.pressure, self.grooves)
         return any(part is not None for part in parts)
 
 
 def make_contact(laws, rows, springs=(), scale: float = 0.0, length: float = 0.0) -> Contact:
-    """Return interfaces under constant loads, and springs.
+    """Return the contact of interfaces under constant loads, one point each, and of springs.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointS
 def make_bond_contact(
     bonds: Bonds, force, row, shear=None, bond_sum: BondSum | None = None, lower=None
 ) -> Contact:
-    """Return points of bonds.
+    """Return the contact of an interface whose points follow the nonlocal law, which sums over bonds.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of 
 
 
 def exponential(matrix, time, powers) -> np.ndarray:
-    """Return exp(time matrix) (..., k, k) for states (k,) of units [s^-powers].
+    """Return the matrix exponential exp(time matrix) (..., k, k) for states (k,) of units [s^-powers].
 
     It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
 

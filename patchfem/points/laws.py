@@ -115,7 +115,7 @@ def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
 
 
 def make_list(bonds: Bonds, load: float) -> PointLaw:
-    """Return a point whose bonds are summed over a list, under a load [N]."""
+    """Return a point under a load [N] whose bonds are kept in a list, over which the friction force is summed."""
     return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
 
 

@@ -19,7 +19,7 @@ MAX_OWED = 1e-4
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _get_list(lists, j):
-    """Return the arrays of the list of point j of a `BondLists` as views."""
+    """Return the arrays of the bonds of point j, as views into those of all points (`BondLists`)."""
     return BondList(
         lists.bondlist, lists.nows[j], lists.statuses[j], lists.law, lists.table, lists.growth
     )

@@ -145,7 +145,7 @@ def sum_triples(first, second, third):
 
 @njit(**NJIT_CALL)
 def copy_memory(numbers, source, target):
-    """Copy the memory (l, m) of all points, without the rows that no stack of reversals uses.
+    """Copy the states of the laws (memory) of all points, without the rows that no stack of reversals uses.
 
     Parameters
     ----------
@@ -167,7 +167,10 @@ def copy_memory(numbers, source, target):
 
 @njit(**NJIT_CALL)
 def is_held(points, p):
-    """Return whether port p is held at rest by a rigid point, which is then the only point on it."""
+    """Return whether port p, a displacement of the rig at which points act, is held at rest by a rigid point.
+
+    A rigid point is the only point on its port.
+    """
     j = points.first[p]
     is_rigid = j < points.first[p + 1] and points.numbers[0, j] == Law.COULOMB
     return is_rigid and points.memory[0, j] == 0
@@ -175,10 +178,11 @@ def is_held(points, p):
 
 @njit(**NJIT_CALL)
 def move_freely(system, level, drive, row, fraction):
-    """Compute the motion in a step without interface forces: row 1 of `system.state`, and four rows of `Port`.
+    """Compute the motion in a step as if no interface acted: row 1 of `system.state`, and four rows of `Port`.
 
-    SLIDE and VELOCITY are those of a port at the start of the step, FREE its increment [m] and FREE_VELOCITY its velocity
-    [m/s] at the end without forces. If the displacement of port 0 is prescribed, these are the prescribed ones.
+    SLIDE and VELOCITY are those of a port at the start of the step, FREE its increment [m] and FREE_VELOCITY its
+    velocity [m/s] at the end without forces. If the displacement of port 0 is prescribed, these are the prescribed
+    ones.
 
     Parameters
     ----------
@@ -716,6 +720,7 @@ def find_loads(system, row, fraction, is_solved):
         pitch = int(ports.contact[1])
         up = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
         turn = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
+        # Slot of the contact set, -1 if none is found. The load is that at rest less the slope of the energy in heave.
         slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
         if slot < 0:
             return -1.0
@@ -835,7 +840,10 @@ def find_holds(system, state, drive):
 
 @njit(**NJIT_CALL)
 def solve_held(system):
-    """Solve grip . x = vector for the ports at rest; the entries of the other ports are given values of x."""
+    """Solve grip . x = vector for the ports at rest, in place in `ports.vector`.
+
+    `grip` is the acceleration of ports per force. The entries of the other ports are given values of x.
+    """
     ports = system.ports
     points = system.points
     n_ports = ports.values.shape[1]

@@ -359,7 +359,7 @@ def _first_loading(numbers, j, x):
 
 @njit(**NJIT_CALL)
 def _walk(numbers, memory, j, dq, commits):
-    """Return force and mean force of parallel sliders over dq by Masing's and Madelung's rules.
+    """Return force at the end and mean force [N] of parallel sliders over an increment dq, by Masing's and Madelung's rules.
 
     A branch from a reversal (q_r, F_r) is F = F_r + 2 d B(d (q - q_r)/2) with the force B of first loading. It ends
     where it meets the start of the branch before. Entries of the stack from COUNT on may be overwritten.
@@ -518,6 +518,7 @@ def advance(numbers, memory, j, load, step):
             memory[1, j] = load + (springs - load) * exp(-slipped * abs(dq) / numbers[2, j])
 
     elif law == Law.BONDS:
+        # Moments of the bonds after the increment; growing bonds then get their new length (eq. 2.10).
         bonds = bond_step(memory[1, j], memory[2, j], memory[3, j], dq, load, memory[4, j])
         memory[1, j] = bonds.m
         memory[2, j] = bonds.z
@@ -600,7 +601,7 @@ def read(numbers, memory, j, load):
 
 @njit(**NJIT_CALL)
 def slip_share(numbers, memory, j, load, velocity):
-    """Return the part of the motion of point j that is irreversible at this instant, d(slide - stretch)/d(slide).
+    """Return the fraction of the motion of point j that is irreversible at this instant, d(slide - stretch)/d(slide).
 
     Parameters
     ----------

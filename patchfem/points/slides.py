@@ -75,11 +75,13 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         np.concatenate([np.arange(0, last, BLOCK), np.asarray(frames, int), changes, [last]])
     )
 
+    # A row has energies and loads, and of each port the force, the slip and the mean force of the next step.
     width = Sample.PORTS + N_PORT_COLUMNS * len(contact.point_sets)
     rows = np.zeros((slide.size, width))
     snapshots = []
 
     for begin, end in pairwise(ends):
+        # The slide is prescribed on the first port, so that the march has a path in place of a drive.
         size = end - begin
         structure = system.structure._replace(
             path=slide[begin : end + 1].copy(), drive=np.zeros((size + 1, 3))
@@ -92,6 +94,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         step = float(time[end] - time[begin]) / size
         options = system.options._replace(step=step if step > 0 else 1.0)
         system = system._replace(structure=structure, options=options)
+        # march_with_room writes the samples, and returns the system at the end, with longer lists of bonds if needed.
         samples = np.zeros((size + 1, width))
         place = f"after sample {begin} of the prescribed slide"
         system = march_with_room(kernels, system, samples, place).system

@@ -429,7 +429,10 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 
 
 def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
-    """Return the columns (n_rows, m) of all points from the rows of each law, (k,) for one point or (k, c), k <= n_rows."""
+    """Return the columns (n_rows, m) of all points, from the rows of each law; missing rows are 0.
+
+    The rows of a law, k of them with k <= n_rows, are (k,) for one point and (k, c) for c points.
+    """
     columns = [part.reshape(len(part), -1) for part in parts]
     padded = [np.pad(part, ((0, n_rows - len(part)), (0, 0))) for part in columns]
     return np.hstack([np.zeros((n_rows, 0)), *padded])
@@ -485,7 +488,7 @@ def _make_flank(contact: Contact) -> np.ndarray:
 
 
 def _make_no_sets():
-    """Return contact sets of a point that is not used."""
+    """Return arrays of contact sets with a single point, for a march in which no pressure changes and none is used."""
     point = np.zeros(1)
     return make_set_arrays(
         np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1
@@ -493,7 +496,7 @@ def _make_no_sets():
 
 
 def _press_first(system: System, contact: Contact) -> None:
-    """Find the contact set at the start."""
+    """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
     press = compiled.load_compiled_module("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
@@ -523,7 +526,7 @@ def _climb_first(system: System, contact: Contact) -> None:
 
 
 def copy_system(system):
-    """Return a copy of nested tuples of arrays."""
+    """Return a copy of nested tuples of arrays, in which the arrays are copied too."""
     if isinstance(system, np.ndarray):
         return system.copy()
     if isinstance(system, tuple):
@@ -1099,7 +1102,11 @@ class Record:
             self.phasors.append(2 / max(end - begin, 1) * phasor)
 
     def _keep(self, part: np.ndarray) -> None:
-        """Keep all rows of the parts within a window of the last one, and of older parts those at equal distances."""
+        """Add a part to the rows that are kept.
+
+        All rows of the parts within a window of the last row stay. Of older parts only rows at equal distances stay, or
+        none.
+        """
         self.recent.append(part)
         window_start = part[-1, NUMBER] - self.n_window
         while len(self.recent) > 1 and self.recent[1][0, NUMBER] <= window_start:
@@ -1207,6 +1214,7 @@ def make_histories(run: March, rows) -> Response:
     time = run.find_times(rows[:, NUMBER])
     n = modes.omega.size
 
+    # Columns of a row: coordinates, rates, energies and loads (`Sample`), then force, slip and mean force of each port.
     z = rows[:, :n]
     rate = rows[:, n : 2 * n]
     first = 2 * n + Sample.PORTS
@@ -1215,6 +1223,7 @@ def make_histories(run: March, rows) -> Response:
     columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
     port_rows = np.array([point_set.row for point_set in sets], float).reshape(len(sets), n)
 
+    # Forces on the modal coordinates, energies, and the state of the normal contact.
     push = run.drive.values(time)
     forces = columns[..., 0]
     pull = forces @ port_rows
@@ -1229,6 +1238,7 @@ def make_histories(run: March, rows) -> Response:
         change = press[:, :2] - [contact.sets.load, contact.sets.moment]
         pull = pull - change @ np.array([contact.heave, contact.pitch])
 
+    # Relative displacement and velocity of each port; several interfaces have histories of their own.
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
     is_interface = np.array([not point_set.is_spring for point_set in sets], bool)
@@ -1237,6 +1247,7 @@ def make_histories(run: March, rows) -> Response:
         if is_interface.any():
             extra |= {name: part[:, is_interface] for name, part in parts.items()}
 
+    # A lifted mass m adds m z'' to the load, with z'' = t q'' + t' q'^2 on a flank of slope t(q).
     grooves = contact.grooves
     if grooves is not None and grooves.lifted_mass:
         sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
@@ -1245,6 +1256,7 @@ def make_histories(run: March, rows) -> Response:
         extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
 
     if is_interface.any():
+        # The first interface has the histories of force and slip.
         face = int(np.flatnonzero(is_interface)[0])
         interface = slides[:, face], rates[:, face], forces[:, face], columns[:, face, 1]
     else:

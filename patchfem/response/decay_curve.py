@@ -73,13 +73,13 @@ class DecayCurve(NamedTuple):
     damping_error: np.ndarray
 
     def select(self, selection) -> "DecayCurve":
-        """Return the curve at selected points."""
+        """Return the curve at the points of an index array or a mask."""
         return DecayCurve(*(column[selection] for column in self))
 
     def interpolate(self, name: str, amplitudes) -> np.ndarray:
-        """Interpolate a column linearly in the logarithm of the amplitude (k,) [m].
+        """Interpolate a column, such as "frequency", at amplitudes (k,) [m].
 
-        The result is NaN outside the range of the curve.
+        It is linear in the logarithm of the amplitude, and NaN outside the range of the curve.
         """
         knots, indices = np.unique(np.log(self.amplitude), return_index=True)
         if not knots.size:
@@ -89,9 +89,10 @@ class DecayCurve(NamedTuple):
         return np.where(inside, np.interp(x, knots, getattr(self, name)[indices]), np.nan)
 
     def add_change(self, coarse: "DecayCurve", reference: "DecayCurve") -> "DecayCurve":
-        """Return the curve with the errors that follow from the change of a coarser run at the same amplitudes.
+        """Return the curve with larger errors, by the change from a coarser run to the run with which it is compared.
 
-        They are of second order, and infinite where either curve has no value.
+        `coarse` and `reference` are the curves of both runs. The error of a method of second order follows from their
+        difference at the same amplitudes; it is infinite where either curve has no value.
         """
         errors = {}
         for name in ("frequency", "damping"):
@@ -258,7 +259,7 @@ class Slopes(NamedTuple):
     span: np.ndarray
 
     def select(self, selection) -> "Slopes":
-        """Return the slopes at selected points."""
+        """Return the slopes at the points of an index array or a mask."""
         return Slopes(*(column[selection] for column in self))
 
 
@@ -323,7 +324,7 @@ def fit_slopes(values, noise) -> Slopes:
 
 
 def _add_damping_error(curve: DecayCurve) -> DecayCurve:
-    """Add the error due to the decay within a half cycle to the errors of a curve.
+    """Add the error that the decay of the amplitude within a half cycle causes to the errors of a curve.
 
     Half the size of a half cycle is cosh(delta/2) times the amplitude at its midpoint, where delta is the
     logarithmic decrement per half cycle. The error is the change of the curve over this difference of

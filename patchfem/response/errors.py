@@ -185,7 +185,7 @@ def estimate_sampling_errors(values: Values) -> Values:
 
 
 class FrictionScale(NamedTuple):
-    """Reference values by which a relative force error is multiplied to obtain absolute errors.
+    """Reference values that turn a relative error of the friction force into absolute errors of measures.
 
     - static: coefficient of static friction [1].
     - limit: friction limit [N].

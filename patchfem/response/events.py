@@ -37,7 +37,10 @@ class Events(NamedTuple):
 
 
 def sort_events(rows) -> Events:
-    """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time."""
+    """Return the last MAX_KEPT_EVENTS events in the order of time.
+
+    Each of the rows has time [s], number of the interface, index of EVENT_KIND_NAMES and relative displacement [m].
+    """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_KEPT_EVENTS:]
     time, interface, kind, slide = rows.T.copy()

@@ -54,7 +54,11 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
-    """Return the reason why no onset of slip was found in a sequence of drive levels."""
+    """Return the sentence why no level of a drive reached its onset, which is of a given kind.
+
+    The onset is the first level with slip ("slip"), with an amplitude above `length` [m] at the output ("gauge"), or with a
+    third harmonic of the acceleration (other kinds).
+    """
     event = f"has an acceleration whose third harmonic is more than {MIN_SLIP_DISTORTION:g} of its first harmonic"
     if kind == "slip":
         event = "slips"

@@ -44,7 +44,10 @@ def cycle_spans(time, period: float) -> list[tuple[float, float]]:
 
 
 def reversal_force_rule(model) -> str:
-    """Return which rule of `find_reversals` gives the friction force at a reversal."""
+    """Return by which rule `find_reversals` takes the friction force at a reversal: "jumps", "rate" or "slide".
+
+    The force of the law jumps there, changes with time also at rest, or depends on the relative displacement alone.
+    """
     law = model.friction.law
     friction = None if model.rig is None else model.rig.friction
     soft = model.partial_slip or (friction is not None and friction.interfaces[0].partial_slip)

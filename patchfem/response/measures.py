@@ -176,14 +176,14 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
 
 def slip_round_off(window: Response) -> float:
-    """Return the round-off error of the slip [m]."""
+    """Return the slip [m] in the window of a run that may be round-off of the modal coordinates."""
     return MODAL_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start_measure(phases) -> Values:
-    """Return the mean phase of the drive [rad] at the onsets of slip, as a dict.
+    """Return the mean of the drive phases (k,) [rad] at which slip starts, by the name of this measure.
 
-    The dict is empty if the onsets have different phases.
+    The dict is empty if the phases differ.
     """
     phase = path_work.mean_slip_phase(
         len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()

@@ -141,7 +141,7 @@ def judge_outcome(
 
 
 def _count_window_cycles(solution, drive) -> int:
-    """Return the number of cycles in the window of a run."""
+    """Return the number of drive cycles in the window of a run, the last part from which its measures follow."""
     time = solution.window.time
     return max(1, round((time[-1] - time[0]) / drive.period))
 
@@ -164,9 +164,9 @@ def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
 
 
 def _has_drift(measures: Measures, tolerance: float, window_drift: float) -> bool:
-    """Return whether the midpoint of the motion drifts.
+    """Return whether the midpoint of the motion moves on from cycle to cycle.
 
-    It drifts if both the drift from cycle to cycle (`drift_per_cycle`) and the drift from window to window
+    It does if both the drift from cycle to cycle (`drift_per_cycle`) and the drift from window to window
     (`window_drift`, [m] per cycle) exceed the relative tolerance of the run. On a belt, a window contains complete
     stick-slip cycles, whereas a cycle of the drive does not.
     """

@@ -160,7 +160,7 @@ def _make_missing_measure(name: str, reason: str) -> Measure:
 
 
 def find_missing_unbounded(values) -> Measures:
-    """Return all measures except the load without values, for an unbounded motion."""
+    """Return the measures of a motion that grows without bound: all lose their values except the normal load."""
     out = {}
     for name, measure in values.items():
         out[name] = replace(measure, value=None, error=None, reason=UNBOUNDED_REASON)

@@ -87,7 +87,7 @@ class LastCycles:
 
     @cached_property
     def reversals(self) -> list[tuple[Reversal, ...]]:
-        """Smallest and largest `Reversal` of the displacement in each complete cycle."""
+        """Reversal at the smallest and at the largest displacement in each complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
         w = self.window
@@ -138,7 +138,7 @@ class LastCycles:
         )
 
     def evaluate(self, row: MeasureDefinition) -> float | None:
-        """Return the value of a measure by its row in the table, in the unit of the row.
+        """Return the value of the measure that a row of the table defines, in the unit of the row.
 
         None if it has no value: measures with the flag "sine" have none under a drive that is no sine.
         """
@@ -149,7 +149,7 @@ class LastCycles:
         return row.function(self)
 
     def further_interfaces(self) -> "list[LastCycles]":
-        """Return the last cycles of each interface after the first one."""
+        """Return the last cycles of each interface after the first one, as if it were the only interface."""
         whole = self.window
         if self.load is None or self.is_single_interface:
             return []
@@ -585,7 +585,7 @@ MOTION_TABLE = {row.name: row for row in (*MOTION_MEASURE_ROWS, *INTERNAL_ROWS)}
 
 
 def select_names(flag: str) -> tuple[str, ...]:
-    """Return the names of the measures of a motion that belong to a set, in the order of the table."""
+    """Return the names of the measures whose row of the table has a flag, such as "main" or "loop"."""
     return tuple(row.name for row in MOTION_TABLE.values() if row.has(flag))
 
 
@@ -626,16 +626,17 @@ def add_interface_number(name: str, number: int) -> str:
 
 
 def error_floor(name: str, size=np.inf):
-    """Return the floor of the error of a measure of any interface, in the unit of the measure.
+    """Return the floor of the error of a measure: the magnitude below which it is round-off, in the unit of the measure.
 
     The floor of a displacement is at most MAX_DISPLACEMENT_FLOOR times `size`.
 
     Parameters
     ----------
     name : str
-        Name of the measure, with the number of an interface.
+        Name of the measure, which may end in the number of an interface, such as "slip_amplitude_2".
     size : float or (n,)
-        Displacement caused by the drive alone [m]. With 0 or inf the floor of a displacement is that of the table.
+        Expected displacement of the motion [m], for n cases. With 0 or inf the floor of a displacement is that of the
+        table.
     """
     definition = find_definition(name)
     floor = definition.floor
@@ -673,8 +674,9 @@ def larger_term(name: str, values: Values):
 
 
 def set_final_floors(measures: Measures, tolerance: float) -> Measures:
-    """Return measures with error floors of at least `tolerance` times the terms of a difference.
+    """Return measures whose error floors are large enough for differences of large numbers.
 
+    The floor of a measure that is a difference, such as a drift, is at least `tolerance` times the larger of its terms.
     The INTERNAL_VALUES among the measures are used and left out.
     """
     values = {name: measure.value for name, measure in measures.items()}

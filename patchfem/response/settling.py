@@ -157,10 +157,10 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
 
 
 def geometric_remainders(values):
-    """Return the remaining sums of geometric series through three values (Aitken's method).
+    """Return what is left of geometric series through three successive values (..., 3), by Aitken's method.
 
-    The sum is the difference between the limit of the series and the last of three successive values
-    (..., 3). It is NaN if the series does not converge. A beat is a series with a complex ratio.
+    It is the difference between the limit of the series and the last value, or NaN if the series does not converge. A beat
+    is a series with a complex ratio.
     """
     previous_change = values[..., 1] - values[..., 0]
     change = values[..., 2] - values[..., 1]
@@ -287,7 +287,7 @@ class Windows(NamedTuple):
 
     @property
     def excess(self) -> np.ndarray:
-        """Excess (..., w) [m] of the amplitude over that of the cycles: a beat that is shorter than the window."""
+        """Amplitude of each window minus the mean amplitude of its cycles (..., w) [m], which a beat makes positive."""
         return self.amplitude - self.cycle_amplitude
 
     def find_drift(self, window: int):

@@ -210,7 +210,7 @@ def is_stationary(window, drive) -> bool:
 
 
 def transform_record(record: Record) -> Segments:
-    """Return the transforms of drive, displacement and acceleration in segments of a record."""
+    """Return the Fourier transforms of drive, displacement and acceleration of a record, in overlapping segments."""
     size = max(
         min(MIN_SEGMENT_SAMPLES, record.displacement.size),
         2 * (record.displacement.size // (2 * SEGMENTS_PER_RECORD)),
@@ -219,7 +219,7 @@ def transform_record(record: Record) -> Segments:
 
 
 def compute_spectra(window, drive) -> Spectra:
-    """Compute the spectra of a window, up to twice the highest frequency of the drive."""
+    """Compute the spectral densities of a window under a random drive, up to twice the highest frequency of the drive."""
     frequency, (inputs, outputs, acceleration_transforms) = transform_record(
         make_record(window, drive)
     )
@@ -330,7 +330,10 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     constants = np.repeat(np.eye(2), f.size, axis=0)
 
     def compute_residual(theta):
-        """Return the relative residual of H1, with optimal amplitude and constant."""
+        """Return the residual of a single mode with the logarithms `theta` of frequency and damping, relative to H1.
+
+        The amplitude of the mode and a constant are those of least squares.
+        """
         response = expected_response(f, *np.exp(theta), span)
         basis, _ = np.linalg.qr(
             np.column_stack([np.concatenate([response.real, response.imag]), constants])

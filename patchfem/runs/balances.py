@@ -39,7 +39,11 @@ def mark_unbalanced(result: Result) -> Result:
 
 
 def _check_load(result: Result) -> Iterator[str]:
-    """Compare the load of the scene with the integral of the pressure over the interface."""
+    """Yield a warning if the integral of the pressure over the interface differs from the load of the scene.
+
+    Both are in [N], and LOAD_BALANCE_TOL is the largest difference relative to the load. A load that varies has no single
+    integral, and is not checked.
+    """
     model = result.plan.model
     patch = result.patch
     if patch is None or model.load_varies or not model.patch.loading.load:
@@ -57,9 +61,11 @@ def _check_load(result: Result) -> Iterator[str]:
 
 
 def _check_energy(result: Result) -> Iterator[str]:
-    """Compare the residual of the energy balance of a bench or a march with zero.
+    """Yield a warning if energy is missing or was created in a bench or in a run with equal time steps.
 
-    Work = change of the stored energy + dissipated - created. Other engines have the residual as an error.
+    The measure `energy_balance` is |work - change of the stored energy - dissipated energy|, divided by the exchanged
+    and the largest stored energy [1]. In the other engines it is no check, because it enters the errors of the
+    measures.
     """
     residual = result.measures.get("energy_balance")
     if residual is None or residual.value is None:

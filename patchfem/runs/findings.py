@@ -61,7 +61,7 @@ class Missed(NamedTuple):
     excess: Mapping[str, float]
 
     def find_names(self) -> list[str]:
-        """Return the measures that a warning names.
+        """Return the names of the measures that a warning mentions; the others are only counted.
 
         These are the main measures whose error is smaller than their value; if there are none, the measure with the
         largest ratio of error to allowed error.
@@ -78,7 +78,7 @@ class Missed(NamedTuple):
         return max(self.find_names(), key=self.excess.get)
 
     def is_time_short(self, axis: str) -> bool:
-        """Return whether accuracy.max_seconds ended the refinement along an axis."""
+        """Return whether accuracy.max_seconds ended the refinement along an axis, such as "mesh" or "steps"."""
         shortage = self.result.shortage
         return shortage is not None and shortage.axis == axis
 
@@ -115,7 +115,11 @@ def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Findin
             excess[name] = ratio
 
     def find_on_face(face: Face) -> list[Finding]:
-        """Return the findings on one interface, whose measures have no number there."""
+        """Return the findings on the static measures of one interface, and remove these measures from `excess`.
+
+        The result numbers the measures of all interfaces after the first one (`Face.name_measure`), but the sentences on one
+        interface do not.
+        """
         numbered = {name: face.name_measure(name) for name in patch_rows.PATCH_TABLE}
         own = {name: measures[full] for name, full in numbered.items() if full in measures}
         missed = {name: excess.pop(full) for name, full in numbered.items() if full in excess}
@@ -131,14 +135,17 @@ def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Findin
 
 
 def _format_error(measure) -> str:
-    """Format the relative error of a measure."""
+    """Format the error of a Measure relative to its value, or say that it is at least as large."""
     if abs(measure.error) < abs(measure.value):
         return f"{abs(measure.error / measure.value):.2g} of its value"
     return f"at least its value ({measure})"
 
 
 def _find_static(missed: Missed) -> list[Finding]:
-    """Return the findings on the static measures of one interface, with the advice to split its trace."""
+    """Return the findings on the static measures of one interface: their advice, and that to split its profile.
+
+    The waves of a profile that the mesh does not resolve can be represented by a layer of asperities instead.
+    """
     from .patch import trace_split
 
     (face,) = missed.faces
@@ -178,7 +185,11 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
 
 
 def _advise_strips(patch_model, excess: Mapping) -> Advice:
-    """Return the advice to use as many strips as second order requires, at least twice as many."""
+    """Return the advice to divide the width of a patch into more strips, at least twice as many.
+
+    The error falls with the square of the number of strips. `excess` has the ratio of error to allowed error [1] of each
+    measure that misses the tolerance.
+    """
     ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_CONVERGENCE_ORDER))
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_PROPOSED_STRIPS:
@@ -225,7 +236,10 @@ def _advise_mesh(
 
 
 def _advise_time(missed: Missed, purpose: str, cause: str = "") -> Advice:
-    """Return the advice to allow the CPU time that further passes need, for a purpose and after a clause on the cause."""
+    """Return the advice to raise accuracy.max_seconds to the CPU time that a finer run needs.
+
+    `purpose` says what the time is for, such as "smaller time steps". `cause` is a clause at the beginning of the advice.
+    """
     # The proposed time has two significant digits.
     seconds = MAX_SECONDS_MARGIN * missed.result.shortage.seconds
     unit = 10.0 ** (floor(log10(seconds)) - 1)
@@ -255,7 +269,11 @@ def _advise_on_motion(missed: Missed) -> Advice:
 
 
 def _advise_steps(missed: Missed) -> Advice | None:
-    """Return the advice to use as many steps per cycle as second order requires, or to leave out what fixes too few."""
+    """Return the advice that reduces the error of the time steps; None for an engine without equal steps.
+
+    The error falls with the square of the step. If the scene fixes the engine or the steps of a rig, and they are far
+    too few, the advice is to leave out these keys; otherwise it is a larger number of steps per cycle.
+    """
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
@@ -277,7 +295,10 @@ def _advise_steps(missed: Missed) -> Advice | None:
 
 
 def _advise_motion_mesh(missed: Missed) -> Advice | None:
-    """Return the advice to refine the meshes of the interfaces that slip part by part, or of the only patch."""
+    """Return the advice to refine the meshes on which the motion depends; None if there are none.
+
+    These are the meshes of the interfaces in which some nodes stick while others slip, or that of the only patch.
+    """
     solved = [
         (face.model.patch, face.unworn or face.patches)
         for face in missed.faces

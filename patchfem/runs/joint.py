@@ -116,7 +116,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
         builders = (bolted.build_rig, bolted.build_stiffer_rig or bolted.build_rig)
 
         def subtract(n_errors: int) -> FreeRig:
-            """Subtract the joint with its stiffness (0) or with one that is larger by its error (1)."""
+            """Return the rig without its joint, whose stiffness is the computed one (0) or larger by its error (1)."""
             own_patches = _match_stiffness(patches, own, n_errors)
             rig = builders[n_errors](stiffnesses[n_errors])
             removed = bolted._replace(
@@ -152,9 +152,9 @@ def find_bolted_stiffness(model: Model, patches: Sequence) -> tuple[float, float
 
 
 def compute_full_stick_stiffness(model: Model, patch) -> float:
-    """Return the tangential stiffness [N/m] of a patch in full stick; 0 without contact.
+    """Return the tangential stiffness [N/m] of a patch of which no point slips; 0 without contact.
 
-    It includes the shear of the pieces, asperities, holder and the stiffness of the friction law.
+    It is that of the pieces in shear, the asperity layer, the spring of the holder and the friction law, in series.
     """
     load = patch.pressure.load
     if not load > 0:
@@ -165,7 +165,10 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
 
 
 def _find_bond_length(model: Model, load: float) -> float:
-    """Return the bond length [m] of the law of a patch under a load [N]; 0 for a law that is rigid in stick."""
+    """Return the displacement [m] over which the friction law of a patch reaches its limit; 0 if it is rigid in stick.
+
+    It is the friction limit under the load [N] over the stiffness of the law in stick.
+    """
     stiffness = record.stick_stiffness(model.friction, load)
     if np.isfinite(stiffness) and not law_has_trait(model.friction.law, "set-valued"):
         stiffness = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)

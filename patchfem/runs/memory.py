@@ -98,9 +98,10 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
 
 def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
-    """Return the contributions of modes, drive and histories of a rig; a list of bonds is limited.
+    """Return the contributions of the modes, the drive and the stored histories of a rig to its memory.
 
-    `has_steps` tells whether the scene sets the steps per cycle.
+    `has_steps` tells whether the scene sets the steps per cycle. Lists of bonds are not counted, because their length is
+    limited.
     """
     model = plan.model
     drive = model.rig.drive
@@ -186,9 +187,9 @@ def _read_allowed(group: Path) -> float:
 
 
 def _read_number(path: Path, name: str = "", place: int = 0) -> float:
-    """Return a word of a file as a number, or nan if there is none.
+    """Return a number of a text file of the operating system, or nan if the file or the number does not exist.
 
-    It is the word after `name`, or without a name that with the index `place`. The file is one of the operating system.
+    It is the word after `name`, or without a name the word with the index `place`.
     """
     try:
         words = path.read_text("ascii").split()

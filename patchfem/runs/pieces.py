@@ -152,9 +152,10 @@ def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
 
 
 def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
-    """Return the fields of a piece whose holder moves by `held` (f, n, 2) [m].
+    """Return the fields of a piece in the coordinates of the patch, with the motion of its holder.
 
-    `other_error` is the error of the stress of the other piece, which counts in the norm of both.
+    `held` (f, n, 2) [m] is the displacement of the points by their holder in each frame. `other_error` is the stress error
+    of the other piece, because the relative error refers to the energy of both pieces.
     """
     flip = np.array([1.0, piece.sign])
     return PieceFields(

@@ -98,7 +98,10 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: "of_rig.Chain") -> list[dict[str, str | float | None]]:
-        """Return name, free and stuck frequency [Hz] of each mode of a rig."""
+        """Return name, free and stuck frequency [Hz] of each mode of a rig.
+
+        `chain` has the stiffnesses [N/m] in series between modes and interface (`Plan.chain`).
+        """
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict[str, Any]:
@@ -231,7 +234,10 @@ def _subtract_joint(model: Model) -> tuple[Model, Values]:
 
 
 def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
-    """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
+    """Return the stiffnesses [N/m] of the grooves and of the friction laws in stick, by name; {} without a load.
+
+    The names are "grooves", "bonds" for the law of the first interface, and "bonds_2", ... for the others.
+    """
     load = model.nominal_load
     if not load > 0:
         return {}
@@ -255,7 +261,10 @@ def _law_stiffness(law, load: float):
 
 
 def _compute_law_groups(model: Model) -> Values:
-    """Return the dimensionless groups of the friction law by name."""
+    """Return {"share_of_the_spread": fraction}, or {} for a law whose bonds do not spread over the surface.
+
+    The fraction [1] of the friction force acts on the pad; the bonds carry the rest beyond its edges.
+    """
     if model.spread is None:
         return {}
 

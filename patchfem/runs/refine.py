@@ -147,14 +147,17 @@ def refine(
 
 
 def split_error(measure: Measure, name: str) -> Values:
-    """Return the contributions to the error of a measure by axis; that of a static measure is the mesh."""
+    """Return the parts of the error of a measure by axis, such as "mesh" or "steps"; static measures have "mesh" alone."""
     if name in PATCH_TABLE:
         return {"mesh": measure.error or 0.0}
     return measure.parts or {}
 
 
 def find_axis(measure: Measure, name: str) -> str:
-    """Return the axis with the largest share of the error of a measure, such as "mesh"; "own" if none is known."""
+    """Return the discretization that contributes most to the error of a measure, such as "mesh", "steps" or "modes".
+
+    It is "own" if no contribution is known.
+    """
     parts = split_error(measure, name)
     axis = max(parts, key=parts.get, default="own")
     return axis if parts.get(axis, 0.0) > 0 else "own"
@@ -225,6 +228,7 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     result = done.result
     if result.outcome in FAILED_OUTCOMES:
         return Verdict(0.0)
+    # Axes along which a run of this kind may be repeated, "mesh" or "steps".
     axes = list_repeated_axes(
         model.kind,
         has_wear=model.wear is not None,
@@ -235,6 +239,8 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     if result.patch is not None and result.patch.points is not None:
         # The mesh has no effect on static measures at the points of a profile.
         main = {name: one for name, one in main.items() if name not in PATCH_TABLE}
+
+    # Largest ratio of error to allowed error, and the axis that causes it. No pass follows one that hardly reduced it.
     excess, name, axis = find_worst_measure(main, model.accuracy.tolerance, axes)
     if not axis or (excesses and excess * MIN_PASS_ERROR_GAIN > excesses[-1]):
         return Verdict(excess)
@@ -242,6 +248,8 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     if finer is None:
         return Verdict(excess)
+
+    # Words, cost and largest number of further passes, for a finer mesh or for more steps.
     resolution = "half the element size"
     cost_ratio = HALVED_MESH_COST_RATIO
     max_passes = inf
@@ -282,7 +290,7 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
 
 
 def is_main(name: str) -> bool:
-    """Return whether a run is refined until this measure meets the tolerance; warnings are about all measures."""
+    """Return whether a measure is one of those for whose sake a run is refined; warnings are about all measures."""
     row = PATCH_TABLE.get(name) or rows.MOTION_TABLE.get(name)
     return row is not None and row.has("main")
 
@@ -324,7 +332,7 @@ def _refine_mesh(patch_model):
 
 
 def _can_refine(patch_model) -> bool:
-    """Return whether the mesh of a patch follows from the tolerance and belongs to this run alone."""
+    """Return whether the program chooses the mesh of a patch, and for this run alone: not the scene, and no sweep."""
     return (
         patch_model is not None
         and patch_model.mesh.is_automatic

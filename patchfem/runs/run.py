@@ -124,8 +124,14 @@ class _Passes:
     ----------
     run_plan : Plan
         Plan of the first pass.
-    say, progress, state_file, estimate
-        Options of `run`.
+    say : callable or None
+        Called with each line of text on what the run does.
+    progress : callable or None
+        Called with the completed fraction of the run [1].
+    state_file : StateFile or None
+        File to which a long run saves its state; None to save nothing.
+    estimate : bool
+        Whether to estimate the errors of the measures from coarser runs.
 
     Attributes
     ----------
@@ -230,7 +236,10 @@ class _Passes:
         return mark_unbalanced(result), pressed
 
     def _move(self, inputs: RunInputs) -> tuple[Result, tuple[Face, ...]]:
-        """Wear the patch of a run and compute its motion; return the result and the worn interfaces."""
+        """Compute the wear of the patch, if the scene has [wear], and then the motion on the worn patch.
+
+        Returns the result, and the pressed interfaces with their worn surfaces.
+        """
         run_plan = inputs.plan
         worn_patch = None
         moved = inputs
@@ -318,7 +327,7 @@ def _press_interfaces(
 
 
 def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
-    """Return a Result with the static measures of interfaces before those of the motion."""
+    """Return a Result that begins with the static measures of all pressed interfaces, such as their peak pressures."""
     static: Measures = {}
     for face in pressed:
         patch, *coarse = face.patches
@@ -431,7 +440,7 @@ def _complete_result(done: FinishedPass) -> Result:
 
 
 def _note_on_yielding_faces(result: Result) -> "dict[strength.Strength, str]":
-    """Return notes on surfaces that yield at the pressure peak minus its error."""
+    """Return the notes on surfaces that yield under the peak pressure minus its error, by the Strength that is exceeded."""
     peak = result.measures.get("pressure_peak")
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:

@@ -48,7 +48,7 @@ _CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 
 class Form(NamedTuple):
-    """What an option accepts after ``table.key=``.
+    """Form of the text after ``table.key=`` that an option of a command accepts.
 
     - option: name of the option in messages.
     - usage: what messages say is needed, with an example.
@@ -79,7 +79,7 @@ BOUNDS_FORM = Form(
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Swept key with its values.
+    """Key of a scene that a sweep varies, with its values.
 
     - key: dotted key of the scene.
     - texts: values as a scene writes them.
@@ -103,7 +103,7 @@ class Range:
     """Key with the range in which its value is drawn or fitted, or over which the values of a sweep are spread.
 
     - key: dotted key of the scene.
-    - low, high: ends in SI; `low` is the first one.
+    - low, high: ends in SI; `low` is the end that is written first.
     - kind: kind of quantity; None for a plain number.
     - ends: both ends in `written_unit`, "" for plain numbers; () if the range was not written.
     - count: number of values; 0 if none is given.
@@ -144,7 +144,7 @@ class Range:
         return f"{self.key}={text}"
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
-        """Return the key with the values at the given fractions of its range."""
+        """Return the key with its values at fractions of the range, from 0 (`low`) to 1 (`high`)."""
         texts = self.format_values(fractions)
         values = array("d", map(_ValueReader(self.key, texts).read, texts))
         return Axis(self.key, texts, values, self.unit)
@@ -258,7 +258,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
 
 
 def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
-    """Parse the values of a key.
+    """Parse the values of a key, which the text of an option lists or gives as a range.
 
     Parameters
     ----------
@@ -268,6 +268,11 @@ def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
         The values as an option writes them.
     form : Form
         What the option accepts.
+
+    Returns
+    -------
+    Axis or Range
+        A Range for a range without a number of values, else an Axis with the values.
 
     Raises
     ------
@@ -350,9 +355,9 @@ class _ValueReader:
         return number
 
     def list_values(self, piece: str) -> list[str]:
-        """Return the values that one part between the commas of a list stands for, as a scene writes them.
+        """Return the values of one part of a list, as a scene writes them.
 
-        `piece` is such a part: a range ``1..9 mm:5`` stands for its values, any other text for itself.
+        `piece` is the text between two commas: a range ``1..9 mm:5`` stands for its values, any other text for itself.
         """
         if not piece:
             raise ValueError("there is no value between two commas")
@@ -391,9 +396,9 @@ class _ValueReader:
         return Range(self.key, low, high, kind, ends, unit, int(count or 0), is_log)
 
     def check_range(self, spread: Range, form: Form) -> None:
-        """Raise ValueError for a range, `spread`, in which the key cannot vary.
+        """Raise ValueError if the values of the key cannot lie anywhere between the ends of a range, `spread`.
 
-        `form` is what the option accepts. Without lists of values the range gives a lower and an upper bound.
+        `form` is what the option accepts. Without lists of values the ends of the range are a lower and an upper bound.
         """
         if not self.takes_float:
             raise ValueError(
@@ -413,9 +418,9 @@ class _ValueReader:
 
 
 def _find_value_key(key: str, texts: Sequence[str]) -> Key:
-    """Find a key to which values can be assigned.
+    """Return the Key with a given dotted key, to which values can be assigned.
 
-    `texts` are these values as written. ValueError, with suggestions, is raised if the key is not known, or if it is a
+    `texts` are these values as written. ValueError, with suggestions, is raised if no scene has the key, or if it is a
     table without a value.
     """
     first = texts[0].partition("..")[0] if texts else ""

@@ -44,7 +44,7 @@ def complete_table(table: Table) -> Table:
 
 
 def _complete_inner_tables(table: Table) -> dict[str, KeyValue]:
-    """Return the tables inside a table that differ after their completion, by attribute."""
+    """Return those tables inside a table that change when their defaults are filled in, by attribute."""
     changed = {}
     for key in list_keys(type(table)).values():
         value = getattr(table, key.attribute)
@@ -81,9 +81,10 @@ def _list_idle_keys(table: Table) -> list[str]:
 
 
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
-    """Return a mode whose participations are filled in.
+    """Return a mode in which each participation that the scene leaves out has its default.
 
-    `index` counts the modes from 0. The participations of the first mode have other defaults.
+    A participation is the motion of a place, such as the output or the accelerometer, per unit of the mode. `index`
+    counts the modes from 0; the first mode has other defaults.
     """
     output = default_output(index) if mode.output is None else mode.output
     defaults = {

@@ -17,7 +17,7 @@ UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
     """Return (dotted key, file) for every file that a scene, or its tables, names.
 
-    Keys without meaning for the law of the asperities or the like are left out.
+    Keys that have no effect, such as those of another law of the asperities, are left out.
     """
     if not isinstance(tables, Tables):
         tables = tables.tables()
@@ -34,10 +34,7 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a path is that of an existing file.
-
-    A path that the system does not accept is that of none.
-    """
+    """Return whether a path is that of an existing file; it is not if the operating system does not accept the path."""
     try:
         return path.is_file()
     except (OSError, ValueError):

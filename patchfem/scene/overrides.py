@@ -185,9 +185,10 @@ def _replace_number(
 
 
 def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
-    """Return whether the limits of PLAIN_KEYS are valid for a scene that is read from a draft.
+    """Return whether a scene is simple enough for PLAIN_KEYS, the numbers that no check depends on below their limits.
 
-    They are valid for the kinds of scene in PLAIN_SCENES without files, except one of measured responses.
+    It must be of a kind in PLAIN_SCENES, and name no files except one of measured responses. `draft` has the values as
+    they were written.
     """
     names = [key for key, _ in list_named_files(scene)]
     if names not in ([], ["measured.file"]) or (names and scene.normal):
@@ -197,7 +198,10 @@ def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
 
 
 def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:
-    """Find a key of PLAIN_KEYS in a scene, and its limit; return None as key for others and for values out of range."""
+    """Return the dotted key in PLAIN_KEYS that `key` stands for, with modes by number, and the limit of its value in SI.
+
+    The key is None if it is not in PLAIN_KEYS, or if its value is not between 0 and the limit.
+    """
     place, value = find_scene_value(scene, key)
     limit = PLAIN_KEYS.get(re.sub(r"\.\d+", "", place), 0.0)
     if key == "contact.load":

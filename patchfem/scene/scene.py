@@ -207,12 +207,12 @@ def finish_scene(
     sets: tuple[str, ...],
     faults: Callable | None = None,
 ) -> Scene:
-    """Check a scene that was read, and return it.
+    """Read the tables of a draft, check them with all rules, fill in defaults, and return the Scene.
 
     Parameters
     ----------
     draft : SceneDraft
-        Its tables are not read yet.
+        Plain values of the file; the tables read from them are added here.
     path, text, sets, faults
         File, its content, assignments of --set, and function of the tables that returns further mistakes.
 
@@ -245,7 +245,7 @@ def finish_scene(
 
 
 def add_sets(scene: Scene, sets: Iterable[str]) -> Scene:
-    """Return a copy of a scene of a study with further assignments `table.key=value`, `sets`."""
+    """Return a copy of a scene with further assignments `table.key=value`, `sets`; it keeps the scene as written before."""
     changed = loads(scene.text, scene.path, [*scene.sets, *sets])
     return replace(changed, written=scene.written)
 

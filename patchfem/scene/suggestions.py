@@ -129,7 +129,7 @@ def _is_table(value: TomlValue) -> bool:
 def _list_tables_with_key(key: str, table_key: str = "") -> list[str]:
     """Return the dotted names of the tables that have a key of this name.
 
-    They are those of the least depth at which one has it, and those right inside the table `table_key`.
+    Only the tables of the smallest depth in the scene are listed, and those directly inside the table `table_key`.
     """
     tables = {"": Tables, **list_inner_tables(Tables)}
     depths = {
@@ -234,10 +234,7 @@ def _list_similar(key: str, names: Collection[str]) -> list[str]:
 
 
 def _write_header(table_key: str) -> str:
-    """Return the header of a table by its dotted key: [[structure.mode]] for an array, or [contact.tilt].
-
-    `table_key` is the dotted key.
-    """
+    """Return the header of a table by its dotted key: [[structure.mode]] for an array, or [contact.tilt]."""
     return f"[[{table_key}]]" if find_key(table_key).is_array else f"[{table_key}]"
 
 

@@ -54,7 +54,10 @@ def build_basis(
 
 
 def _make_weighted_rows(elements, n: int) -> np.ndarray:
-    """Return rows such that rows^T rows is the stiffness or damping matrix of given elements."""
+    """Return rows (k, n) such that rows^T rows is the stiffness or damping matrix of k springs or dampers.
+
+    `elements` are pairs of (mass, mass), numbered from 1 on and 0 for the base, and a coefficient.
+    """
     rows = make_slide_rows([pair for pair, _ in elements], n)
     coefficients = np.array([coefficient for _, coefficient in elements], float)
     return rows * np.sqrt(coefficients)[:, None]

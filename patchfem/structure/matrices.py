@@ -78,6 +78,7 @@ def build_basis(
         If a matrix is not square, finite and symmetric, if M is not positive definite, or if K or C is
         not positive semidefinite.
     """
+    # With M = L L^T (`root` is L), the modes follow from L^-1 K L^-T, or from rows of springs without forming K.
     M = _check_matrix(M, "M")
     n = len(M)
     root = _factor_mass(M)

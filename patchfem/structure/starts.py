@@ -23,7 +23,7 @@ def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> In
 
     Returns
     -------
-    Start
+    InitialState
 
     Raises
     ------

@@ -49,9 +49,9 @@ def fill_nearest(z) -> np.ndarray:
 
 
 def find_scan_spikes(scan: Areal) -> np.ndarray:
-    """Return a mask (m, n) of spikes of a scan: small groups far from the median of the 5 x 5 around.
+    """Return a mask (m, n) of spikes of a scan: small groups of heights far from the median of the 5 x 5 heights around.
 
-    A larger group is a feature of the surface; the threshold rises until the groups are small.
+    A larger group is a feature of the surface; the threshold is raised until all groups are small.
     """
     from scipy import ndimage
 
@@ -71,7 +71,7 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
 def level(surface: Profile | Areal) -> Profile | Areal:
     """Subtract the least-squares line (trace) or plane (scan) from the heights of a surface.
 
-    Raises PatchfemError if the measured heights do not determine it, such as all of them in one line.
+    Raises PatchfemError if the measured heights do not determine the plane, such as all of them in one line.
     """
     known = ~surface.missing
     axes = (surface.x,) if surface.z.ndim == 1 else (surface.x, surface.y[:, None])

@@ -18,7 +18,7 @@ MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
 
 
 def is_note(text: str) -> bool:
-    """Return whether the text of a sentence on a trace is a note rather than a warning."""
+    """Return whether a sentence about a trace is a note, not a warning."""
     return any(words in text for words in HARMLESS_NOTE_PARTS)
 
 
@@ -114,7 +114,7 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
 
 
 def _covers(places, x) -> bool:
-    """Return whether a trace ends at most half an element inside the patch.
+    """Return whether a trace covers a patch, except for half an element at each end.
 
     `places` [m] are the samples of the trace, and x (m,) [m] the nodes of the patch.
     """

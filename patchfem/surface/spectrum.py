@@ -40,7 +40,7 @@ class WaveSpectrum(NamedTuple):
         return uniform_filter1d(self.power, N_SMOOTHED_WAVES, mode="nearest") * self.waves[0]
 
     def measure_band(self) -> float:
-        """Return the amplitude [m] of the sine that has the mean square of the waves of `WAVE_BAND`."""
+        """Return the amplitude [m] of a sine whose mean square is that of all waves with lengths in `WAVE_BAND`."""
         inside = (self.waves >= WAVE_BAND[0]) & (self.waves <= WAVE_BAND[1])
         return float(np.sqrt(2 * self.power[inside].sum()))
 

@@ -221,7 +221,7 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
 
 
 def _weigh_ends(positions) -> np.ndarray:
-    """Return the weights (k, 2) of both ends in a linear interpolation to positions (k,), or (1, 1) without two of them."""
+    """Return the weights (k, 2) of both ends in a linear interpolation to positions (k,); (1, 1) for a single position."""
     if positions is None or len(positions) == 1:
         return np.ones((1, 1))
     fraction = (positions - positions[0]) / (positions[-1] - positions[0])

@@ -271,7 +271,7 @@ def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
 
 
 def _suspect_units(ratio: float, axis: str) -> str:
-    """Return the end of a message on two numbers whose ratio lets suspect wrong units."""
+    """Return the end of a message on two numbers, which suggests a wrong unit if their ratio is that of two units."""
     if 1 / WRONG_UNIT_RATIO < ratio < WRONG_UNIT_RATIO:
         return ""
     return f"; check the units of {axis} with --units"
@@ -306,6 +306,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     correlations.
     """
     n_shown = int(MIN_PATCH_OVERLAP * N_PATCH_BINS)
+    # The computed patch has N_PATCH_BINS bins of the same width as those of the measured depth.
     edges = np.linspace(-history.half, history.half, N_PATCH_BINS + 1)
     size = bins.depth.size
     squares = np.full((2, size + N_PATCH_BINS - 1), np.inf)
@@ -315,6 +316,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     ):
         for side in (0, 1):
             template = history.average(edges, Place(ratio, 0.0, bool(side)))
+            # Sum of (d - t)^2 at each shift, for measured depths d and computed depths t, without the constant of d^2.
             total = np.correlate(np.ones(size), template**2, "full")
             total -= 2 * np.correlate(bins.depth, template, "full")
             ratios[side] = np.where(total < squares[side], ratio, ratios[side])

@@ -31,9 +31,9 @@ MAX_FORCE_INTERPOLATIONS = 8  # largest number of interpolations towards the amp
 
 
 def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
-    """Return amplitudes (k,) [m] at the output from full stick to nearly free motion of modes.
+    """Return amplitudes (k,) [m] at the output from full stick to nearly free motion of one or several modes.
 
-    `joints` are the modes with their contact. The amplitudes lie closer where a curve changes fast.
+    `joints` are the modes with their contact. The amplitudes lie closer where frequency or damping change fast.
     """
     ends = np.array([_default_range(joint) for joint in joints])
     low, high = ends[:, 0].min(), ends[:, 1].max()
@@ -59,7 +59,7 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
 
 
 def _default_slides(joint: JointMode) -> tuple[float, float]:
-    """Return the smallest and largest relative displacement [m] of the default amplitudes of a joint."""
+    """Return the smallest and largest relative displacement [m] at the contact of the default amplitudes of a joint."""
     stiffness = joint.stiffness[joint.face]
     deflection = joint.deflection if joint.friction_limit else 0.0
     if 0 < stiffness < np.inf or not deflection:
@@ -71,7 +71,7 @@ def _default_slides(joint: JointMode) -> tuple[float, float]:
 
 
 def _max_amplitude(joint: JointMode) -> float:
-    """Return the largest default amplitude [m] of a joint, limited by the stop and by a cubic spring."""
+    """Return the largest default amplitude [m] at the output, within the travel and the range of a cubic spring."""
     springs = joint.model.rig.springs
     travel = springs.travel / TRAVEL_OVER_MAX_AMPLITUDE
     if not springs.cubic:
@@ -87,7 +87,7 @@ def _max_amplitude(joint: JointMode) -> float:
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
-    """Return the curve of a joint by the first method that has one, without errors, or None without one.
+    """Return a fast estimate of the backbone of a joint, without errors, or None if no method has one.
 
     `amplitudes` (k,) [m] are those at the output. The methods are periodic motions, then quasi-static loops.
     """
@@ -145,13 +145,15 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
 
 
 def _join(curve: Curve, other: Curve) -> Curve:
-    """Return a curve and the other one as one with increasing amplitudes."""
+    """Return the points of two curves as one curve with increasing amplitudes."""
     joined = Curve(*(np.concatenate(pair) for pair in zip(curve, other)))
     return joined.at(np.argsort(joined.amplitude))
 
 
 def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
-    """Return the smallest amplitudes (n,) [m] at which given forces at the output hold the phase resonance.
+    """Return the smallest amplitudes (n,) [m] at which a given force at the output is in phase with the velocity.
+
+    The force then holds the mode at its phase resonance.
 
     Parameters
     ----------
@@ -205,9 +207,9 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
 
 
 def _estimate_forces(joint: JointMode, amplitudes) -> Curve:
-    """Return the estimated curve of a joint at amplitudes (k,) [m], where its force is above 0.
+    """Return the estimated backbone of a joint at amplitudes (k,) [m], without points whose force is not above 0.
 
-    Raises PatchfemError if there are no such points.
+    The force is that of phase resonance at the output. Raises PatchfemError if there are no points.
     """
     curve = estimate_curve(joint, amplitudes)
     if curve is not None:

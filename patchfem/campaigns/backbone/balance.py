@@ -220,12 +220,12 @@ def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:
 def _sustain_linear_motion(
     joint: JointMode, excitation: np.ndarray
 ) -> tuple[float, float] | tuple[None, None]:
-    """Return the frequency omega [rad/s] and zeta of a linear motion z'' + (D - 2 zeta omega E) z' + Omega^2 z = 0.
+    """Return frequency [rad/s] and damping ratio of a mode of a linear rig, sustained by a negative damping.
 
-    Both are None if the mode does not oscillate, or if no such motion of the mode is found. excitation: E (n, n).
-
-    E is the distribution of a negative damping that sustains the motion of the mode of the `joint`. D and Omega are the
-    damping matrix and the natural frequencies.
+    The motion is a solution of z'' + (D - 2 zeta omega E) z' + Omega^2 z = 0 with constant amplitude. D and Omega are
+    the damping matrix and the natural frequencies of the rig, and `excitation` is the distribution E (n, n) of the
+    negative damping. Both results are None if the mode of the `joint` does not oscillate, or if no such motion of it is
+    found.
     """
     rate = 0.0
     for _ in range(N_DAMPING_ITERATIONS):
@@ -241,9 +241,10 @@ def _sustain_linear_motion(
 
 
 def _find_mode_eigenvalue(joint: JointMode, negative_damping: np.ndarray) -> complex:
-    """Return the eigenvalue of z'' + (D - G) z' + Omega^2 z = 0 that belongs to the mode.
+    """Return the eigenvalue [1/s] of z'' + (D - G) z' + Omega^2 z = 0 whose eigenvector has the largest component in a mode.
 
-    `joint` tells the mode, whose component is largest in the eigenvector. negative_damping: G (n, n) [1/s].
+    D and Omega are damping matrix and natural frequencies of the rig, `negative_damping` is G (n, n) [1/s], and `joint`
+    tells the mode.
     """
     modes = joint.modes
     n = modes.omega.size

@@ -18,9 +18,9 @@ LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
 class SteadyLoop(NamedTuple):
-    """Steady run of a contact under a sinusoidal displacement.
+    """Run of a contact under a sinusoidal displacement whose friction loop is steady.
 
-    - run: the run.
+    - run: result of the bench (`BenchRun`), with histories and measures.
     - model: model of the run.
     - steps: number of steps per cycle.
     - change: change of each of LOOP_MEASURES from the run with half as many cycles.

@@ -178,7 +178,7 @@ def compute_backbones(
 
 
 def _merge(amplitudes) -> np.ndarray:
-    """Return amplitudes in rising order, without those that differ by round-off."""
+    """Return amplitudes in rising order, with one of each group that differs only by round-off."""
     ordered = np.unique(amplitudes)
     return ordered[np.append(True, np.diff(ordered) > EQUAL_AMPLITUDE_TOL * ordered[1:])]
 
@@ -282,11 +282,10 @@ def _main_mode_name(joint: JointMode) -> str:
 
 
 def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
-    """Return the frequencies [Hz] of the mode of a joint without its contact and with it stuck.
+    """Return the frequencies [Hz] of the mode of a joint without its contact, and with the contact stuck.
 
-    The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
-    uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
-    alone are elastic.
+    The first includes a bonded spring, with its stiffness at rest if it is nonlinear. If the pieces alone are elastic,
+    the second has the tangential stiffness of the patch that a run states, extrapolated over its meshes.
     """
     model = joint.model
     modes = joint.modes
@@ -325,13 +324,11 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
 
 
 def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
-    """Fit the exponents of energy loss over amplitude of a curve in micro-slip and in gross slip.
+    """Fit the exponents of the energy loss per cycle as a power of the amplitude, in micro-slip and in gross slip.
 
-    In micro-slip it is the slope from the first to the last point, in gross slip that of the last
-    two points. A loss counts if it exceeds MIN_LOSS_TO_ERROR_RATIO times its error and the round-off of the
-    energy.
-
-    `joint` gives the amplitude at which the whole contact slips.
+    In micro-slip it is the slope from the first to the last point, in gross slip that of the last two points. A loss
+    counts if it exceeds MIN_LOSS_TO_ERROR_RATIO times its error and the round-off of the energy. `joint` gives the
+    amplitude at which the whole contact slips, above which slip is gross.
     """
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
         return LossExponents()
@@ -365,11 +362,10 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:
-    """Find the largest amplitude [m] at which the damping of a joint changes from positive to negative.
+    """Find the largest amplitude [m] at which the damping of a mode changes from positive to negative.
 
-    A curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
-    which is a straight line under Coulomb friction, computes further points of the same curve. It
-    is None if there is no such root.
+    Two points of a curve enclose it. Brent's method finds the root of damping times amplitude, which is a straight line
+    under Coulomb friction, from further points of the same curve. The result is None if the damping never changes so.
     """
     falls = {}
     for method, curve in curves.items():

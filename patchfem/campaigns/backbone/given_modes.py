@@ -97,7 +97,10 @@ def prepare_model(
 
 
 def _attach_stiffer_rig(model: Model, stiffer_rig) -> Model:
-    """Return a model of a bolted joint whose modes have the slides of another rig if the joint is stiffer by its error."""
+    """Return a model of a bolted joint that takes its modes from another rig when its joint is stiffer by its error.
+
+    The modes of `stiffer_rig` have the slides that were assumed for the stiffer joint.
+    """
     structure = model.rig.structure
     build_rig = stiffer_rig.structure.bolted.build_rig
     bolted = structure.bolted._replace(build_stiffer_rig=build_rig)

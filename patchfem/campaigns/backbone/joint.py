@@ -98,12 +98,12 @@ class JointMode(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Output displacement per unit of the stuck mode shape."""
+        """Magnitude of the displacement at the output per unit of the stuck mode shape."""
         return abs(self.modes.output @ self.shape)
 
     @property
     def face(self) -> int:
-        """Index of the interface whose force on the mode increases most with the amplitude."""
+        """Index of the dominant interface, whose stiffness times relative displacement in the mode is largest."""
         slides = np.abs(self.modes.interfaces @ self.shape)
         is_elastic = np.isfinite(self.stiffness) & (self.stiffness > 0)
         return int(np.argmax(slides * np.where(is_elastic, self.stiffness, 1)))
@@ -154,7 +154,7 @@ class JointMode(NamedTuple):
 
     @property
     def has_partial_slip(self) -> bool:
-        """Whether a part of a contact slips before the whole."""
+        """Whether a part of a contact slips before the whole of it does."""
         return self.model.partial_slip or self.model.rig.friction.has_partial_slip
 
     @property
@@ -164,16 +164,15 @@ class JointMode(NamedTuple):
 
     @property
     def deflection(self) -> float:
-        """Static relative displacement [m] of the free mode under the friction limit."""
+        """Static relative displacement [m] of the mode without its contact, under the friction limit."""
         return self.friction_limit * self.face_slide**2 / self.spring
 
     @property
     def slip_displacement(self) -> float:
         """Relative displacement [m] at which the complete contact slips.
 
-        For rigid friction it is the static deflection by friction. For springs alone it is the
-        displacement at which a cubic spring doubles the stiffness of the mode, or the one of an
-        interlock.
+        For rigid friction it is the static deflection under the friction limit. Without friction it is the displacement
+        at which a cubic spring doubles the stiffness of the mode, or at which an interlock engages.
         """
         rig = self.model.rig
         if not self.friction_limit:
@@ -379,10 +378,10 @@ def _find_mode(rig, name: str) -> int:
 
 
 def _stuck_stiffness(joint: JointMode) -> np.ndarray:
-    """Return the tangential stiffness (i,) [N/m] of each interface without slip.
+    """Return the tangential stiffness (i,) [N/m] of each interface before any slip.
 
-    It is that of the loops of the laws if they have a closed form, that of a small loop on a bench
-    if there is one interface, else the one of the plan (`joint.stiffness`).
+    If the laws have friction loops in closed form, it is that of these loops. Otherwise it is that of a small loop on a
+    bench for a single interface, and that of the plan (`joint.stiffness`) for several.
     """
     model = joint.model
     planned = joint.stiffness

@@ -136,10 +136,10 @@ def compute_cases(
 
 
 def _build_base_model(build: Callable[..., Model], modes: str | Iterable) -> Model | None:
-    """Return the model of the scene without the values of `over`, or None if it needs one of them to be valid.
+    """Return the model of the scene without the values of `over`, or None if the scene is not valid without them.
 
-    A scene with the first value would state it as the condition of the modal test, and another joint would be
-    subtracted from bolted modes. `build` and `modes` are as in `compute_cases`.
+    A bolted joint is subtracted in the condition of the scene as written. With the first value of `over` the scene
+    would state another condition of the modal test. `build` and `modes` are as in `compute_cases`.
     """
     try:
         return prepare_model(build, modes, ()).model

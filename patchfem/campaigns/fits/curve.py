@@ -79,7 +79,7 @@ class MeasuredCurve(NamedTuple):
     method: str
 
     def scale_assumed_errors(self, curve, n_values: int) -> "MeasuredCurve":
-        """Return the measured curve with assumed errors equal to the scatter around a fitted curve (2, k).
+        """Return the measured curve with its missing errors replaced by the scatter around a fitted curve (2, k).
 
         The `n_values` fitted values take up as many degrees of freedom, half of them of each quantity.
         """
@@ -514,6 +514,7 @@ def extrapolate_curve(
         return np.array([amplitudes, *curve, *np.full_like(curve, np.nan)])[:, known], ""
     correlation = fit.intervals.correlation
     correlation = np.where(np.isfinite(correlation), correlation, np.eye(len(slopes)))
+    # Variance of the curve: sum of s_i R_ij s_j, with the slopes s per half-width and the correlations R.
     variance = np.einsum("iqk,ij,jqk->qk", slopes, correlation, slopes)
     beyond = np.array([amplitudes, *curve, *np.sqrt(np.maximum(variance, 0.0))])
 

@@ -164,7 +164,10 @@ class FreeKeys:
         return Problem(residual, low, high, self.start() if start is None else start)
 
     def widen(self, fit: Fit, changes: np.ndarray) -> Fit:
-        """Return a fit with intervals that contain the effect of numerical errors of the model (`Fit.widen`)."""
+        """Return a fit with wider intervals that contain the effect of numerical errors of the model (`Fit.widen`).
+
+        `changes` (m, r) are the changes of the r residuals by each of m errors.
+        """
         return fit.widen(changes, [(bound.low, bound.high) for bound in self.ranges])
 
     def make_fitted_keys(self, fit: Fit, warnings: Sequence[str] = ()) -> FittedKeys:

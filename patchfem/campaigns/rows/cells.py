@@ -172,7 +172,7 @@ def read_response_table(path: Path) -> Readings:
 
 
 def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
-    """Return the root mean square log ratio of selected readings by kind of reading.
+    """Return the root mean square of ln(computed/measured) of selected readings, by kind of reading.
 
     Parameters
     ----------

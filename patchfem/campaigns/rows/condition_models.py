@@ -20,7 +20,7 @@ STEADY_METHOD = "accuracy.method=harmonic"
 
 
 class ConditionModels(FreeKeys):
-    """Free keys of a rig under sinusoidal base motion at the measured conditions.
+    """Free keys of a rig, and its models under the sines of the base at which the responses were measured.
 
     The rows were measured in steady state. If the scene does not set a method, the steady-state method 'harmonic' is
     therefore used where it supports the scene, and `notes` reports this.
@@ -47,6 +47,7 @@ class ConditionModels(FreeKeys):
     ):
         _require_sines_of_base(scene, ranges, measured)
 
+        # Keys that the scene leaves out: the file of the measurements, and a steady method where the scene allows it.
         sets = []
         notes = []
         if scene.measured is None and any(bound.key.startswith("measured.") for bound in ranges):
@@ -66,6 +67,7 @@ class ConditionModels(FreeKeys):
 
         self.instrument = self.base.scene.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
+        # The rig under the drive of each measured condition.
         self.rigs = []
         for frequency, level in conditions:
             drive = [

@@ -128,7 +128,7 @@ class SweepScene:
         return []
 
     def note_bolted_joint(self) -> str:
-        """Return a note on the joint that is subtracted from modes that were measured with it; "" without them."""
+        """Return a note on a joint that is subtracted from modes measured with the joint bolted; "" for other modes."""
         base = _get_cached_base(self).scene
         structure = None if base is None else base.scene.structure
         if structure is None or structure.measured == "free":
@@ -193,7 +193,7 @@ class _SweepBase(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _get_cached_base(sweep_scene: SweepScene) -> _SweepBase:
-    """Return the scene from which the scenes of the cases of a sweep are made.
+    """Return the base from which the scenes and models of the cases of a sweep are derived.
 
     It belongs to this `sweep_scene`, and is cached for the last two sweeps.
     """

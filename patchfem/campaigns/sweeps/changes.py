@@ -15,7 +15,7 @@ MAIN_MEASURES = (*CHANGE_AT_LIMIT, "peak_frequency")
 
 
 class MeasureRange(NamedTuple):
-    """Smallest and largest value of a measure that count.
+    """Smallest and largest value of a measure in a sweep, among the values that are accurate enough to count.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class MeasureRange(NamedTuple):
 
 @dataclass(frozen=True)
 class SweepAnalysis:
-    """What a sweep shows.
+    """Results of the analysis of a sweep.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ KEYS_WITHOUT_LIMIT = ("drive.", "slide.", "accuracy.", "wear.cycles")
 
 
 class KeyLimit(NamedTuple):
-    """Value of a key up to which the change of a measure stays within its limit, in SI.
+    """Value of a swept key up to which a measure changes by no more than a given amount, in SI.
 
     Attributes
     ----------
@@ -67,12 +67,10 @@ class KeyLimit(NamedTuple):
 
 
 def find_limits(table: SweepTable) -> list[KeyLimit]:
-    """Find the limits in a table of the numerical key with the most values.
+    """Find up to which value of a swept key each measure stays within an allowed change from the first case.
 
-    If other keys are swept too, a limit is the smallest one over the values of these keys whose first case counts.
-
-    A limit is the value of the key above, or below, which a measure changes, such as that at which the contact begins
-    to slip.
+    The key is the numerical one with the most values. If other keys are swept too, a limit is the smallest one over
+    their values. A line of cases whose first value does not count is left out. `table` has the results of the sweep.
     """
     axis = _choose_axis(table)
     if axis is None:
@@ -128,7 +126,7 @@ def _find_limit_on_line(
     Parameters
     ----------
     blank : KeyLimit
-        Names and relative change of the limit.
+        Limit without values: names of measure and key, and the relative change at the limit.
     key : SweptKey
         Key that changes along the line.
     key_values : (m,) array

@@ -48,7 +48,7 @@ class SweptPeak(NamedTuple):
 
 
 class PeakOnLine(NamedTuple):
-    """Peak of a measure, and the first case of its curve, which has the values of the other keys."""
+    """Peak of a measure over a swept frequency, and the first case of its curve, which has the values of the other keys."""
 
     measure: str
     case: int
@@ -151,7 +151,10 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
 
 
 def _estimate_error(values: np.ndarray) -> float:
-    """Return the error of the first of some values (n,), from their differences; NaN for an unknown first value."""
+    """Return the error of the first of several estimates (n,): a factor times their largest difference from it.
+
+    It is NaN if the first estimate is not known.
+    """
     return ERROR_SAFETY_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
 
 

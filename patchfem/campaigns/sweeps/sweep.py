@@ -102,7 +102,7 @@ def compute_chunk(
 
 
 def _build_similar_models(work: WorkerData, numbers: Sequence[int]) -> SimilarModels | None:
-    """Return the models of cases that differ only in plain numbers; None if this is not possible.
+    """Return the models of cases that differ only in numbers that no check depends on; None for other cases.
 
     It is also None for patches in motion, and if `work.keep` is called with the result of each run.
     """
@@ -140,9 +140,9 @@ def _build_case_model(work: WorkerData, number: int):
 
 
 def choose_shared_meshes(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep, `work`, with meshes that are chosen for all its cases.
+    """Return the data of a sweep, `work`, with meshes that are chosen for all its cases together.
 
-    Cases that are already computed are included in this choice.
+    All cases of the sweep count, also those that are already computed. Without a patch the data are unchanged.
     """
     if work.meshes is not None:
         return work
@@ -156,11 +156,10 @@ def choose_shared_meshes(work: WorkerData) -> WorkerData:
 
 
 def _find_min_chunk_size(work: WorkerData) -> int:
-    """Return the smallest number of cases per chunk for which computing them together is efficient.
+    """Return the smallest number of cases per chunk.
 
-    The time of a smaller chunk does not predict the time of a large one.
-
-    `work` is the data of the sweep.
+    It is 1, or more for cases that one call of a kernel computes together; the time of a smaller chunk would not
+    predict that of a large one. `work` is the data of the sweep.
     """
     model = _build_case_model(work, 0)
     if work.keep is not None or not isinstance(

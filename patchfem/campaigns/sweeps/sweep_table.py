@@ -79,10 +79,7 @@ class MeasureColumn:
 
     @classmethod
     def blank(cls, unit: str, count: int) -> "MeasureColumn":
-        """Return the column of `count` cases without a value.
-
-        The unit is that of the measure.
-        """
+        """Return a column without any value (NaN) for `count` cases; `unit` is that of the measure."""
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
 

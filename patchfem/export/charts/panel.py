@@ -128,7 +128,10 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
 
 
 def select_curve_points(values: np.ndarray, count: int = MAX_CURVE_INTERVALS) -> np.ndarray:
-    """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
+    """Return the indices of the points that suffice to draw a long curve.
+
+    They are those of the smallest and the largest value in each of `count` intervals.
+    """
     if values.size <= 2 * count:
         return np.arange(values.size)
     edges = np.linspace(0, values.size, count + 1).astype(int)

@@ -89,12 +89,12 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
 
 
 def _split_names(names: str) -> list[tuple[str, str]]:
-    """Return the variables of "NAME NAME@X ...": name, and that of the own horizontal variable or ""."""
+    """Return (variable, horizontal variable) for each name in a text such as "NAME NAME@X"; "" without @X."""
     return [(name, x) for name, _, x in (word.partition("@") for word in names.split())]
 
 
 def _find_x(data: Variables, chart: Chart) -> str:
-    """Return the first of the horizontal variables that the data has, or ""."""
+    """Return the first horizontal variable in the list of a chart that the data contain, or ""."""
     return next((name for name in chart.x.split() if name in data), "")
 
 

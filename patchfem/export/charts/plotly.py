@@ -108,6 +108,8 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
         trace["marker"]["symbol"] = curve.symbols
     if style == "area":
         trace["fill"] = "tozeroy"
+
+    # Points have error bars, and a line has a band.
     if curve.low is None:
         return [trace]
     if style in ("points", "dots"):

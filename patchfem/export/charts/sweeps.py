@@ -117,7 +117,7 @@ def list_measures(answers: Answers) -> list[str]:
 
 
 def _has_values(answer: Answer, name: str) -> bool:
-    """Return whether a variable of a sweep is a measure, which has errors, with a value in at least one case."""
+    """Return whether a variable of a sweep is a measure with a value in at least one case; a measure has an error."""
     return f"{name}_error" in answer.data and bool(np.isfinite(answer.data[name].values).any())
 
 
@@ -127,7 +127,10 @@ def spread_indices(size: int, count: int) -> np.ndarray:
 
 
 def make_relative(answers: Answers, chart: Chart) -> Panel | None:
-    """Return the main measures relative to their first case along the only key, with the band of 5 %."""
+    """Return the main measures divided by their values in the first case, against the only swept key.
+
+    A band shows changes of up to 5 %.
+    """
     curves = []
     for title, answer in answers.items():
         view = view_sweep(answer)

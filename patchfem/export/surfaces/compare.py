@@ -113,7 +113,7 @@ def compare_with_scene(
 
 
 def make_answer(comparison: Comparison) -> Answer:
-    """Return the answer of a comparison of two surfaces."""
+    """Return the answer of a comparison of two surfaces: its sentences, quantities, curves and content of compare.json."""
     words = sentences.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]

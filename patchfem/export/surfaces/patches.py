@@ -62,6 +62,8 @@ def read_patch(folder: Path) -> PatchRun:
         area, gap, depth = (np.broadcast_to(field, shape) for field in fields)
     except ValueError:
         raise PatchfemError(f"{folder}: the fields in result.nc differ in length") from None
+
+    # Measures of the wear with their errors, as far as the run has them.
     measures = {
         name: (answer.quantities[name].value, answer.quantities[name].error)
         for name in ("worn_volume", "worn_depth_max")

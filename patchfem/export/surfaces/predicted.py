@@ -46,6 +46,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     PatchfemError
         If the traces show no depth or run along y, or if the run cannot be theirs.
     """
+    # The fit has the wear coefficient, the position of the patch, and both depths along it.
     fitted = predicted.fit_wear(_measure_depth(comparison), read_history(folder, piece))
     numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
     values = sentences.to_answers(numbers)
@@ -53,6 +54,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     notes = describe_reliability(fitted)
     warnings = warn_of_other_shape(fitted)
 
+    # Content of compare.json on the fit and its run.
     entry = {
         "coefficient": values["wear_coefficient"],
         "patch_centre": values["patch_centre"],
@@ -74,6 +76,8 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     # the sentence belongs to the verdict, whose last sentence then becomes a note
     kept = sentences.MAX_VERDICT_SENTENCES - 1
     notes = (*answer.remarks.notes, *answer.verdict[kept:], *notes)
+
+    # Both depths along the patch, with the 95 % band of the measured one, for the chart.
     depths = fitted.depths
     data = make_variables(
         "x_patch",
@@ -157,6 +161,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
         if applies:
             raise PatchfemError(f"compare --predicted {folder}: {text}")
 
+    # Worn depth of both pieces in each frame of the wear; of frames of the same cycle the first one counts.
     depth = worn_depths(run.answer)
     if not depth[-1].max() > 0:
         raise PatchfemError(f"compare --predicted {folder}: nothing wore off in this run")

@@ -77,6 +77,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
 
 def make_answer(reports: list[RoughnessReport]) -> Answer:
     """Return the answer of the reports of one or several surfaces."""
+    # Traces and scans have different parameters, so that each kind has its own headline.
     quantities, means, headlines, cautions = {}, [], [], []
     for kind, name in ROUGHNESS_INPUT_WORDS.items():
         members = [report for report in reports if report.kind == kind]
@@ -95,6 +96,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         headlines.append(f"{state}{_format_main_parameters(values, members)}.")
         quantities |= sentences.to_answers(values)
 
+    # A treatment that several surfaces share is named once, after the headlines.
     notes = [text for report in reports for text in report.notes]
     if any(value.low is not None for report in reports for value in report.values):
         notes.append(INTERVAL_NOTE)

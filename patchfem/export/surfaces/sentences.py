@@ -168,6 +168,8 @@ def describe_comparison(comparison: Comparison) -> Words:
     headline, advice = VERDICT_HEADLINES[code], NO_DEPTH_ADVICE.get(code, "")
     if comparison.is_areal:
         headline, advice = SCAN_VERDICTS.get(code, (headline, advice))
+
+    # The headline, then advice if no depth is known, or the loss.
     verdict = [headline.format_map(fields)]
     if code in NO_DEPTH_ADVICE:
         # the limit of a track that would be found may be unknown
@@ -177,6 +179,7 @@ def describe_comparison(comparison: Comparison) -> Words:
         verdict.append(_describe_loss(comparison))
     verdict += describe_waves(values.get("amplitude_ratio"))
 
+    # The code of a finding tells whether it is a warning, a note or a sentence of the verdict.
     warnings, notes = [], []
     for code, numbers in comparison.findings:
         fields = _format_numbers(numbers, comparison.is_areal)

@@ -74,8 +74,9 @@ def answer_runs(before: Path, after: Path) -> Answer:
 
 
 def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
-    """Return the answer on the wear between two runs."""
+    """Return the answer on the wear of a patch between two runs: its sentences, quantities and curves."""
     verdict = describe_wear(runs, wear)
+    # Measures and warnings of the run before and of the run after.
     sides = {}
     warnings = []
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
@@ -92,6 +93,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
             f"{format_length(-wear.depth.min(), 3)} less, so it does not continue the earlier one"
         )
 
+    # Both runs have the same coordinates, so that the second surface needs no alignment.
     zero = {"shift": Quantity(0.0, "m", low=0.0, high=0.0)}
     stored = sides["before"]["measures"] | sides["after"]["measures"]
     names = [name for name in BEFORE_AND_AFTER_MEASURES if name in stored]

@@ -106,7 +106,11 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> JsonObject:
 
 
 def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
-    """Return the peak if there is only one, the limits of the key, and the ends of the largest ranges."""
+    """Return the quantities of the answer of a sweep, by name.
+
+    They are frequency, height and width of a resonance peak if there is only one, the values of the key at which
+    measures have changed by a given amount, and smallest and largest value of the measures that change most.
+    """
     quantities = {}
     if len(analysis.peaks) == 1:
         quantities |= make_peak_quantities(table, analysis.peaks[0])
@@ -139,6 +143,7 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
 
     There is a dimension for each swept key, or the dimension `case` if the cases are rows.
     """
+    # Keys are the coordinates of a grid, or columns over the cases of a table.
     dims = tuple(key.name for key in table.keys) if table.is_grid else ("case",)
     data = {}
     if not table.is_grid:
@@ -148,6 +153,7 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
         own_dims = (key.name,) if table.is_grid else dims
         data[key.name] = Variable(own_dims, values, key.unit, _describe_key(key))
 
+    # Each measure with its error, and with its floor unless that is 0.
     for name in sort_measures(table):
         if name in data:  # normal.load is also the name of a measure
             continue

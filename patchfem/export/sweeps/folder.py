@@ -99,7 +99,7 @@ class Writer:
         return json.dumps(answers.make_summary(answer), allow_nan=False, ensure_ascii=False) + "\n"
 
     def _name_case(self, number: int) -> dict[str, str]:
-        """Return the swept keys of a case with their values as written."""
+        """Return {swept key: its value as written} of a case, given by its number."""
         return dict(zip([axis.key for axis in self.cases.axes], self.cases.texts(number)))
 
     def write_results(self, number: int, result) -> None:
@@ -117,7 +117,7 @@ class Writer:
             raise fault
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
-        """Write the summaries of cases, then their chunk.
+        """Write the summary files of the cases that need one, then one file (chunk) with the measures of all these cases.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Writer:
 
 
 def _make_quantities(results: CaseResults, case: int) -> Quantities:
-    """Return the measures of a case."""
+    """Return the measures of a case as quantities by name; `case` is its index in the results."""
     quantities = {}
     for name, unit in results.units.items():
         if results.has(name, case):

@@ -65,7 +65,7 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
 
 
 def _name_in_words(name: str) -> str:
-    """Return the name of a measure as words."""
+    """Return the name of a measure with blanks in place of underscores."""
     return name.replace("_", " ")
 
 

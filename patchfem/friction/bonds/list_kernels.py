@@ -307,7 +307,7 @@ def divide(path, eps, growth, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_end(piece, division):
-    """Return the position of the end of a strip in an increment, as a fraction from the end of the increment."""
+    """Return the end of strip number `piece` of an increment, as a fraction of the increment, measured from its end."""
     if piece == division.count and division.is_whole:
         return 1.0
     return -log1p(-piece * division.step) * division.scale
@@ -414,7 +414,7 @@ def list_mean(increment, bonds, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_exact_means(increment, eps, bonds):
-    """Replace the mean force of a rule by a closed form where there is one.
+    """Replace mean forces that a rule of integration gave by those in closed form, of the new or of the initial bonds.
 
     There is none for the new bonds of reading="report": their steep force at the start of the increment cancels that of
     the strip before. eps: bond length [m] in the middle of the increment.

@@ -121,9 +121,10 @@ def sum_strips(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _value_scale(after, bonds):
-    """Return the factor that undoes the scale of the values of the strips.
+    """Return the factor by which the stored values of the strips are multiplied to get those after an increment.
 
-    The values are stored relative to a reference (`list_rows_kernels`), so that an increment need not change all of them.
+    The values are stored relative to a reference (`list_rows_kernels`), so that an increment need not change all of
+    them.
     """
     reference = bonds.now[PATH.reference]
     if bonds.law[LAW.form] == FORM_STRETCH:

@@ -16,7 +16,10 @@ from ..protocol_kernels import Rates, RelaxedStretch
 
 
 class StretchNumber(IntEnum):
-    """Indices of the parameters of the law; the first one is reserved for the engines, the growth follows."""
+    """Indices of the parameters of the law: stiffness and bond length.
+
+    The parameter 0 is reserved for the engines, and those of the growth of bonds follow.
+    """
 
     STIFFNESS = 1
     LENGTH = 2

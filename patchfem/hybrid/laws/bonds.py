@@ -63,7 +63,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the velocity in the direction of motion, and the side of the speed v_h.
+    """Write the margins of a regime: the velocity in the direction of motion, and the distance of the speed from v_h.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Change the direction of motion or the side of the speed v_h.
+    """Change the regime at an event: the direction of motion, or whether the speed is above v_h.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Change the sign of the velocity or of z.
+    """Change the regime at an event: the sign of the velocity, or that of z.
 
     Parameters
     ----------

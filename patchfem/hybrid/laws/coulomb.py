@@ -33,7 +33,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write static friction less the holding force, or the velocity in the direction of slip, and the load.
+    """Write the margins of a regime: static friction minus holding force at rest, the velocity during slip, the load.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Start, stop or reverse the slip, or change the contact.
+    """Change the regime at an event: slip starts, stops or reverses, or the surfaces part or meet.
 
     Parameters
     ----------

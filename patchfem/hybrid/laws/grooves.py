@@ -75,7 +75,9 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the distance to slip up or down the flank or the velocity, and the vertical force.
+    """Write the margins of a regime: the distance to slip along the flank at rest, the velocity during slip, the load.
+
+    The load is the vertical force that the flank carries.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the velocity in the direction of motion, and the side of the speed above which g is mu_k.
+    """Write the margins of a regime: the velocity, and the distance of the speed from that above which g is mu_k.
 
     The stages of a step may all lie beside the narrow range of speeds where g is larger.
 
@@ -62,7 +62,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Change the direction of motion, or the side of the speed above which g is mu_k.
+    """Change the regime at an event: the direction of motion, or whether the speed is above that at which g is mu_k.
 
     Parameters
     ----------

@@ -144,7 +144,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the velocity along the branch, the distances to its end and to that of a piece, and the load.
+    """Write the margins of a regime: the velocity, the distances to the ends of branch and linear piece, the load.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Reverse, return to an earlier branch, or enter the next piece of the curve.
+    """Change the regime at an event: a reversal, the return to an earlier branch, the next linear piece, or lift-off.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ RIGID = False
 
 
 def force_and_rates(p, memory, point, s, rates):
-    """Write the rates of force and density; the rates are continuous where slip starts and ends.
+    """Write the rates of both states, force over mu and density of springs, which are continuous where slip starts and ends.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the distance to slip or the rate of slip, the growth of the density, and the load.
+    """Write the margins of a regime: the distance to slip or its rate, the growth of the density of springs, and the load.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Start or end slip or growth, or change the contact, which breaks all springs.
+    """Change the regime at an event: slip or growth starts or ends, or the surfaces part or meet, which breaks all springs.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def force_and_rates(p, memory, point, s, rates):
 
 
 def write_margins(p, memory, point, s, margins):
-    """Write the load; the law has a single regime in contact.
+    """Write the only margin of this law, the load, which vanishes where the surfaces part.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Change the contact.
+    """Change the regime at an event: the surfaces part or meet.
 
     Parameters
     ----------

@@ -21,7 +21,10 @@ MIN_CHUNK_CASES = 256
 
 
 def find_group(model: Model, n_study_cases: int) -> Hashable | None:
-    """Return the key of the models that are computed together with a model; None if it is computed by a single run."""
+    """Return a key that is equal for all models that are computed together; None for a model that a single run computes.
+
+    `n_study_cases` is the number of cases of the study; small studies are computed one by one.
+    """
     if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
@@ -88,10 +91,9 @@ def solve_models(
 
 
 def _forward_result(on_result, case_indices: Sequence[int], index: int, result) -> None:
-    """Call `on_result` with the index of a case in the whole study.
+    """Call `on_result`, the callback of a study, with the index that a case of a group has in the study, and its result.
 
-    `on_result` is the callback of the study, `case_indices` are the indices in the study of the cases of a group, and
-    `index` is that of a case in the group.
+    `case_indices` are the indices in the study of the cases of the group, and `index` is that of the case in the group.
     """
     on_result(case_indices[index], result)
 

@@ -109,7 +109,10 @@ class CaseResults:
         return self.messages, self.warnings, self.notes, self.numerics
 
     def insert(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Insert the results of a subset of the cases, in place of those that they have."""
+        """Insert the results of a part of the cases, in place of those that they have.
+
+        `cases` are the indices of these cases, in the order of the results in `part`.
+        """
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
@@ -128,7 +131,7 @@ class CaseResults:
             _replace_texts(texts, part_texts, new_indices)
 
     def select(self, cases: np.ndarray) -> CaseResults:
-        """Return measures, outcomes and messages of selected cases, in a form for `insert`."""
+        """Return the results of selected cases, numbered from 0, in a form that `insert` accepts."""
         results = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
         results.faults += self.faults
         for columns, all_columns in zip(results._result_columns, self._result_columns):
@@ -156,7 +159,7 @@ def _replace_texts(texts, part_texts, new_indices) -> None:
 
 
 def _renumber(texts, new_indices) -> dict[int, str]:
-    """Return texts by case with new case indices, without the cases that have none."""
+    """Return texts by case, with the new index of each case; cases without a new index are left out."""
     return {new_indices[case]: text for case, text in texts.items() if case in new_indices}
 
 

@@ -107,7 +107,10 @@ class Refined(NamedTuple):
 
 
 def refusal_reason(model: Model) -> str:
-    """Return why a model is not one mode with one point under a sine that steps can follow, or ""."""
+    """Return why the batch kernel cannot compute a model, or "" if it can.
+
+    The kernel steps one mode with one contact point under a sine, and a constant load.
+    """
     rig = model.rig
     if rows.SINGLE_RUN_ROWS:
         return f"the measure {rows.SINGLE_RUN_ROWS[0].name} is computed only by single runs"
@@ -165,7 +168,7 @@ def refusal_reason(model: Model) -> str:
 
 
 def group_key(model: Model) -> tuple[int, str]:
-    """Return a hashable key; models with equal keys are computed together."""
+    """Return a key that is equal for models that one call of the kernel computes: number of cycles, and friction law."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
@@ -199,7 +202,10 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
 
 
 def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
-    """Return models with one law and number of cycles as cases, with their scales."""
+    """Return the numbers of models with the same law and number of cycles as arrays over the models.
+
+    The second record has their tolerances and the reference quantities of their errors.
+    """
     columns = collect_columns(models, _list_numbers)
     first, second = len(Number), len(Number) + N_NUMBERS
     memory = columns[second : -1 - len(Scales._fields)]
@@ -211,7 +217,11 @@ def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
 
 
 def _list_numbers(model: Model) -> tuple:
-    """Return the parameters, law, memory, reference stiffness and scales of a model."""
+    """Return the numbers of a model as a flat tuple, which `collect_cases` takes apart again.
+
+    They are the parameters of the rig (`Number`), those of the friction law, its memory at rest, the stiffness of the
+    first mode at the contact, and the fields of `Scales`.
+    """
     rig, friction = model.rig, model.friction
     load = model.point.load
     # Bonds of a batch do not grow.
@@ -244,7 +254,7 @@ def _list_numbers(model: Model) -> tuple:
 
 
 def _may_create_energy(model: Model):
-    """Return whether the force of the law may have the direction of the motion."""
+    """Return whether the friction force may act along the motion, instead of against it, and so create energy."""
     friction = model.friction
     if friction.law == "lugre":
         kinetic = friction.static if friction.kinetic is None else friction.kinetic
@@ -339,7 +349,7 @@ def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.n
 
 
 def _select(record, rows):
-    """Return some of the rows of all arrays of a record or dict."""
+    """Return the given rows of all arrays of a record or dict, which may contain dicts of arrays."""
     if isinstance(record, dict):
         return {name: value[rows] for name, value in record.items()}
     return type(record)(
@@ -521,7 +531,7 @@ def needs_single_run(
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
-    """Store the warnings and notes that follow from the models."""
+    """Store the warnings and notes that follow from the models alone in `results`, by case."""
     creeps = law_has_trait(models[0].friction.law, "creeps")
     for case, model in enumerate(models):
         if warnings := [*model.source.remarks, *model.rig.structure.notes]:

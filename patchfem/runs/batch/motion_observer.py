@@ -50,7 +50,7 @@ class MotionObserver:
 
     @cached_property
     def finder(self):
-        """Finder of periodic motions; the motions of other engines are those of runs from rest."""
+        """Solver of periodic motions, created once for all drives."""
         return ShootingFinder(self.model, self.numerics, self.patch, 0, self.report)
 
     def __call__(self, drive, initial_guess=None) -> ObservedMotion | None:

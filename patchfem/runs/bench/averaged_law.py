@@ -45,7 +45,9 @@ def find_tractions(model, patch, direction: float, offset: float = 0.0) -> np.nd
 
 
 def slip_force_ratio(model, patch) -> float:
-    """Return the ratio of the slip force of a rigid block to the static coefficient times the load.
+    """Return the ratio of the force at which a rigid block slips to static coefficient times load.
+
+    It is 1 unless the law averages the pressure along the slide, as the law 'convolution' does.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def has_changing_pressure(model) -> bool:
 
 
 def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
-    """Choose the method of bond summation for a rigidly sliding interface.
+    """Choose the method of bond summation for an interface whose points all slide alike.
 
     The method is chosen as in a rig. Its error refers to the largest force, which is small for
     strokes that are short compared with the bond length. `slide` (k,) [m] is the relative
@@ -150,7 +150,7 @@ def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | N
 
 
 def mean_stroke(slide) -> tuple[float, float]:
-    """Return the mean path [m] and the mean number of moving steps between reversals."""
+    """Return the mean path [m] between two reversals of a slide (k,) [m], and the mean number of steps that move on it."""
     moves = np.diff(slide)
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
@@ -203,7 +203,10 @@ def uses_parallel_elements(model) -> bool:
 
 
 def nodal_element_limit(model, patch):
-    """Return the nodal friction limits (m,) [Pa] of parallel elements; None for other methods."""
+    """Return the tractions (m,) [Pa] at which the nodes of a pressed patch slip, if parallel elements compute the slip.
+
+    The result is None for other methods.
+    """
     return model.friction.static * patch.pressure.sigma_n if uses_parallel_elements(model) else None
 
 

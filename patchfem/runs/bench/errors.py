@@ -77,7 +77,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     """
 
     def solve(variant: CoarseRun):
-        """Compute a bench run with coarser settings."""
+        """Run the bench with the coarser steps, mesh, bond summation or shear modes of a comparison run."""
         coarse_model = model
         if variant.modes is not None:
             accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
@@ -160,7 +160,7 @@ def find_bond_sum_error(engine) -> float:
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> Values:
-    """Estimate the errors of the measures due to bond summation."""
+    """Estimate the errors of the measures of a BenchRun due to bonds that the sum leaves out or merges."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     return friction_errors(
         fine_run.values,

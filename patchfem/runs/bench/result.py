@@ -167,7 +167,10 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
 
 
 def _warn_of_overhang(patch, fine) -> list[str]:
-    """Return warnings if the upper piece leaves the loaded area or the lower piece."""
+    """Return warnings if the upper piece slides off the loaded area, or slides far compared with the contact.
+
+    `patch` is the pressed patch, and `fine` is the run with the finest resolution, with its loads and slides over time.
+    """
     warnings = []
     load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if load_loss > 0.01:

@@ -313,7 +313,7 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
     tolerance = model.accuracy.tolerance
 
     def compute() -> "shear_modes.ShearModes":
-        """Compute the modes, for all runs with the same Patch."""
+        """Compute the shear modes, which the cache keeps for all runs with the same Patch."""
         weakening = _find_weakening(law)
         limit = law.static * patch.pieces.interface.weight
         sigma = patch.pressure.sigma_n

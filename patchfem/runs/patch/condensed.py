@@ -163,7 +163,7 @@ def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
     """
 
     def make() -> CondensedPair:
-        """Condense the pieces and delete their factors."""
+        """Condense the pieces to their interface, and delete their factors, except those with a round-off error above 0."""
         pair = condense(patch_model, grid, upper_grid)
         for piece in (pair.piece, pair.upper):
             if not piece.round_off_error:

@@ -20,7 +20,10 @@ from .press import Patches
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
-    """Solve the contact of each interface that has a patch, and yield the interface with its patch."""
+    """Solve the static contact of each interface of a rig that has a patch of its own.
+
+    Yields a Face for each of them, with its number and name, its Model, and the patch on its meshes.
+    """
     rig = model.rig
     for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
         if interface.patch is not None:
@@ -79,7 +82,10 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> P
 
 
 def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:
-    """Return the indices of the interfaces with a coarser mesh, grouped by distinct patch."""
+    """Return groups of indices of the interfaces that have a coarser mesh for the error estimate.
+
+    Interfaces with equal patches share one solution, and are a group.
+    """
     out = {}
     for face in solve_interface_patches(model):
         if face.partial_slip and face.patches[1] is not None:

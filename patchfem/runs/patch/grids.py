@@ -88,7 +88,7 @@ COARSE_GRID_DENSITY = GridDensity(0.9, 10, 0.8)
 
 
 def choose_density(patch_model) -> GridDensity:
-    """Return the density of the grids of a patch, which depends on whether the mesh takes most of the time of its run."""
+    """Return how dense the grids of a patch are: coarser in a rig or with wear, where each node slows down every step."""
     return FINE_GRID_DENSITY if patch_model.mesh.is_fine else COARSE_GRID_DENSITY
 
 
@@ -231,7 +231,10 @@ def make_load_variants(patch_model) -> list[PatchModel]:
 
 
 def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
-    """Return whether columns at x (k,) [m] have cells of a layout inside a span, up to a ratio of their lengths."""
+    """Return whether all columns at x (k,) [m] inside a span (start, end) [m] are short enough.
+
+    A column is short enough if its length is at most `ratio` times the cell length that `layout` asks for at its middle.
+    """
     inside = (x[1:] > span[0]) & (x[:-1] < span[1])
     middle = (x[1:] + x[:-1])[inside] / 2
     return bool((np.diff(x)[inside] <= ratio * layout.cell_lengths(middle)).all())
@@ -337,7 +340,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
 
 
 def _merge_layouts(layouts: list[Layout]) -> Layout:
-    """Merge column layouts, taking the shortest cell of all layouts at each position."""
+    """Merge column layouts of several loads or cases, taking the shortest cell of all of them at each position."""
     if len(layouts) == 1:
         return layouts[0]
     bands = set()
@@ -370,14 +373,15 @@ def _merge_layouts(layouts: list[Layout]) -> Layout:
 
 
 def _make_point_bands(places, cell: float) -> Bands:
-    """Return bands with a node at each position [m] between cells of a given length [m]."""
+    """Return bands without width, which put a node at each position [m], between cells of a given length [m]."""
     return [(place, place, cell) for place in places]
 
 
 def _make_edge_bands(edge_positions: list[tuple[float, ...]], min_cell: float) -> Bands:
-    """Return the bands of short columns around the contact edges.
+    """Return the bands of short columns around the contact edges: (start, end, cell length) [m] of each.
 
-    If all contacts have equally many edges, each band covers the range over which its edge moves.
+    `edge_positions` are the edges [m] under each load. If all loads have equally many edges, each band covers the range
+    over which its edge moves; otherwise each position has a band. `min_cell` [m] is the length of the columns.
     """
     if len(set(map(len, edge_positions))) == 1:
         return [(min(sweep), max(sweep), min_cell) for sweep in zip(*edge_positions)]

@@ -81,7 +81,7 @@ def list_elements(patch: Patch, static: float, length: float) -> tuple[PatchElem
 
 
 def join_elements(parts: tuple[PatchElements, ...]) -> PatchElements:
-    """Return the elements of strips that slide together, from those of each strip."""
+    """Return the elements of strips that slide together: those of all strips side by side."""
     if len(parts) == 1:
         return parts[0]
     stiffness, yield_displacement, _ = zip(*parts)

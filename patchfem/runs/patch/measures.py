@@ -152,10 +152,10 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
 
 
 def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Measures:
-    """Return the measures that profile points determine more accurately than the mesh.
+    """Return those measures by name that the points of a profile determine more accurately than the mesh.
 
-    Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
-    peak pressure, and therefore a small absolute error.
+    `by_mesh` and `by_points` are the measures of both solutions. Peak measures are compared by their relative errors: a
+    mesh that smooths the profile has a low peak pressure, and therefore a small absolute error.
     """
     out = {}
     for name, measure in by_points.items():
@@ -197,7 +197,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch])
 
 
 def _count_contact_intervals(active) -> int:
-    """Return the number of contact intervals in a contact set (m,)."""
+    """Return the number of separate parts of the interface that are in contact, from the contact set (m,) of its nodes."""
     return int(np.count_nonzero(active & np.diff(active, prepend=False)))
 
 
@@ -292,9 +292,9 @@ def extrapolate_static_measures(
 
 
 def widen_fraction_error(peak: Measure, fraction: Measure) -> Measure:
-    """Return the loaded fraction with at least the part of its error that is due to the peak pressure.
+    """Return the loaded fraction with an error that is at least that due to the peak pressure.
 
-    A loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
+    The loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
     relative error.
     """
     relative = peak.error / peak.value if peak.value > 0 else 0.0
@@ -335,7 +335,7 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
 
 
 def are_cells_halved(fine, coarse) -> bool:
-    """Return whether the finer of two Pairs halves every cell of the coarser one."""
+    """Return whether the condensed pieces `fine` have a mesh that halves every cell of that of `coarse`."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     for halved, grid in bodies:
         if not (isinstance(halved, TensorGrid) and isinstance(grid, TensorGrid)):

@@ -66,7 +66,7 @@ def solve_with_coarser(
     condense_level = condense if mesh.shared is None else condense_once
 
     def solve() -> Patches:
-        """Solve the patch on the given or shared meshes."""
+        """Solve the patch on the meshes that the scene prescribes or that the cases of a sweep share."""
         pairs = [condense_level(patch_model, *level) for level in levels]
         return solve_on_pairs(patch_model, pairs, tolerance)
 
@@ -210,16 +210,20 @@ def solve_on_refined_meshes(
 
 
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
-    """Return whether the measures that control the mesh meet the tolerance with given points.
+    """Return whether the errors of the static measures for which the mesh is refined are within the tolerance.
 
-    `patches` are the solved patch on successive meshes, and `points` the solution on equally spaced points, or None.
+    `patches` are the solved patch on successive meshes, and `points` the solution on equally spaced points of a profile, or
+    None.
     """
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
 
 
 def is_too_expensive(patch_model, bodies) -> bool:
-    """Return whether condensing meshes of the pieces takes more CPU time than the finest mesh of a patch may take."""
+    """Return whether condensing the pieces on given meshes takes more CPU time than the finest mesh of a patch may take.
+
+    To condense a piece is to compute its compliance at the interface nodes. `bodies` are the meshes of both pieces.
+    """
     return predict_condensing_seconds(bodies) > choose_density(patch_model).max_condensing_seconds
 
 

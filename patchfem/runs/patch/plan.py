@@ -62,9 +62,9 @@ def count_unknowns(model: Model) -> dict[str, int]:
 
 
 def stiffness_chain(patch_model) -> StiffnessChain:
-    """Return a dict of the stiffnesses [N/m] in series between holder and interface of a patch.
+    """Return the stiffnesses [N/m] in series between the holder and the interface of a patch, by name.
 
-    An element that is not in the scene is "rigid".
+    The names are "holder", "pieces_shear" and "asperities"; the value of an element that is not in the scene is "rigid".
     """
     stiffnesses = {
         "holder": patch_model.loading.tangential_stiffness or "rigid",

@@ -258,7 +258,7 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
 
 
 def _distinct_pieces(patch_model) -> list[tuple[PatchPiece, int]]:
-    """Return the distinct pieces of a patch as pairs (piece, multiplicity)."""
+    """Return (piece, number of times it occurs) for the pieces of a patch: one pair if both are alike, else two."""
     pieces = patch_model.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 

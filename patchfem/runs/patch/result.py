@@ -111,6 +111,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
     has_error_mesh : bool
         Whether the patch is solved on another mesh too, from which its errors follow.
     """
+    # Linear elasticity assumes small strains, which two ratios check.
     materials = []
     for piece in patch_model.pieces.both:
         materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
@@ -145,6 +146,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
             f"twice the estimates; {_advise_shorter_elements(patch_model)}"
         )
 
+    # Warnings on the profile, and on a mesh without a coarser one for an error estimate.
     warnings += [text for text in patch.notes if not nodes.is_note(text)]
     if not has_error_mesh:
         warnings.append(

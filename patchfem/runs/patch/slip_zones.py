@@ -49,10 +49,10 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
 
 
 def _yielding_intervals(x, yield_displacement, amplitude: float) -> list[Zone]:
-    """Return the intervals of x [m] in which the yield displacement is below an amplitude.
+    """Return the intervals (start, end) of x [m] in which the nodes slip under a prescribed displacement.
 
     `x` [m] are positions of neighbouring nodes, `yield_displacement` [m] is the displacement at which each of them
-    slips, and `amplitude` [m] that of the prescribed displacement.
+    slips, and `amplitude` [m] that of the prescribed displacement. Between two nodes the yield displacement is linear.
     """
     is_yielding = np.concatenate([[False], yield_displacement < amplitude, [False]])
     ends = []

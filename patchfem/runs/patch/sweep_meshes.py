@@ -140,10 +140,7 @@ def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
 
 
 def _list_numbers(value) -> list[float]:
-    """Return the numbers in nested tuples in their order.
-
-    None counts as 0, and texts are left out.
-    """
+    """Return all numbers in nested tuples as a flat list, in their order; None counts as 0, and texts are left out."""
     if value is None or isinstance(value, int | float):
         return [float(value or 0.0)]
     if not isinstance(value, tuple):

@@ -189,7 +189,10 @@ def _compute_static_values(patch: Patch) -> Values:
 
 
 def _compute_edge_values(patch: Patch) -> EdgeValues:
-    """Return contact length and contact stiffnesses, summed over the strips of a patch."""
+    """Return contact length and contact stiffnesses of a patch; those of its strips are summed.
+
+    All depend on where the contact ends between two nodes, which the nodal pressures show.
+    """
     count = len(patch.state.force)
     skin = patch.model.interface.skin
     motions = np.stack([np.ones(patch.x.size), patch.x], axis=1)
@@ -255,7 +258,8 @@ def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
 def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list[edges.ContactEdge]:
     """Return the contact edges of one strip of a solved patch, with their positions between two nodes.
 
-    `strip` is the number of the strip, 0 without strips, and `pressed` the factor of its nodes in contact.
+    `strip` is the number of the strip, 0 without strips. `pressed` is the Cholesky factor of the compliance of its nodes in
+    contact, by which the pressure near an edge is corrected.
     """
     x = patch.x
     state = patch.state

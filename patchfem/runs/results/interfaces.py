@@ -38,7 +38,7 @@ class Face(NamedTuple):
 
     @property
     def surface(self):
-        """Points at which the fields of the interface are given (`press.Surface`)."""
+        """Points of the interface at which its fields are given, with pressure and gap (`press.Surface`)."""
         return patch_surface(self.patch, self.fields or {})
 
     @property

@@ -75,7 +75,10 @@ def _warn_of_infinite_traction(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
-    """Warn of the printed law if bonds slide by more than MAX_BOND_FORMING_SLIP_RATIO of their length while they form."""
+    """Warn of a law as printed in the 1985 report whose bonds slide far while they form.
+
+    The limit is MAX_BOND_FORMING_SLIP_RATIO of the bond length; beyond it the printed law differs from its own equations.
+    """
     law = find_bonds(facts.model)
     if law is None or law.reading != "report":
         return
@@ -93,7 +96,10 @@ def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
 
 
 def _warn_of_creep(facts: LawFacts) -> Iterator[str]:
-    """Warn of the drift of a bounded motion (Dahl's creep), which is a property of the law, not of the joint."""
+    """Warn of a mean position that moves on in each cycle of a bounded motion (creep under a mean force, as in Dahl's law).
+
+    The drift is a property of the law, not of the joint.
+    """
     law = find_bonds(facts.model)
     drift = facts.measures.get("drift_per_cycle")
     is_bounded = facts.outcome in (Outcome.STEADY, Outcome.STUCK)
@@ -157,7 +163,12 @@ def _warn_of_work_check(facts: LawFacts) -> Iterator[str]:
 
 
 def _note_on_growth(facts: LawFacts) -> Iterator[str]:
-    """Note that initial bonds of the printed law do not grow, or that growing bonds may exceed the friction limit."""
+    """Note on a bond length that grows during the run.
+
+    In the law as printed in the 1985 report only bonds that form during the motion have the grown length, not the
+    initial ones. In the other reading of the law, older bonds pull harder as the length grows, so that friction may
+    exceed mu_s N.
+    """
     law = find_bonds(facts.model)
     if law is None or not law.has_growth:
         return

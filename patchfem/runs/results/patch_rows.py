@@ -205,7 +205,10 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
 
 
 def find_unknown_measures(measures: Measures) -> list[str]:
-    """Return the positive measures that control the mesh and whose error exceeds their value."""
+    """Return the names of the measures that are hardly known: their error exceeds their value.
+
+    Only measures that are positive by definition and for which the mesh is refined are considered.
+    """
     names = []
     for name in POSITIVE_MESH_MEASURES:
         measure = measures.get(name)

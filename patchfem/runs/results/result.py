@@ -299,7 +299,7 @@ def _make_surface_frame(surface) -> Arrays:
 
 
 def patch_surface(patch, fields: Arrays):
-    """Return the surface at whose points the fields of a patch are given; None without a patch.
+    """Return the points at which the fields of a patch are given, with pressure and gap; None without a patch.
 
     After a motion these are the nodes of the mesh, otherwise the points of `collect_rest_frame`.
     """
@@ -387,9 +387,10 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP_RULE) -> np.ndarray:
 
 
 def collect_used_settings(result) -> dict[str, str | float]:
-    """Return the `Settings` that a run used by name, and the resolution of its patches.
+    """Return the numerical settings that a run used, by name.
 
-    These are the nodes of each interface, the strips of the patch, and the averaging length [m] of its profile.
+    Besides those of `Settings`, they contain the resolution of its patches: the nodes of each interface, the strips of the
+    patch, and the length [m] over which its profile is averaged.
     """
     patch = result.patch
     used = result.settings._asdict()

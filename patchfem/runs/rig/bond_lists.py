@@ -45,11 +45,11 @@ MAX_BOND_VIBRATION_PHASE = 2.0
 def choose_bond_summation(model: Model, numerics: Numerics):
     """Choose the method of bond summation of a nonlocal law in a rig.
 
-    A law that needs no bond list has the recursion, which is exact. Otherwise the method depends on
-    the stroke, which is four times the amplitude that follows from the speed scale and the frequency
-    of the drive, or from the stiffness of the bonds if they hold the block. If the motion decays
-    (release, step), the stroke is reduced to DECAYED_STROKE_RATIO, because a list of all bonds would need
-    too much memory. For a block held by the printed law it is reduced to STICKING_STROKE_RATIO.
+    A law that needs no bond list has the recursion, which is exact. Otherwise the method depends on the stroke, i.e. the
+    path between two reversals of the motion. It is four times the amplitude that follows from the speed scale and the
+    frequency of the drive, or from the stiffness of the bonds if they hold the block. If the motion decays (release,
+    step), the stroke is reduced to DECAYED_STROKE_RATIO, because a list of all bonds would need too much memory. For a
+    block held by the law as printed in the 1985 report it is reduced to STICKING_STROKE_RATIO.
     """
     if numerics.choice is not None:
         return numerics.choice
@@ -61,7 +61,7 @@ def choose_bond_summation(model: Model, numerics: Numerics):
 
 
 def has_bond_list(model: Model, numerics: Numerics) -> bool:
-    """Return whether the friction force is summed over a bond list."""
+    """Return whether a law with bonds needs a list of all bonds that have formed, over which its force is summed."""
     f = model.friction
     return (
         f is not None

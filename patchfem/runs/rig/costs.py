@@ -106,7 +106,11 @@ def estimate_elements(model: Model) -> ElementSizes:
 
 
 def estimate_hybrid_steps(model: Model) -> float:
-    """Estimate the number of steps per cycle of the engine `hybrid`."""
+    """Estimate the number of steps per cycle of the engine `hybrid`, which integrates from event to event.
+
+    An event is a stop, a release or a reversal of an interface. Each interval between events takes steps that resolve the
+    fastest vibration of the modes and the fastest change of a law.
+    """
     rig = model.rig
     modes = rig.modes
     drive = rig.drive.signal

@@ -62,7 +62,7 @@ def compute_decay_curve(solution: Solution) -> DecayCurve | None:
 
 
 def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
-    """Add the differences from coarse runs to the errors of a decay curve."""
+    """Add the differences of the curve in coarse runs, with fewer steps or modes, to the errors of a decay curve."""
     for run, beside in solution.coarser:
         reference = curve if beside is None else _measure_decay_curve(beside)
         curve = curve.add_change(_measure_decay_curve(run), reference)
@@ -166,7 +166,7 @@ def compute_static_curve(
 
 
 def tabulate_static_motions(modes, motions) -> np.ndarray:
-    """Return amplitude, frequency, damping ratio, loss and force (5, k) of quasi-static motions."""
+    """Return amplitude [m], frequency [Hz], damping ratio, loss [J] and force [N] of quasi-static motions, (5, k)."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]
@@ -205,7 +205,11 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
 
 
 def _spread_elements(stiffness, yield_displacement) -> tuple[np.ndarray, np.ndarray]:
-    """Spread friction elements at mesh nodes, in any order, over the yield displacements between the nodes."""
+    """Spread friction elements at the nodes of a mesh uniformly over ranges around their yield displacements.
+
+    The change that this causes is the mesh error: between two nodes, the yield displacement is not constant. `stiffness`
+    [N/m] and `yield_displacement` [m] (e,) are in any order; returned are those of the spread elements.
+    """
     order = np.argsort(yield_displacement, kind="stable")
     return spread_elements(stiffness[order], yield_displacement[order])
 

@@ -88,9 +88,10 @@ def may_fold(model: Model) -> bool:
 
 
 def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
-    """List the comparison runs with other modes of a reduced structure, if modes are neglected.
+    """List the comparison runs with other modes of a reduced structure, which neglects its highest modes.
 
-    One has more modes, another one half of them. Those of a time integration have a quarter of the steps.
+    One run has more modes, another one half of them; the list is empty if no modes are neglected. The runs of a time
+    integration have a quarter of the steps of `numerics`, the settings of the run.
     """
     n_rigs = len(model.rig.structure.other_rigs)
     if not n_rigs:
@@ -116,12 +117,12 @@ def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> li
 
 
 def _divide_steps(numerics, divisor: int):
-    """Return numerical settings with a fraction of the steps per cycle."""
+    """Return the Numerics of a run with its number of steps per cycle divided by `divisor`."""
     return replace(numerics, steps=max(1, numerics.steps // divisor))
 
 
 def _list_march_time_runs(model: Model, numerics) -> ComparisonRuns:
-    """List the comparison runs of a time integration with half and with a quarter of its steps."""
+    """List the comparison runs of a time integration: those with half and with a quarter of the steps of `numerics`."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(convergence_errors, steps=numerics.steps), source="steps")]
 
@@ -189,7 +190,10 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
         return []
 
     def bound_errors(values: Values) -> Values:
-        """Return the errors of the measures due to truncation of the sum over bonds."""
+        """Return a bound of the error of each measure in `values` due to bonds that the sum leaves out or merges.
+
+        The bound follows from the relative error of the force and from the friction work of the run.
+        """
         load = first_interface_load(model, patch)
         window = solution.window
         passed = np.abs(np.diff(window.extra["ledger"][0])).sum()
@@ -269,10 +273,10 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 
 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
-    """List the comparison runs of a steady motion on coarser meshes, after the errors that its finder knows.
+    """List the comparison runs of a steady motion on coarser meshes.
 
-    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them. `solution` is the steady motion,
-    with the errors that its finder knows by measure.
+    The first entry has no runs, but the errors that the solver of the motion knows by measure (`solution.errors`).
+    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]

@@ -142,7 +142,10 @@ class RunEvaluator:
         return values
 
     def is_stuck(self, run) -> bool:
-        """Return whether all interfaces or strips stick during the last cycles of a run."""
+        """Return whether no interface or strip slips in the last cycles by more than `stick_tolerance` [m].
+
+        A law that creeps never sticks.
+        """
         if not self.has_friction or self.creeps:
             return False
         return is_all_stuck(run.window, self.stick_tolerance)
@@ -162,7 +165,7 @@ class RunEvaluator:
         return {}
 
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return fields of the Solution that only this engine provides."""
+        """Return keyword arguments of `Solution` that only this engine provides; the base class has none."""
         return {}
 
     def make_solution(self, run, seconds: float, drive=None, **other_fields) -> Solution:
@@ -208,7 +211,7 @@ class RunEvaluator:
 
 
 def compute_sampled_work(response) -> Values:
-    """Return a dict with the friction work and the integral of its absolute value [J].
+    """Return {"sampled": friction work of a Response, "passed": integral of its absolute value} [J].
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
     """

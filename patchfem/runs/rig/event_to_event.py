@@ -94,11 +94,13 @@ class SampleTimes(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LumpedRun:
-    """Run of the engine with histories.
+    """Run of the engine `hybrid`, in which each interface has a single relative displacement, with its histories.
 
     - values: measures of the last cycles by name.
     - response, window: histories of the run and of its last cycles.
-    - extremes (c, 2), phasors (c,): of the output in each cycle, see `hybrid.runs.Motion`.
+    - extremes (c, 2), phasors (c,): minimum and maximum, and complex amplitude at the drive frequency, of the output
+      [m]
+      in each of c cycles.
     - ledger: energies [J] and counters by name.
     - outcome, message: how the run ended, if it ended early.
     - end: arrays of the engine at the end, from which another run can go on.
@@ -152,7 +154,7 @@ def run_from_event_to_event(
 
 
 class LumpedEvaluator(RunEvaluator):
-    """Runs of the engine `hybrid` and their evaluation."""
+    """Evaluator that computes runs of the engine `hybrid`, and measures from them."""
 
     def __init__(self, model, numerics, patch, joints: Joints):
         super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
@@ -440,7 +442,11 @@ class LumpedEvaluator(RunEvaluator):
         }
 
     def _limit_loop_measures(self, run) -> dict[str, None]:
-        """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
+        """Return {name: None} for the measures of the friction loop that a run does not have.
+
+        An interface that hardly moves has no stiffness. A motion in several modes has no equivalent damping, which refers to
+        the stiffness of a single one.
+        """
         missing = {}
         if np.ptp(run.window.slide) <= MAX_RESTING_SLIDE_RANGE:
             names = ("equivalent_stiffness", "secant_stiffness", "harmonic_force_ratio")
@@ -450,7 +456,10 @@ class LumpedEvaluator(RunEvaluator):
         return missing
 
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return the vibration of a release after its last slip, in which the rig is linear."""
+        """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.
+
+        No interface slips any more, so that the rig is linear. The dict is empty for other drives and nonlinear springs.
+        """
         rig = self.model.rig
         is_linear = not self.joints.laws
         springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
@@ -497,7 +506,7 @@ class LumpedEvaluator(RunEvaluator):
 
 
 def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
-    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
+    """Remove the extremes and the complex amplitude of a last cycle that the run did not complete."""
     count = int(run.cycles_done + 1e-9)
     if not count:
         return run
@@ -514,7 +523,7 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
 
 
 def _find_even_samples(window: Response) -> np.ndarray:
-    """Return which samples (k,) of a window are of equal distances, and not of events."""
+    """Return which samples (k,) of a window lie at equal distances in time; the others are those of events."""
     position = (window.time - window.time[0]) / np.diff(window.time).max()
     return np.abs(position - np.round(position)) <= 1e-6
 

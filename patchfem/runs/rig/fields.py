@@ -87,6 +87,7 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
 
     The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.
     """
+    # The first frame is the pressed patch at rest; the others are snapshots of the motion.
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
     snapshots = solution.snapshots
@@ -96,10 +97,12 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     lift = np.array([0.0, *(snapshot.heave for snapshot in snapshots)])[:, None]
     turn = np.array([0.0, *(snapshot.pitch for snapshot in snapshots)])[:, None]
 
+    # Gap = opening without forces + motion of the holder + compliance times forces, and 0 in contact.
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
 
+    # Slip is the slide less the stretch of the law and the shear of the pieces.
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
     for k, snapshot in enumerate(snapshots, 1):

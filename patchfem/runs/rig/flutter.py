@@ -59,14 +59,15 @@ class Flutter(NamedTuple):
 
 
 def compute_flutter_amplitude(run) -> Flutter:
-    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig, above which a motion grows.
+    """Compute the amplitude above which friction does not limit a mode with negative damping, so that a motion grows.
 
-    `run` is the `rig.CoupledRun` of the rig, whose model has a mode of negative damping. Without an unstable cycle the
-    measure has no value, but the reason.
+    It is the amplitude of the largest unstable limit cycle. `run` is the `rig.CoupledRun` of the rig. Without an unstable
+    cycle the measure has a reason instead of a value.
     """
     model = run.model
     unit = MOTION_TABLE[FLUTTER_MEASURE].unit
     floor = MOTION_TABLE[FLUTTER_MEASURE].floor
+    # Limit cycles by increasing amplitude, why no unstable one is known, and the smallest amplitude [m] of the search.
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
 
     end_notes = []

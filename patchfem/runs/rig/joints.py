@@ -58,7 +58,10 @@ class Joint(NamedTuple):
     reduction: shear_modes.JenkinsSet | None = None
 
     def make_law(self):
-        """Return the law of an interface that slips as a whole, per newton of load, or the parameters of its bonds."""
+        """Return the friction law of an interface that slips as a whole, as the record from which engines take its numbers.
+
+        Its forces are per newton of load. For the nonlocal law it is the record of the bonds.
+        """
         if law_has_trait(self.law.law, "bonds"):
             return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
         return record.make_law(self.law, self.load.mean)
@@ -70,20 +73,23 @@ class Joint(NamedTuple):
         return self.make_law().element(self.load.mean)
 
     def make_point_law(self) -> point_laws.PointLaw:
-        """Return the law under its mean load in the form of the march."""
+        """Return the law under its mean load as a PointLaw, the form for the time integration with equal steps."""
         if self.stiffness is not None:
             return point_laws.make_elements(self.stiffness, self.yields)
         return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
-        """Return the law in the form of the engine `hybrid`."""
+        """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
         if self.stiffness is not None:
             return from_elements(self.stiffness, self.yields)
         load = self.load
         return hybrid_laws.make_law(self.law.law, self.make_law(), load.mean, varies=load.varies)
 
     def list_elements(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return stiffness [N/m] and yield displacement [m] (e,) of parallel elements; empty for other laws."""
+        """Return stiffness [N/m] and yield displacement [m], both (e,), of the parallel spring-slider elements.
+
+        Both are empty for a law that is not made of such elements.
+        """
         element = self.make_element()
         count = int(element.numbers[1]) if element.form == "parallel" else 0
         return element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
@@ -111,7 +117,7 @@ class Joints(NamedTuple):
 
     @property
     def springs(self) -> np.ndarray:
-        """Stiffness (i,) [N/m] of each interface in stick, or nan for a law that is no single element."""
+        """Stiffness (i,) [N/m] of each interface in stick, or nan for a law that is not a single spring with a slider."""
         return np.array([_find_spring_stiffness(law) for law, _ in self.laws])
 
 
@@ -165,9 +171,10 @@ def _make_point_load(point) -> Load:
 
 
 def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
-    """Return loads and elements of the patch of the table [contact], or of its strips if they slide apart.
+    """Return pairs of load and elements: one of the patch in [contact], or one of each strip if the strips slide apart.
 
-    The elements are the last fields of a Joint, () without partial slip.
+    The elements are those of a patch that slips node by node, as the last fields of a Joint: stiffness, yield
+    displacement and JenkinsSet. They are () for a patch that slips as a whole.
     """
     slide_apart = model.rig.friction.strips_slide_apart
     load = Load(float(patch.pressure.load))
@@ -220,7 +227,7 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
 
 
 def _make_groove_law(model: Model) -> LawNumbers:
-    """Return the law of the only interface, whose flanks lift the load."""
+    """Return the law of the only interface, whose grooves lift the load along their flanks when it slides."""
     slide = model.rig.modes.slide
     mass = model.rig.modes.mass / float(slide @ slide)
     model.grooves.check_lifted_mass(model.friction.static, mass)
@@ -236,7 +243,11 @@ def _find_spring_stiffness(law: LawNumbers) -> float:
 
 
 def _find_stick_tolerance(joints, laws) -> float:
-    """Return the largest slip per cycle [m] of interfaces that count as stuck, or 0 for rigid laws."""
+    """Return the largest slip per cycle [m] at which the interfaces still count as stuck, or 0 for rigid laws.
+
+    It is a small fraction of the shortest displacement over which one of the laws reaches its friction limit. `joints`
+    are the Joints of the interfaces, and `laws` their LawNumbers.
+    """
     lengths = []
     for joint, law in zip(joints, laws):
         keys = joint.law

@@ -128,7 +128,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
     def find(run) -> Onset | None:
-        """Return the onset in a run."""
+        """Return the onset of slip in a run with drive levels, or None if no level reaches it."""
         return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
     onset = find(solution)
@@ -145,7 +145,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
 
 
 def convert_to_scene_units(rig, drive_levels) -> tuple[Level, ...]:
-    """Return the Levels with their amplitudes [m s-2] in the unit of the scene, [m s-2] or [N] for a force."""
+    """Return the drive levels of a run with their amplitudes in the unit of the scene: [m s-2], or [N] for a force."""
     unit, factor = _find_level_unit(rig)
     return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in drive_levels)
 
@@ -200,7 +200,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         return run, Level(level, evaluator.is_stuck(run), values, errors)
 
     def run_level(number: int, level: float) -> Level:
-        """Run a level from the final state of level `number`, or from rest if it is -1."""
+        """Run the drive at an amplitude `level` [m s-2] from the final state of level `number`, or from rest if it is -1."""
         return solve(level, runs[number] if number >= 0 else None)[1]
 
     # Each level goes on from the end of the one before; a run that ends early is the last one.
@@ -214,6 +214,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
         if run.outcome is not None:
             break
 
+    # One run has the histories of all levels; `run_level` computes further levels in the search for the onset of slip.
     joined = join_runs(runs, drive.levels.cycles * drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 
@@ -224,7 +225,7 @@ def _report_fraction(progress, runs, n_levels: int, fraction: float) -> None:
 
 
 def join_runs(runs, duration: float):
-    """Join the runs of successive drive levels to a single run.
+    """Join the runs of successive drive levels, each of `duration` [s], to a single run with histories over all of them.
 
     The window and the friction loop are those of the last level.
     """

@@ -49,7 +49,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 
 class MarchEvaluator(RunEvaluator):
-    """Runs that are integrated with constant time steps, and their evaluation."""
+    """Evaluator that computes runs with equal time steps, and measures from them."""
 
     def __init__(self, model, numerics, patch, contact):
         stick_tolerance = 0.0
@@ -107,7 +107,7 @@ class MarchEvaluator(RunEvaluator):
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)
 
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return the bond summation of a law with bonds."""
+        """Return {"bond_summation": method by which the bonds were summed}, or {} for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return {}

@@ -58,7 +58,7 @@ def collect_remarks(run, settings: Settings) -> Remarks:
 
 
 def collect_law_facts(run, settings: Settings) -> LawFacts:
-    """Return what a run shows of its friction law."""
+    """Return what the warnings and notes on a friction law need: law, patch, measures, forces and energies of a run."""
     model = run.model
     solution = run.solution
     limit = 0.0
@@ -81,7 +81,7 @@ def collect_law_facts(run, settings: Settings) -> LawFacts:
 
 
 def _warn_of_single_points(run) -> list[str]:
-    """Warn of patches whose shape has no effect, because they move exactly like single points."""
+    """Return warnings on patches that move exactly like single points, so that their shape has no effect on the motion."""
     return merge_sentences(
         run.model,
         run.inputs.faces,
@@ -90,7 +90,10 @@ def _warn_of_single_points(run) -> list[str]:
 
 
 def _is_single_point(run, face: Face) -> bool:
-    """Return whether the patch of an interface moves exactly like a single point."""
+    """Return whether an interface moves exactly like a single point.
+
+    It does if its pieces are rigid in shear, its load is constant, and the pressure moves with the upper piece.
+    """
     model = run.model
     law = face.model.friction
     can_move = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart

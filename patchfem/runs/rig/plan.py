@@ -28,7 +28,7 @@ Chain = dict[str, float | str]  # stiffness [N/m] of each link by name, or why i
 
 
 def structure_stiffnesses(rig) -> Chain:
-    """Return a dict of the stiffnesses [N/m] of the structure in the stiffness chain."""
+    """Return the stiffnesses [N/m] of the structure by name: "mode" at the contact, and "bonded" if it has such a spring."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )

@@ -90,7 +90,7 @@ class CoupledRun:
 
     @property
     def has_errors(self) -> bool:
-        """Whether the errors of the measures are known."""
+        """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
         is_solved = self.solution.outcome is not Outcome.NOT_CONVERGED
         return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
 
@@ -213,6 +213,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
         return refine.Refined(CoupledRun(inputs, numerics, first, measures))
 
+    # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
     space_runs = [
         *engine.list_space_runs(model, numerics, inputs.patch, inputs.coarse[0], first),
         *list_runs_with_other_modes(model, numerics),
@@ -221,7 +222,10 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     space_errors = runner.estimate_errors(space_runs, first)
 
     def solve(numerics: Numerics, coarser: CoupledRun | None) -> CoupledRun:
-        """Solve the rig with finer settings than before, and estimate the errors."""
+        """Solve the rig with `numerics`, and estimate the errors of its measures from runs with fewer steps.
+
+        `coarser` is the run with half as many steps, which is one of them; None in the first pass.
+        """
         solution = first
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
@@ -262,11 +266,11 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
 
 
 def _count_slip_period_cycles(model, numerics, solution) -> int:
-    """Return the number of cycles of a complete stick-slip period on a belt.
+    """Return how many cycles the stick-slip motion on a belt takes to repeat; 0 if it does not.
 
     A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one. The cycles are
-    those of `drive.period`. The result is 0 if the motion has no period, or if the run is shorter than two such periods.
-    `model` has the drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
+    those of `drive.period`. The result is also 0 if the run is shorter than two periods of the motion. `model` has the
+    drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
@@ -277,16 +281,17 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
 
 
 def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
-    """Decide whether a run is repeated with smaller steps, after runs with given excesses.
+    """Decide whether a run is repeated with smaller steps, and return the next steps as a Verdict.
 
-    It ends where two runs with smaller steps have not reduced the largest error, as those of some lists of bonds, which
-    depend on the steps. Measures that are not main ones count in a run that takes little time
-    (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
+    `excesses` are the largest ratios of error to allowed error [1] in the passes before. No pass follows if two of them
+    have not reduced the ratio, as with some lists of bonds, whose error depends on the steps. Only main measures count,
+    except in a run that takes little time (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
     """
     numerics = run.numerics
     max_passes = _count_finer_passes(run)
     if not max_passes:
         return refine.Verdict(0.0)
+    # Work of the run: steps times nodes, and more if each step presses the patch.
     counters = run.solution.book
     pressed = [face.patches[0] for face in run.inputs.faces]
     nodes = max(
@@ -298,6 +303,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_STEP_WORK_RATIO
 
+    # All measures count in a run that takes little time, else the main ones.
     tolerance = run.model.accuracy.tolerance
     measures = set_final_floors(complete_measures(run).measures, tolerance)
     if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
@@ -437,7 +443,7 @@ def _add_decay_curve(run: CoupledRun) -> CoupledRun:
 
 
 def _find_final_outcome(run: CoupledRun) -> Outcome:
-    """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
+    """Return the outcome of a run, or LEAVES_CONTACT if the slide at an interface exceeds the overlap of its pieces."""
     outcome = run.outcome
     for face in run.inputs.faces:
         slide = face.slide(run.solution.response)
@@ -446,7 +452,7 @@ def _find_final_outcome(run: CoupledRun) -> Outcome:
 
 
 def _collect_settings(run: CoupledRun) -> Settings:
-    """Return the numerical settings of a run."""
+    """Return the numerical settings that a run used, which its result states."""
     solution = run.solution
     numerics = run.numerics
     settings = solution.settings._replace(engine=numerics.engine, window_cycles=numerics.window)
@@ -466,7 +472,7 @@ def _collect_settings(run: CoupledRun) -> Settings:
 
 
 def _collect_motion(run: CoupledRun) -> MotionData:
-    """Return period, energies, levels, events, spectra and steady motion of a run."""
+    """Return what the Result states of a motion beside measures and histories, as MotionData."""
     solution = run.solution
     drive = run.model.rig.drive
     spectra = None

@@ -89,7 +89,10 @@ class Solution:
 
 
 def find_travel(rig) -> float:
-    """Return the output [m] at which a run ends: the travel of the scene, or the range of a softening spring."""
+    """Return the output displacement [m] at which a run ends.
+
+    It is the travel that the scene allows, or less for a softening spring, whose force decreases beyond a displacement.
+    """
     cubic = rig.springs.cubic
     if cubic is None or cubic >= 0:
         return rig.springs.travel
@@ -98,7 +101,7 @@ def find_travel(rig) -> float:
 
 
 def describe_escape(rig, travel: float) -> str:
-    """Return why a run ended at a travel [m] of `find_travel`; "" if it is the travel of the scene."""
+    """Return why a run ended at the displacement `travel` [m]; "" if it is the travel that the scene allows."""
     if travel >= rig.springs.travel:
         return ""
     return (

@@ -61,7 +61,7 @@ class Runner:
         self._done = 0.0  # reported fraction of all runs
 
     def solve(self, numerics: Numerics) -> Solution:
-        """Solve the rig with the given settings, and with all fields."""
+        """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
         has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
         return self._solve(
             self.model,
@@ -72,7 +72,10 @@ class Runner:
         )
 
     def _solve_coarse_run(self, numerics: Numerics) -> Solution:
-        """Solve the rig with coarser settings, and without fields."""
+        """Solve the rig with the settings of a comparison run, without frames of the interface.
+
+        The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
+        """
         model = self.model
         patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
         if numerics.other_rig is not None:
@@ -105,7 +108,7 @@ class Runner:
         share = left / 2 if self.inputs.estimate else left
 
         def report(fraction: float) -> None:
-            """Report the completed fraction of all runs from that of this run."""
+            """Report the completed fraction of all runs, given that of the present run."""
             if self.inputs.progress is not None:
                 self.inputs.progress(1 - left + share * fraction)
 

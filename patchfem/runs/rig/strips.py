@@ -25,7 +25,7 @@ def average_over_strips(run, patch):
     weights = loads / loads.sum()
 
     def average(histories):
-        """Return the histories of a single interface."""
+        """Return the histories of the strips as those of one interface that carries the whole load."""
         return replace(
             histories,
             slide=histories.slides @ weights,

@@ -95,7 +95,7 @@ History = tuple[WearState, tuple[WearMoment, ...]]
 
 
 class _UnboundedMotion(Exception):
-    """Exception for a worn model whose motion has no periodic cycle."""
+    """Signal that the motion of a worn rig grows without bound, so that no cycle repeats and the wear ends."""
 
 
 class _SlipPathFunction:
@@ -171,22 +171,24 @@ def make_worn_model(model, patch, depth):
 def compute_wear(
     model, patch, coarse, progress=None, initial: "History | None" = None, store=None
 ) -> WornPatch:
-    """Compute the wear of a patch over all cycles of a model with [wear].
+    """Compute the wear of a patch over all cycles of a model with [wear], in jumps over many cycles.
 
     Parameters
     ----------
     model : Model
         Unworn model with [wear].
     patch : Patch
-        Unworn patch.
+        Unworn patch, solved on its finest mesh.
     coarse : sequence of Patch or None
-        The unworn patch on coarser meshes; None for a missing one.
+        The unworn patch solved on two coarser meshes, on which the same jumps are repeated to estimate the error; None for
+        a mesh that does not exist.
     progress : callable, optional
         Called with the completed fraction of the cycles.
     initial : tuple, optional
-        State and moments of an interrupted run.
+        WearState (worn depth, cycle, length of the next jump) and tuple of WearMoments, with which an interrupted run goes
+        on.
     store : callable, optional
-        Called with state and moments after each jump.
+        Called with WearState and WearMoments after each jump, to save them.
 
     Returns
     -------
@@ -310,7 +312,10 @@ class WornPiece(NamedTuple):
 
 
 def list_worn_pieces(model, depth) -> list[WornPiece]:
-    """Return both pieces with their parts of a worn depth (m,) [m], (s, m) for strips, of both together."""
+    """Return both pieces, each with its part of the largest worn depth [m], which the scene divides among them.
+
+    `depth` is the worn depth of both together, (m,) [m] or (s, m) for strips.
+    """
     largest = float(depth.max(initial=0.0))
     share = model.wear.upper_share
     pieces = model.patch.pieces
@@ -332,7 +337,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     def find_excess(cycle: float) -> float:
-        """Return the largest worn fraction of a coating thickness after a jump, minus 1."""
+        """Return the worn fraction of the coating that is most worn after a jump to a cycle, minus 1."""
         end = state if cycle == state.cycle else jump_to(cycle)
         return _most_worn_coating(model, end.depth).fraction - 1
 

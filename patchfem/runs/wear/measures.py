@@ -61,6 +61,7 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
     if evolved.state is None:
         return result
 
+    # Measures of the wear by name. The finite length of the jumps also adds to the errors of the motion.
     worn = _measure_patch_wear(model, evolved, result.measures, with_errors=with_errors)
     if model.wear.friction is not None:
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
@@ -69,6 +70,7 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
 
+    # A run that continues an earlier one, or wears through a coating, says so.
     notes = list(result.notes)
     if model.wear.start is not None:
         notes.append(model.wear.start.sentence)
@@ -104,7 +106,10 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
 
 
 def _note_on_worn_through_coating(model, evolved) -> list[str]:
-    """Return a list with a note on the coating that is worn through."""
+    """Return a list with a note on the coating that is worn through, and where it is.
+
+    `evolved` is the `WornPatch` at the end of the wear.
+    """
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
@@ -153,7 +158,10 @@ def _widen_errors_by_jumps(result, evolved):
 
 
 def _warn_of_worn_depth(model, evolved) -> list[str]:
-    """Return warnings on a worn depth that is large compared with a piece or its coating."""
+    """Return warnings on a worn depth that is large compared with a piece or its coating.
+
+    `evolved` is the `WornPatch` at the end of the wear.
+    """
     warnings = []
     for piece, name, depth in list_worn_pieces(model, evolved.state.depth):
         if depth > MAX_WORN_THICKNESS_FRACTION * (piece.thickness or piece.height):
@@ -290,7 +298,11 @@ def _measure_worn_friction(model, evolved, motion: Measures, error: float | None
 
 
 def _warn_of_friction_table(model, evolved) -> list[str]:
-    """Return warnings on wear beyond the friction table and on jumps over several of its rows."""
+    """Return warnings on wear beyond the table [wear.friction], and on jumps over several of its rows.
+
+    The table gives the friction against the mean worn depth, and `evolved` is the `WornPatch` with the history of this
+    depth.
+    """
     table = model.wear.friction
     if table is None:
         return []
@@ -316,9 +328,10 @@ def _warn_of_friction_table(model, evolved) -> list[str]:
 
 
 def _relative_slip_change(moment, motion: Measures) -> float:
-    """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
+    """Return the relative difference of the slip amplitude in the last jump of the wear and in the final run.
 
-    The final run, on the worn patch, may have used smaller time steps.
+    `moment` is the last WearMoment, and `motion` has the measures of the final run, on the worn patch, which may have used
+    smaller time steps.
     """
     wear_amplitude = moment.values.get("slip_amplitude")
     final_amplitude = motion.get("slip_amplitude")

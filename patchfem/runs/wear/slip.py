@@ -103,7 +103,7 @@ class _PointSlip(NamedTuple):
 
     @property
     def path(self) -> np.ndarray:
-        """Paths (p,) [m] over all samples."""
+        """Slip paths (p,) [m] of the points over all samples."""
         return self.integrate_path(np.arange(len(self.slip)))
 
     def estimate_reversal_error(self, force) -> float:
@@ -135,7 +135,8 @@ class _PointSlip(NamedTuple):
 def choose_frame_count(tolerance: float) -> int:
     """Return the number of frames per cycle for a slip path accurate to tolerance/100.
 
-    A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
+    A frame is an instant at which the slip of all nodes is stored. A reversal between two of k frames of a sinusoid hides
+    up to (pi/k)^2/2 of the amplitude.
     """
     return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_CYCLE_FRAMES, MAX_CYCLE_FRAMES))
 
@@ -272,9 +273,9 @@ def _follow_rig(model, patch, frames: int) -> _Motion:
 
 
 def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
-    """Return the relative difference between the slip amplitudes of the last cycle and the window.
+    """Return the relative difference between the slip amplitudes of the last cycle and of all evaluated cycles.
 
-    A mode that still beats causes this difference.
+    `values` has the measures of the evaluated cycles. A mode that still beats causes this difference.
     """
     amplitude = float(np.ptp(cycle.slip)) / 2
     window_amplitude = values.get("slip_amplitude")

@@ -19,9 +19,10 @@ from .types import Table, list_keys
 class Selector:
     """A key whose value decides which other keys of its table are required or used.
 
-    - model: the table.
-    - key: the selector; "" for keys that the table needs or excludes in any case.
-    - choices: value of the selector -> required keys and optional keys. A key that stands here only with other values is
+    - model: class of the table.
+    - key: name of the selector; "" for keys that the table needs or excludes in any case.
+    - choices: value of the selector -> required keys and optional keys. A key that stands here only with other values
+      is
       not used with this one.
     """
 
@@ -173,7 +174,7 @@ def list_keys_unused_by_value(selector: Selector, value: str) -> tuple[str, ...]
 
 
 class TableChoices(NamedTuple):
-    """What the values of the selectors of a table mean for its other keys.
+    """Keys of a table that are needed or have no meaning, because of its selectors (keys such as `law`).
 
     - needs: (keys of which the table needs some, whether one of them must be given, reason).
     - unused: keys that have no meaning -> selector and value for which they have none.

@@ -143,9 +143,9 @@ def describe_requirement(key: Key | None, path: str) -> str:
 
 
 def _describe_other_type(key: Key, path: str) -> str:
-    """Return what the key at a dotted `path` accepts in place of one of its words, "" for nothing.
+    """Return what a key that accepts one of a few words accepts besides: a table, a whole number, or "" for nothing else.
 
-    It is a table or a whole number.
+    `path` is the dotted key, which names the table.
     """
     if key.inner is not None:
         return f"a table [{path}]"

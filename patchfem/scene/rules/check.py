@@ -20,7 +20,7 @@ RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "w
 
 
 def check_scene(draft: SceneDraft) -> str:
-    """Report all mistakes of a scene draft to it, and return the kind of scene.
+    """Add all mistakes of a scene to its draft, and return the kind of scene.
 
     The kind is "patch", "bench", "rig" or "linear", or "" if the tables define none.
     """
@@ -84,7 +84,10 @@ def find_kind(draft: SceneDraft) -> str:
 
 
 def _remark_unused_motions(draft: SceneDraft, kind: str) -> None:
-    """Add remarks on motions of modes that have no effect because the scene, of this `kind`, has no friction."""
+    """Add a remark on each `normal`, `pitch` or `yaw` of a mode in a scene of the kind "linear".
+
+    These motions of the patch have no effect without friction.
+    """
     for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
         for key in filter(mode.__getitem__, ("normal", "pitch", "yaw")):
             draft.add_remark(

@@ -19,10 +19,7 @@ MAX_INTERFACE_ELEMENTS = 100_000
 
 
 def find_max_load(patch: TableView) -> float:
-    """Return the load [N] of a patch at which the mean pressure is Young's modulus.
-
-    It is that of the softer substrate.
-    """
+    """Return the load [N] of a patch at which the mean pressure is Young's modulus of the softer substrate."""
     moduli = [(patch[name].substrate or patch.substrate).young for name in PIECE_KEYS_OF_PATCH]
     return min(moduli) * find_flat_length(patch) * patch.width * patch.pairs
 

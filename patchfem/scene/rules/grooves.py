@@ -16,7 +16,7 @@ def find_grooves(draft: SceneDraft) -> TableFacts | None:
 
 
 def find_steepest_slope(grooves: TableView) -> float:
-    """Return the steepest slope of the flanks of grooves."""
+    """Return the steepest slope [1] of the flanks of grooves, which are sinusoidal."""
     return 2 * pi / grooves.wavelength * grooves.amplitude
 
 

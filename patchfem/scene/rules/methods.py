@@ -39,7 +39,7 @@ class MotionFeatures(NamedTuple):
     - load_change: cause of a load that changes, such as "with normal.amplitude".
     - strips_yaw: whether the strips of the patch slide independently.
     - spring: key of the nonlinear spring of the rig, or of the grooves that the upper piece climbs.
-    - waveform: NO_WAVEFORM of a release and of the sine of a response curve.
+    - waveform: record of the waveform of the drive, in `effects`; NO_WAVEFORM for a release and for a response curve.
     - drive: the table [drive].
     - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
     """
@@ -281,7 +281,10 @@ def find_load_change_key(tables: Tables) -> str:
 
 
 def _find_mode_key(tables: Tables, *names: str) -> str:
-    """Return the first of the keys `names` of the modes in the tables that is not 0, or ""."""
+    """Return the dotted key of the first value of a mode that is not 0, such as "structure.mode.0.yaw", or "".
+
+    `names` are the keys of a mode that are looked at.
+    """
     for index, mode in enumerate(TableView(tables).structure.mode):
         for name in names:
             if mode[name]:

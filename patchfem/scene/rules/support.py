@@ -101,7 +101,7 @@ class Joint(TableFacts):
         return law_has_trait(self.law or None, trait)
 
     def supports(self, *words: str) -> bool:
-        """Return whether the law is known and supports all of some features, such as "pieces"."""
+        """Return whether the law is known and supports all of some features, such as "pieces" (spring-slider elements)."""
         return self.law in LAWS and all(law_supports(self.table, word) for word in words)
 
     def lacks(self, *words: str) -> bool:
@@ -173,14 +173,14 @@ class Joint(TableFacts):
 
     @property
     def is_read(self) -> bool:
-        """Whether the law could be read, or the joint is that of an interface, in a bench or a rig."""
+        """Whether the properties of the joint are known: it is an interface, or has a known law in a bench or a rig."""
         return self.is_interface or (self.law in LAWS and self.kind in ("bench", "rig"))
 
 
 class Feature(NamedTuple):
     """Property of a joint that cannot be combined with every other.
 
-    - is_there: function of the joint.
+    - is_there: function that returns whether a Joint has the property.
     - key: dotted key that causes it; "" for a mere condition. `{name}` in it, and in `words`, stands for a property of
       the joint.
     - words: text for messages; "" for the key itself.
@@ -302,7 +302,7 @@ JOINT_FEATURES = {
 
 @cache
 def find_feature(name: str) -> Feature:
-    """Return the feature of this name in UNSUPPORTED_COMBINATIONS: a row of JOINT_FEATURES, a key, or a key with a value."""
+    """Return the Feature of a name in support.toml: a row of JOINT_FEATURES, a dotted key, or "key=value"."""
     if name in JOINT_FEATURES:
         return JOINT_FEATURES[name]
     key, _, value = name.partition("=")
@@ -335,7 +335,7 @@ UNSUPPORTED_COMBINATIONS = _read_rows()
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
-    """Report combinations of keys in a draft that a run of this kind cannot compute yet.
+    """Add combinations of keys that a run of this kind cannot compute to the draft of a scene, as mistakes.
 
     The combinations are the rows of UNSUPPORTED_COMBINATIONS, which are tried on each interface.
     """

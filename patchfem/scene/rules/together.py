@@ -31,7 +31,10 @@ _WORDS = {name: "|".join(words) for name, words in _NAMES.items()}
 
 
 def _list_rows(table: str) -> dict[str, str]:
-    """Return the sentences of a table of together.toml by condition, with a single key in each first clause."""
+    """Return the rows of a table of together.toml as {condition: sentence}.
+
+    A condition whose first clause has several keys stands for one row with each of them.
+    """
     rows = {}
     for condition, sentence in _TABLES[table].items():
         first, *others = condition.format_map(_WORDS).split(" & ")
@@ -48,7 +51,7 @@ MISSING_KEY_RULES = _list_rows("missing")
 
 
 def check_together(draft: SceneDraft, kind: str) -> None:
-    """Report the keys of a draft that need or exclude keys of other tables, or have no effect with them.
+    """Add to a draft all keys that need or exclude keys of other tables, or that have no effect beside them.
 
     `kind` is the kind of scene. Each row of the tables MISTAKE_RULES, REMARK_RULES, MISSING_TABLE_RULES and
     MISSING_KEY_RULES is a condition, such as a key and its value, with a sentence.
@@ -77,7 +80,7 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     kind : str
         Kind of the scene.
     condition : str
-        Clauses as in the rows of this module.
+        Clauses such as "drive.kind=force & !structure.file", which means a force drive and no structure file.
     """
     for clause in _split_condition(condition):
         written = (kind if key == "kind" else draft.written_value(key) for key in clause.keys)

@@ -56,11 +56,12 @@ MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in s
 class Aligned:
     """Two surfaces after alignment, or the code of the reason why they cannot be compared.
 
-    - numbers: what the sentence on the reason needs.
-    - gain_error: standard deviation of the gain, as far as the unworn heights show it.
+    - numbers: values [m] by name that the sentence on the reason needs.
+    - gain_error: standard deviation of the gain of the instrument [1], as far as the unworn heights show it.
     - model: common points of both surfaces.
-    - fit: depths, place and datum that fit the unworn heights.
-    - place: place of the second surface where the search found it.
+    - fit: depths below the datum (the line, parabola or plane between both surfaces), with the position of the second
+      surface.
+    - place: position of the second surface where the search found it.
     """
 
     reason: str = ""
@@ -114,7 +115,7 @@ def align(
 
 
 def _refuse(first: Raster, second: Raster) -> Aligned:
-    """Return why no common place of two surfaces is found: a mirror finish, or none exists.
+    """Return why the second surface has no position on the first one: it is as smooth as a mirror, or shows another place.
 
     `first` and `second` are the surfaces before and after wear.
     """
@@ -137,14 +138,14 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
 
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
-    """Return the depths at all points, if the place was fitted to a part of them.
+    """Compute the depths at all points, if the position was fitted to every k-th point only.
 
     Parameters
     ----------
     aligned : Aligned
-        Fitted place and datum.
+        Fitted position and datum.
     first, second : Raster
-        Both surfaces.
+        Surfaces before and after wear.
     digit : float
         Standard deviation [m] due to the printed digits of the heights.
     """
@@ -160,9 +161,10 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
 
 
 def _is_same_place(aligned: Aligned) -> bool:
-    """Return whether aligned surfaces really have a place in common.
+    """Return whether two aligned surfaces really show the same place.
 
-    That is shown by the significance of the correlation there, or by the fraction of heights that agree.
+    They do if their correlation there is significant enough, or if more of their heights agree than those of unrelated
+    surfaces.
     """
     model = aligned.model
     fit = aligned.fit
@@ -185,12 +187,10 @@ def _is_same_place(aligned: Aligned) -> bool:
 
 
 def _estimate_chance(first, second, noise: float) -> float:
-    """Return the fraction of heights of unrelated surfaces that agree within the noise.
+    """Return the fraction of heights that agree within the noise by chance, at wrong positions of two surfaces.
 
-    They are those of both surfaces, without their long waves, at other places.
-
-    `first` and `second` are their heights (n,) or (m, n) [m] on the same points, and `noise` is the standard deviation
-    [m] of an unworn depth.
+    `first` and `second` are their heights (n,) or (m, n) [m] on the same points, without long waves. `noise` is the
+    standard deviation [m] of an unworn depth.
     """
     count = first.shape[-1]
     fractions = []
@@ -202,7 +202,7 @@ def _estimate_chance(first, second, noise: float) -> float:
 
 
 def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
-    """Fit datums with more and more terms, and return the last one that explains the depths better.
+    """Fit datums with more and more terms (line, parabola, plane), and return the last one that explains the depths better.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
-    """Fit the gain of the instrument, too, and keep it if it is clear.
+    """Fit the gain of the instrument (factor of the heights) too, and keep it if it clearly differs from 1.
 
     Parameters
     ----------
@@ -272,11 +272,10 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
 
 
 def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
-    """Estimate a further change of the gain of a fit, and its standard deviation [1].
+    """Estimate by how much [1] the gain of a fit must change, and the standard deviation of this change.
 
-    A drift has no short waves, and valleys wear last, so that neither passes for another gain.
-
-    It follows from the short waves of the valleys in the `model`.
+    The change is the slope of depth against height in the short waves of the unworn valleys. A drift of the instrument
+    has no short waves, and valleys wear last, so that neither is mistaken for a change of the gain.
     """
     unworn = model.draw(fit.unworn, False)
     columns = (fit.depth, model.compute_jacobian(fit.state)[:, -1])
@@ -302,7 +301,7 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
 
 
 def _find_digit(z) -> float:
-    """Return the smallest difference of two heights z [m], at most their range over 100."""
+    """Return the smallest difference [m] of two heights z [m], a printed digit; at most their range over 100."""
     levels = np.unique(z[np.isfinite(z)])
     steps = np.diff(levels)
     return float(min(steps.min(), np.ptp(levels) / 100)) if steps.size else 0.0

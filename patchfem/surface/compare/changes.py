@@ -36,7 +36,7 @@ MIN_SHALLOW_TRACK_DEVIATIONS = 8.0
 
 
 def find_changed(depth, noise) -> np.ndarray:
-    """Find the points whose depth, alone or in means over windows, noise does not explain.
+    """Find the points whose depth, alone or in means over windows, is larger than noise explains.
 
     Parameters
     ----------
@@ -108,9 +108,10 @@ class Boxes(NamedTuple):
 
 @lru_cache(maxsize=2)
 def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
-    """Return boxes with at least `n_inside` parts, and `n_beside` on each side of a trace.
+    """Return box functions over all spans of a trace of at least `n_inside` parts.
 
-    A polynomial datum of the given degree is subtracted from each.
+    Each leaves `n_beside` parts or more on either side of the span. A least-squares polynomial of the given degree is
+    subtracted from each.
     """
     datum = make_polynomials(N_TRACE_PARTS, degree)
     spans = []
@@ -126,9 +127,9 @@ def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
 
 
 class ShallowTrack(NamedTuple):
-    """Samples of a track that only means show, and the mean depth [m] from which on it is found.
+    """Samples of a track that is seen only in means of depths, and the mean depth [m] above which a track is found.
 
-    `samples` is empty if there is none. `limit` holds for a track over the middle third.
+    `samples` is an empty slice if there is none. `limit` holds for a track over the middle third.
     """
 
     samples: slice
@@ -136,9 +137,9 @@ class ShallowTrack(NamedTuple):
 
 
 def find_shallow_track(depth) -> ShallowTrack:
-    """Find a track in depths (n,) [m] by the means of 60 parts.
+    """Find a track in depths (n,) [m] of a trace by the means of its 60 parts.
 
-    The test is the likelihood ratio of a box beside a cubic datum.
+    It is the likelihood ratio test of a box function that is added to a cubic datum.
     """
     if depth.size < 2 * N_TRACE_PARTS:
         return ShallowTrack(slice(0), MIN_SHALLOW_TRACK_DEVIATIONS * float(depth.std()))
@@ -161,7 +162,7 @@ def find_shallow_track(depth) -> ShallowTrack:
 
 
 def find_detection_limit(depth, noise) -> float:
-    """Return the smallest mean depth [m] of a track that is found in a trace, or of a square in a scan.
+    """Return the smallest mean depth [m] at which a track in a trace, or a square worn area in a scan, is found.
 
     `depth` and `noise` (n,) or (m, n) [m] are the depths and the standard deviation of an unworn one.
     """

@@ -105,7 +105,7 @@ class Options(NamedTuple):
     - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if it is not known.
     - shift: known x of the second trace minus x of the first [m].
     - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
-    - keep_spikes: whether spikes, dropouts and dust count.
+    - keep_spikes: whether spikes, dropouts and dust are kept as heights.
     """
 
     units: tuple[str, str] | None = None
@@ -199,7 +199,7 @@ def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: O
 
 
 def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
-    """Return quantities of these names without value, and with the code of the reason."""
+    """Return quantities of these names by name, each without a value and with the code of the reason."""
     return {name: name_unknown(name, reason) for name in names}
 
 
@@ -299,7 +299,10 @@ def _measure(
 
 
 def _find_detection_limit(depths: DepthMap) -> float:
-    """Return the mean depth [m] from which on wear is found; over the middle third of a trace a drift may hide more."""
+    """Return the mean depth [m] above which wear is found.
+
+    For a trace it is at least the error of the mean depth of its middle third, because a drift may hide as much.
+    """
     limit = find_detection_limit(depths.depth, depths.noise)
     if depths.depth.ndim > 1:
         return limit
@@ -333,10 +336,9 @@ def _make_placement(aligned: Aligned) -> Placement:
 def _collect_findings(
     evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
-    """Return findings that a reader must know: on the place, the datum, the gain and the tracks.
+    """Return what a reader must know of a comparison: findings on position, datum, gain of the instrument and tracks.
 
-    `evidence` has the aligned depths and how they were placed, and `bend` [m] is the height of the subtracted
-    parabola.
+    `evidence` has the aligned depths and how they were placed, and `bend` [m] is the height of the subtracted parabola.
     """
     placement = evidence.placement
     depths = evidence.curves
@@ -387,14 +389,14 @@ def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool
 
 
 def _enlarge(part) -> np.ndarray:
-    """Return a mask, `part`, enlarged by a square of WORN_MARGIN_SIDE samples."""
+    """Return a mask, `part`, enlarged on each side by half a square of WORN_MARGIN_SIDE samples."""
     return ndimage.binary_dilation(part, np.ones((WORN_MARGIN_SIDE,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
-    """Return the mask of the worn places in `depths` with their flanks.
+    """Return the mask of the heights over which lost material is integrated: worn ones, with the flanks beside them.
 
-    `spans` are first and last sample of each track of a trace.
+    `spans` are first and last sample of each track of a trace. Grown heights are left out.
     """
     if depths.depth.ndim > 1:
         return _enlarge(depths.worn) & depths.inside & ~depths.grown
@@ -414,7 +416,9 @@ def _doubt(
     tracks: tuple[Track, ...],
     sizes: tuple[float, float, float],
 ) -> tuple[str, dict[str, float]]:
-    """Return the verdict, or that of two possible causes with the numbers of both.
+    """Replace the verdict by that of an ambiguous case if two causes explain the depths equally well.
+
+    Growth at both ends looks like a scar between them, and a bow of the instrument like a wide scar.
 
     Parameters
     ----------
@@ -422,15 +426,17 @@ def _doubt(
         Verdict on lost and grown material.
     depths : DepthMap
         Depths of the aligned surfaces.
-    spans, tracks
-        Tracks of a trace.
+    spans : list of (int, int)
+        First and last sample of each track of a trace.
+    tracks : tuple of Track
+        Measured tracks of a trace, the longest one first.
     sizes : tuple of float
-        Lost and grown area or volume, and height of the bow.
+        Lost and grown area [m2] or volume [m3], and height of the bow [m].
 
     Returns
     -------
     code : str
-        Verdict: the given one, or one of two possible causes.
+        Verdict: the given one, or that of the ambiguous case.
     numbers : dict
         Heights [m] by name that both causes would have, or {} if there is one cause.
     """
@@ -457,9 +463,9 @@ def _doubt(
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:
-    """Return whether material grew along an end or a border of the `depths`.
+    """Return whether material seems to have grown along an end of a trace, or along a border of a scan.
 
-    A scar over all the rest looks the same.
+    A scar over all the rest of the surface looks the same, because the datum lies in the scar.
     """
     axes = set(range(depths.depth.ndim))
     for axis in axes:
@@ -488,9 +494,9 @@ def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
 
 
 def _measure_share(depths: DepthMap) -> Quantity:
-    """Return the worn fraction of the `depths` of a scan.
+    """Return the worn fraction of the common area of two scans.
 
-    Its interval is a line of points around the worn places.
+    The half-width of its interval is one line of points around the worn places.
     """
     cell = depths.cell
     share = float(depths.worn.sum()) * cell / depths.size

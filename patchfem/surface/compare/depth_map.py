@@ -77,7 +77,7 @@ class DepthMap:
 
     @cached_property
     def scatter(self) -> float:
-        """Standard deviation [m] of worn depths about those beside them."""
+        """Standard deviation [m] of worn depths about the mean of the worn depths around them."""
         beside = subtract_local_level(self.depth, self.worn)[self.worn]
         known = beside[np.isfinite(beside)]
         return float(known.std()) if known.size else 0.0
@@ -96,11 +96,10 @@ class DepthMap:
         )
 
     def measure_hidden(self, covered) -> float:
-        """Return the area [m2] or volume [m3] that slight wear may have outside the mask `covered`.
+        """Return the area [m2] or volume [m3] of wear that may be hidden by the noise, outside the mask `covered`.
 
-        It lies there still, or has lowered the datum, which then is higher than the valleys.
-
-        Such wear is within the noise.
+        It is the net loss of the depths there, plus the loss by which slight wear everywhere would have lowered the
+        datum; the valleys, which wear last, then seem to stand above it.
         """
         limit = 2 * UNWORN_LIMIT_DEVIATIONS
         relative = np.clip(self.depth / self.noise, -limit, limit)

@@ -98,7 +98,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
 
 
 def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
-    """Return the depths of a section below a straight datum.
+    """Return the DepthMap of a trace whose depths are measured below a straight datum, without a first surface.
 
     Parameters
     ----------
@@ -198,12 +198,12 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
 
 
 def _bend_datum(depth, unworn, base) -> np.ndarray:
-    """Return how far [m] the unworn depths (n,) of a trace bend its datum, if it has two terms more.
+    """Return by how much [m] the datum (n,) of a trace would change with two more polynomial terms.
 
-    Where a drift is slow, this is the error of a datum in a wide track, which the flanks alone do not show.
+    With a slow drift, this is the error of the datum in a wide track, which the scatter of the flanks does not show.
 
-    `unworn` (n,) is the mask of the unworn depths, and `base` (k, n) are the functions of which the datum is a
-    combination.
+    `depth` and `unworn` (n,) are the depths [m] and the mask of the unworn ones, which determine the datum. `base` (k,
+    n) are the functions of which it is a combination.
     """
     x = np.linspace(-1, 1, depth.size)
     bent = np.vstack((base, x ** len(base), x ** (len(base) + 1)))

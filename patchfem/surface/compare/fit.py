@@ -58,14 +58,14 @@ class Fit:
 
 
 def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
-    """Fit some parameters to the unworn heights, alternating with the choice of the worn ones.
+    """Fit parameters to the unworn heights; fits alternate with the choice of the heights that count as worn.
 
     Parameters
     ----------
     model : Model
         Common points of both surfaces.
     state : (k,) array
-        Start.
+        Parameters of the model at the start.
     free : list of int
         Indices of the fitted parameters.
     digit : float
@@ -126,9 +126,10 @@ def evaluate(model: Model, state, free: list[int], digit: float, worn=None) -> F
 
 
 def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
-    """Estimate the standard deviation (n,) of unworn depths as positive factors times some terms.
+    """Estimate the standard deviation (n,) of unworn depths, whose variance is a sum of given terms.
 
-    A height on a slope has an error of its position, one at a kink an error of interpolation.
+    The factors of the terms are those of non-negative least squares. A height on a slope has an error of its position,
+    one at a kink an error of interpolation.
 
     Parameters
     ----------

@@ -106,13 +106,14 @@ class Model:
         self.keep_common(self.start)
 
     def _shape(self, values) -> np.ndarray:
-        """Return values (d,) as an array that can be combined with points (d, ...)."""
+        """Return values (d,), one for each axis, in a shape that broadcasts with points (d, ...)."""
         return np.reshape(values, (-1,) + (1,) * self.n_axes)
 
     def keep_common(self, state) -> None:
-        """Keep the points that both surfaces show at a state.
+        """Set the masks of the points that both surfaces show at a state.
 
-        They are `known`. `common` has those near the border of the other surface, too.
+        `common` has all of them, and `known` those that are not near the border of the other surface, where the spline
+        is inaccurate.
         """
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
@@ -124,7 +125,7 @@ class Model:
         )
 
     def _map_pixels(self, state) -> np.ndarray:
-        """Return the place (d, ...) of the sampled points on the other surface at a state, in samples of it."""
+        """Return the positions (d, ...) of the sampled points on the other surface at a state, in steps of its raster."""
         turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
         start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
         return (turned + start) / self._shape(self.other.steps)
@@ -180,10 +181,7 @@ class Model:
         return np.column_stack((np.ones(slopes.size), slopes, kinks**2))
 
     def draw(self, values, fill=np.nan) -> np.ndarray:
-        """Return values (n,) of the known points as a map in the shape of the surface.
-
-        Other points of it have the value `fill`.
-        """
+        """Return values (n,) of the known points as a map of the sampled surface; its other points get `fill`."""
         image = np.full(self.sampled.z.shape, fill, dtype=np.asarray(values).dtype)
         image[self.known] = values
         return image
@@ -193,7 +191,7 @@ class Model:
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
 
     def find_worn(self, depth, noise) -> np.ndarray:
-        """Return the worn points (n,) bool, with tops that are narrow or hardly worn.
+        """Return a mask (n,) of the worn points, which includes narrow or hardly worn tops.
 
         `depth` and `noise` (n,) [m] are the depths and the standard deviation of an unworn one.
         """
@@ -204,9 +202,9 @@ class Model:
         return worn | tops[self.known]
 
     def refine_place(self) -> np.ndarray:
-        """Return the state with the place of the short waves.
+        """Return the state at which the short waves of both surfaces agree best.
 
-        Biweight steps on both surfaces, smoothed less and less, find it.
+        It is found by robust (biweight) Gauss-Newton steps on both surfaces, which are smoothed less and less.
         """
         state = self.start.copy()
         place = slice(0, self.n_axes + 1)
@@ -222,7 +220,7 @@ class Model:
 
     @cached_property
     def smoothing(self) -> np.ndarray:
-        """Deviations (d,), in samples, of the Gaussian that removes the long waves of a refined place."""
+        """Standard deviations (d,), in samples, of the Gaussian that removes the long waves when the position is refined."""
         sizes = np.array(self.sampled.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
         return np.maximum(sizes, MIN_PLACE_GAUSSIAN_SAMPLES) if self.n_axes == 1 else sizes
 
@@ -307,7 +305,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
 
 def _scale_datums(datums, base, depth) -> np.ndarray:
-    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum.
+    """Return for each datum the distance (k,) [m] from it within which a fifth of the depths lie.
 
     `datums` (k, j) are factors of the functions in the columns of `base` (n, j), and `depth` (n,) [m] are depths
     without datum.

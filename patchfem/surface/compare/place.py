@@ -114,9 +114,10 @@ def find_place(first: Raster, second: Raster) -> Place:
 
 
 def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
-    """Return the short waves on square pixels [m]: all, the valleys, which do not wear, and valleys of equal power.
+    """Return images of the short waves of a surface on square pixels [m], by which its position is sought.
 
-    Without their periods, turned surfaces differ from one feed to the next.
+    They are all waves (traces only), those of the valleys, which wear last (traces only), and those of the valleys with
+    equal power at all wavelengths. Without equal power, turned surfaces would agree at each period of their feed marks.
     """
     z = smooth(fill_gaps(surface.z), 0.4 * pixel / surface.steps)
     shape = (surface.lengths / pixel).astype(int) + 1
@@ -132,9 +133,9 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
 
 
 def _whiten(z) -> np.ndarray:
-    """Return heights whose waves are equally high, so that a periodic lay does not hide the others.
+    """Return heights z (n,) or (m, n) whose waves have nearly equal amplitudes, so that a periodic lay hides no others.
 
-    Those of a trace fall to zero at its ends, whose jumps would be short waves that both traces share.
+    A trace is first tapered to zero at its ends, because jumps there would be short waves that both traces share.
     """
     if z.ndim == 1:
         # Tukey's window falls to zero as half a period of a cosine at each end.
@@ -146,12 +147,10 @@ def _whiten(z) -> np.ndarray:
 
 
 def correlate(first, second) -> np.ndarray:
-    """Return the significance of the correlation of two images at each lag.
+    """Return the significance of the correlation of two images at each lag, or -inf where they overlap too little.
 
-    It is -inf where the images overlap too little.
-
-    `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. Lags count pixels by which the
-    second image is moved. Negative lags stand at the end of each axis.
+    `first` and `second` (n,) or (m, n) are heights without long waves on equal pixels. A lag is the number of pixels by
+    which the second image is moved. Negative lags stand at the end of each axis.
     """
     size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]

@@ -63,7 +63,7 @@ def fill_gaps(z) -> np.ndarray:
 def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Profile | Areal:
     """Mark spikes, dust and saturated heights of a surface as missing.
 
-    With `keep_spikes` they only count. Raises PatchfemError if too few heights are left.
+    With `keep_spikes` they stay, and the surface is only checked. Raises PatchfemError if too few heights are left.
     """
     if isinstance(surface, Areal):
         if min(surface.z.shape) < MIN_SCAN_SIDE:

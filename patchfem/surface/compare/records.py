@@ -106,9 +106,9 @@ class Comparison:
 
 
 def name_quantity(name: str, value: float, low: float | None, high: float | None) -> Quantity:
-    """Return the quantity of this name with its value and its interval.
+    """Return a quantity of a comparison from its name, its value and its interval.
 
-    Its unit and definition are those of the name. `low` and `high` are the ends of the interval, or None if they are not
+    Unit and definition follow from the name. `low` and `high` are the ends of the interval, or None if they are not
     known.
     """
     bounds = [None if number is None else float(number) for number in (value, low, high)]
@@ -132,5 +132,5 @@ def name_estimate(name: str, value: float, error: float, least: float = -np.inf)
 
 
 def name_unknown(name: str, reason: str) -> Quantity:
-    """Return the quantity of this name without a value; reason: its code."""
+    """Return a quantity of a comparison without a value; `reason` is the code that says why it has none."""
     return Quantity(None, None, None, *COMPARISON_DEFINITIONS[name], reason, name)

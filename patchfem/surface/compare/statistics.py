@@ -49,7 +49,9 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
 
 
 def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndarray:
-    """Compute the change of parameters (k,) that moves depths (n,) towards zero, by Tukey's biweight.
+    """Compute the change (k,) of parameters that reduces depths (n,) [m] by one weighted least-squares step.
+
+    The weights are those of Tukey's biweight.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def make_polynomials(count: int, degree: int) -> np.ndarray:
 
 
 def find_mode(values) -> float:
-    """Return the mean of the shortest interval that contains 30 % of the values."""
+    """Return the mode of values: the mean of the shortest interval that contains 30 % of them."""
     ordered = np.sort(values)
     count = max(int(MODE_INTERVAL_FRACTION * ordered.size), 2)
     if ordered.size <= count:
@@ -101,7 +103,7 @@ def estimate_correlation(values) -> float:
 
 
 def compute_threshold(n_tests: float) -> float:
-    """Return the number of standard deviations that noise exceeds in 1 of 1000 sets of tests."""
+    """Return how many standard deviations a value must exceed so that noise does so in 1 of 1000 sets of `n_tests` tests."""
     return float(-special.ndtri(FALSE_POSITIVE_RATE / max(n_tests, 1)))
 
 
@@ -130,7 +132,7 @@ def remove_long_waves(z, part: float = SIDE_OVER_LONG_WAVE_GAUSSIAN) -> np.ndarr
 def subtract_local_level(values, mask) -> np.ndarray:
     """Subtract the Gaussian mean of the values in a mask from values (n,) or (m, n), both without gaps.
 
-    A slow drift has no part in what is left. NaN where less than a fifth of the neighbours are in the mask.
+    This removes a slow drift. The result is NaN where less than a fifth of the neighbours are in the mask.
     """
     deviations = np.array(values.shape) / SIDE_OVER_LONG_WAVE_GAUSSIAN
     weight = smooth(mask.astype(float), deviations)
@@ -139,9 +141,9 @@ def subtract_local_level(values, mask) -> np.ndarray:
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
-    """Return rms height and noise [m] of a surface hardly rougher than its white noise, else {}.
+    """Return {"rq": rms height, "noise": standard deviation} [m] of the first surface that is hardly rougher than its noise.
 
-    `surfaces` are arrays of heights (n,) or (m, n) [m]. The first such surface counts.
+    The dict is empty if all are rougher. `surfaces` are arrays of heights (n,) or (m, n) [m], whose noise is white.
     """
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)

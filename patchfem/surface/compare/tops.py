@@ -27,8 +27,8 @@ SAMPLES_PER_TOP = 3  # number of samples whose mean depth shows whether a top is
 def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     """Find the worn tops of a surface: single ones of any width, and tops that wear lowered slightly on all of it.
 
-    Single tops count as worn if there are clearly more of them than of filled valleys. These are the control, because wear
-    fills no valley, but an error of interpolation between the samples lowers tops and raises valleys alike, and a drift of
+    Single tops count as worn if there are clearly more of them than of filled valleys. Valleys are the control: wear
+    fills none, whereas an error of interpolation between the samples lowers tops and raises valleys alike. A drift of
     the instrument is too slow for both.
 
     Parameters
@@ -64,7 +64,7 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
 
 def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
-    """Return a mask (n,) of heights in classes that wear lowered, even slightly.
+    """Return a mask (n,) of heights in those classes of equal height that wear lowered, even slightly.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
     Returns
     -------
     (n,) bool array
-        Only if wear lowered most classes of tops: they are deeper than the valleys by more than another gain explains.
+        Empty unless the highest classes are deeper than the valleys by more than another gain explains.
     """
     is_worn = np.zeros(height.size, bool)
     if height.size < N_HEIGHT_CLASSES * MIN_CHANGED_TRACE_SAMPLES:
@@ -93,7 +93,10 @@ def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
 
 def _subtract_valleys(values, classes: list[np.ndarray]) -> np.ndarray:
-    """Return the medians (k,) of classes of values (n,) less that of the lowest classes."""
+    """Return the median (k,) of values (n,) in each class of heights, minus that of the lowest classes (valleys).
+
+    `classes` are the indices of the values in each class, the lowest one first.
+    """
     medians = np.array([np.median(values[part]) for part in classes])
     return medians - np.median(medians[:N_VALLEY_CLASSES])
 
@@ -112,7 +115,7 @@ class Tops(NamedTuple):
 
 
 def find_tops(depths: DepthMap) -> Tops:
-    """Find the unworn tops that would be worn in a track, from the depths of a trace.
+    """Find the tops of a trace that are not worn, although they are high enough to be worn in a track.
 
     They are higher than the lowest quarter of the worn heights.
     """

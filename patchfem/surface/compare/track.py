@@ -67,9 +67,9 @@ class End(NamedTuple):
 def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
-    Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
-    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a
-    track may stand above the first surface.
+    Two worn parts belong to one track unless there are unworn tops between them, as high as the worn ones. Valleys
+    below the floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New
+    roughness in a track may stand above the first surface.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
 
 
 def get_margin(span: tuple[int, int]) -> int:
-    """Return the number of samples of the flanks beyond the first and last sample, `span`, of a track."""
+    """Return the number of samples of a flank of a track, beyond its first and last worn sample (`span`)."""
     return max(int(FLANK_OVER_TRACK_WIDTH * (span[1] - span[0])), MIN_FLANK_SAMPLES)
 
 
@@ -158,10 +158,9 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
 
 
 def _has_unworn_valleys(relative, is_high) -> bool:
-    """Return whether wear inside an end of a track touched tops alone.
+    """Return whether the valleys at the end of a track are less deep than the tops, so that wear touched the tops alone.
 
-    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops. Then the valleys
-    between them are less deep.
+    `relative` (n,) are depths in standard deviations, and `is_high` (n,) tells which heights are tops.
     """
     if is_high.all() or not is_high.any():
         return False
@@ -326,12 +325,11 @@ def measure_track(
 
 
 def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
-    """Return the mean depth of the deepest piece that is a fifth of the width long.
+    """Return the mean depth [m] of the deepest part of a track, a fifth of its width long.
 
-    The largest of many noisy means is too large: by 1.8 standard deviations of a mean over a flat bottom, and by
-    nothing where one place is far deeper than all others.
-
-    The track begins at `start` and has a `width` [m].
+    The largest of many noisy means is too large; this bias is subtracted. It is 1.8 standard deviations of a mean over
+    a flat bottom, and nothing where one place is far deeper than all others. The track begins at `start` and has a
+    `width` [m].
     """
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
     count = max(inside.size // TRACK_OVER_FLOOR_LENGTH, 1)

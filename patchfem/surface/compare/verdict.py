@@ -14,10 +14,11 @@ MIN_LOST_DEVIATIONS = 4.0
 
 
 def find_sure_loss(depths: DepthMap) -> float:
-    """Return the loss, in its standard deviations, above which drift and noise do not explain it.
+    """Return how many standard deviations a loss must have so that neither drift nor noise explains it.
 
-    The worn places were chosen as the deepest ones out of as many as the common part contains. Drift is known
-    from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %.
+    The worn places were chosen as the deepest ones of all places in the common part, which raises the limit. The
+    variance of a drift is known from few independent tiles, so that the quantile is that of Student's t, over its
+    quantile at 95 %, which the stated errors contain already.
 
     `depths` gives the number of places and of independent tiles.
     """
@@ -28,9 +29,9 @@ def find_sure_loss(depths: DepthMap) -> float:
 
 
 def measure_sharp_loss(depths: DepthMap) -> float:
-    """Return the area [m2] or volume [m3] lost from tops of the `depths` map that lie deeper than others.
+    """Return the area [m2] or volume [m3] lost from worn tops, measured from the unworn heights around them.
 
-    Unworn heights beside them do not lie as deep. No drift is so sharp.
+    No drift is so sharp, so that this loss is wear beyond doubt. `depths` are those of a trace or a scan.
     """
     if not depths.worn.any():
         return 0.0

@@ -101,14 +101,15 @@ def _subtract_polynomial(z, degree: int) -> np.ndarray:
 
 
 def _average_squares(parts: list[np.ndarray]) -> np.ndarray:
-    """Return the mean squares (k,) of parts of values."""
+    """Return the mean squares (k,) of k arrays of values."""
     return np.array([np.mean(part**2) for part in parts])
 
 
 def _divide_means(before, after, power: float) -> np.ndarray:
-    """Return the ratio of the means of blocks (k,), after divided by before, to a power, and the ends of its interval.
+    """Return the ratio of two means to a power, after divided by before wear, and the ends of its 95 % interval.
 
-    Both surfaces have the same blocks, so the scatter of the ratio does not contain that of the surface.
+    `before` and `after` (k,) are means over the same k blocks of both surfaces, so that the scatter of the ratio does
+    not contain that of the surface.
     """
     first = before.mean()
     second = after.mean()
@@ -179,7 +180,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
 
 
 def _cut_sections(z, cutoff: float, degree: int) -> list[np.ndarray]:
-    """Return the sections of the roughness profile of a part (n,) without its form; [] if it has none.
+    """Subtract form and mean line from a part of a profile, and cut its roughness into sections; [] if it is too short.
 
     Parameters
     ----------

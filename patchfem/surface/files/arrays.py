@@ -57,9 +57,10 @@ def read_mat(content: Content) -> Table:
 
 
 def _read_columns(path, arrays: dict[str, np.ndarray]) -> Table:
-    """Read the only array of two or three columns.
+    """Return the table of the only array of a file that has two or three columns.
 
-    PatchfemError is raised if there is none, or more than one. `path` names the file in the message.
+    PatchfemError is raised if there is none, or more than one. `arrays` are the variables of the file by name, and
+    `path` names the file in the message.
     """
     tables = [array for array in arrays.values() if array.ndim == 2 and array.shape[1] in (2, 3)]
     if len(tables) == 1:

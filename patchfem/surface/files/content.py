@@ -36,7 +36,7 @@ class Content(NamedTuple):
     - path: name for messages.
     - kind: "text", "npy", "mat" or "instrument".
     - data: unpacked bytes.
-    - is_packed: whether the file itself has other bytes, because it is packed.
+    - is_packed: whether the file is compressed, so that its own bytes differ.
     """
 
     path: Path

@@ -243,7 +243,7 @@ def _require_increase(table: Table, coordinate: str, places) -> None:
 
 
 def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]:
-    """Return the table and positions x (n,) [m], made even if they differ only by rounding.
+    """Return the table, and positions x (n,) [m] with equal steps if their steps differ only by printed digits.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and

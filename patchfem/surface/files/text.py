@@ -214,7 +214,7 @@ def _read_rows(
     for number, line in lines:
         line = line.strip(" \n")
         place = f"{path}:{number}: '{shorten(line)}'"
-        if line.startswith(COMMENT_SIGNS):
+        if line.startswith(COMMENT_SIGNS):  # one with a setting in a matrix belongs to another scan
             if is_matrix and re.search("[:=]", line):
                 raise PatchfemError(
                     f"{place} ends the scan or begins another one; keep only one scan per file"
@@ -235,7 +235,7 @@ def _read_rows(
         cells = (line.replace(",", ".") if has_comma else line).split(delimiter)
         cells = [cell.strip() for cell in cells]
         while len(cells) > len(coordinates) and not cells[-1]:
-            cells.pop()
+            cells.pop()  # empty cells behind the last column
         if len(cells) != len(coordinates):
             is_decimal = delimiter == "," and len(cells) == 2 * len(coordinates)
             remedy = "with a decimal comma, separate the columns by semicolons or tabs"

@@ -63,7 +63,7 @@ class ObservedMotion(NamedTuple):
     - window: histories; None if they were not requested.
     - acceleration: peak absolute acceleration [m s-2], as in the measures of a run.
     - displacement: displacement amplitude [m], as in the measures of a run.
-    - initial_guess: initial guess for the motion under a similar drive, or None.
+    - initial_guess: motion from which that under a similar drive is computed, or None.
     - fundamental: magnitude of the first harmonic of the absolute acceleration [m s-2]; None if it
       must be computed from the window.
     """

@@ -90,7 +90,10 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
 
 
 class CurveInProgress:
-    """Response curve to which points are added, with their positions along it."""
+    """Response curve to which points are added.
+
+    `points` are those of the curve in its order, and `positions` their distances along it, as `finder` measures them.
+    """
 
     def __init__(self, points: list[CurvePoint], finder):
         self.points = points
@@ -105,7 +108,10 @@ class CurveInProgress:
         return np.where(counts, np.nan_to_num(_collect_amplitudes(self.points)), 0.0)
 
     def refine_maximum(self, place: float, tolerance: float) -> None:
-        """Add points until the maximum next to a position is known within a fraction of its width."""
+        """Add points until the maximum next to a point of the curve is known within a fraction of its width.
+
+        `place` is the position of the point along the curve, and `tolerance` the fraction [1].
+        """
         heights = self.find_heights()
         positions = np.array(self.positions)
         k = self.positions.index(place)
@@ -122,7 +128,7 @@ class CurveInProgress:
             return
 
     def _compute_depth(self, position: float) -> float:
-        """Add the point at a position to the curve; return its negative height [m]."""
+        """Add the point at a position along the curve; return its negative amplitude [m], which Brent's method minimizes."""
         k = min(max(bisect(self.positions, position), 1), len(self.points) - 1)
         begin, end = self.positions[k - 1 : k + 1]
         fraction = (position - begin) / (end - begin)

@@ -62,7 +62,7 @@ LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
 
 
 class ShootingFinder:
-    """Solver for steady motions by Newton's method on the map of a period."""
+    """Solver for steady motions of a rig by shooting: Newton's method for the state that returns after one period."""
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model = model
@@ -83,7 +83,7 @@ class ShootingFinder:
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
 
     def make_case(self, drive) -> cases.Case:
-        """Return the case of a period from rest under sinusoidal drive."""
+        """Return the inputs of the engine for one period from rest under a sine."""
         schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
         rig = self.model.rig
         return cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
@@ -128,6 +128,7 @@ class ShootingFinder:
         leaves them.
         """
         begin = perf_counter()
+        # A run from rest shows whether the lifted mass leaves its grooves; then no motion is steady.
         run = self._leave_grooves(drive)
         if run is not None:
             solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
@@ -135,6 +136,7 @@ class ShootingFinder:
             periodic_data = SteadyData("leaves its grooves", np.zeros(0))
             return replace(solution, errors=errors, periodic=periodic_data)
 
+        # The periodic motion is run once more from its state, for histories and frames.
         motion, notes = self._find_stable_motion(drive, guess)
         state = None if motion.grows else motion.run.final
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
@@ -153,6 +155,7 @@ class ShootingFinder:
             if not dissipated:
                 errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
 
+        # An unstable motion is no result, because a rig would not stay in it.
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.grows or motion.is_stable
         outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
@@ -187,6 +190,7 @@ class ShootingFinder:
         guess : State, PathPoint or None
             State of a similar motion, or the point of a response curve that has this drive.
         """
+        # A point of a response curve has its periodic motion already; else it is found from the guess.
         if isinstance(guess, PathPoint):
             motion = guess.equations.details
         else:
@@ -282,14 +286,14 @@ class ShootingFinder:
         return errors
 
     def _leave_grooves(self, drive):
-        """Return the run from rest that leaves the grooves, or None if there is none."""
+        """Return the run from rest in which the lifted mass leaves the grooves, or None if it stays in them."""
         if self.model.grooves is None or not self.model.grooves.lifted_mass:
             return None
         run = self.evaluator.resume(drive, N_CYCLES_IN_GROOVES, None, 0)
         return run if run.outcome is Outcome.LEAVES_GROOVES else None
 
     def _name_regime(self, motion, *, is_stuck: bool) -> str:
-        """Return the name of the regime of a periodic motion, such as "2 stops" or "partial slip"."""
+        """Return the name of the regime of a periodic motion, such as "stuck", "2 stops" per period or "partial slip"."""
         if motion.grows:
             return "unbounded"
         if is_stuck:
@@ -312,8 +316,10 @@ class ShootingFinder:
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, starting from a neighbouring motion or from rest.
 
-        Without friction it has a closed form, except for an undamped resonance.
+        Without friction it has a closed form, except for an undamped resonance. `drive` is the `SineDrive` of the
+        point, and `guess` is the state of the neighbouring motion, None for rest.
         """
+        # Two motions need no search: that of a linear rig, and that of a mass that leaves its grooves.
         is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
         point = self._compute_linear_point(drive) if is_linear else None
         if point is not None:
@@ -332,6 +338,7 @@ class ShootingFinder:
         if motion.grows:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
+        # An interface sticks if it slips by no more than the tolerance.
         values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
         slips = np.ptp(motion.run.record.get_face_extremes(Probe.SLIP), axis=1)
         slips = slips[: len(self.joints.laws)]
@@ -415,7 +422,10 @@ class ShootingFinder:
             return self._follow_curve(drive)
 
         def sample(frequency, before):
-            """Return the amplitude [m] at a frequency [Hz], and the curve point."""
+            """Return the amplitude [m] at a frequency [Hz], and the curve point.
+
+            `before` is the pair that this function returned for the frequency before, or None.
+            """
             sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
             point = self.compute_curve_point(sine, before and before[1].guess)
             return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
@@ -425,7 +435,7 @@ class ShootingFinder:
         return ResponseCurve([point for _, point in samples])
 
     def _follow_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency through its folds."""
+        """Compute the response curve over frequency by continuation along its arc length, through its folds."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         motion, _ = self._find_stable_motion(first, None)
         if motion.grows:
@@ -447,7 +457,7 @@ class ShootingFinder:
         )
 
     def _make_curve_point(self, point: PathPoint) -> CurvePoint:
-        """Return a point of a response curve that has been followed."""
+        """Return the CurvePoint of a point that the continuation has found."""
         signal = self.model.rig.drive.signal
         motion = point.equations.details
         regime = "stable" if motion.is_stable else "unstable"
@@ -519,5 +529,8 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
 
 
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
-    """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
+    """Return the error of a periodic motion relative to its size [1].
+
+    It is the error of the fixed point of the map of a period, plus that of the time steps within the period.
+    """
     return motion.error + STEPS_ERROR * RTOL
