@@ -192,8 +192,8 @@ class BenchModel:
     def estimate_mesh_error(self, values: np.ndarray) -> np.ndarray:
         """Return the error (k,) of the computed reading by the mesh of a patch, with its sign; 0 without a patch.
 
-        `values` (n,) are those of the free keys. The error follows from another mesh. Raises PatchfemError if there is no other mesh, or if the patch cannot be
-        solved on it.
+        `values` (n,) are those of the free keys. The error follows from another mesh. Raises PatchfemError if there is no
+        other mesh, or if the patch cannot be solved on it.
         """
         model = self.keys.build_model(values)
         patch = self._solve_patch(model)
