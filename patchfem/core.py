@@ -422,8 +422,9 @@ class MeasureDefinition(NamedTuple):
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
       "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
       curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
-      drive), "error" (it is itself an error), "sine" (it exists only under a sine), "loop" (an integral or a peak of
-      samples of the friction loop), "run" (a sum over the whole run), "phase" (an angle modulo pi).
+      drive), "force" (its floor is limited by the normal load), "error" (it is itself an error), "sine" (it exists only
+      under a sine), "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
+      "phase" (an angle modulo pi).
     - friction_scale: function of an `errors.FrictionScale` that returns the error of the measure for a relative error 1
       of the friction force; None if this is the value of the measure.
     """

@@ -441,9 +441,9 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
 
     # The curve ends at the high bound of the coefficient, and so does the interval.
     max_depth = fit.curve[1][-1]
-    if measured.high > max_depth:
+    if measured.high + (error or 0.0) > max_depth:
         warnings.append(
-            f"the interval of the measured {name} reaches beyond {format_length(max_depth, 4)}, the depth with the high "
+            f"the measured {name} with all errors reaches beyond {format_length(max_depth, 4)}, the depth with the high "
             "bound of the coefficient, at which the interval of the coefficient ends; raise the high bound, unless the "
             "coating is worn through"
         )

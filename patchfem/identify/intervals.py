@@ -44,8 +44,8 @@ class FitIntervals:
     - open_ends: whether each end (n, 2) is the bound of the parameter.
     - correlation: correlation matrix (n, n); NaN for an undetermined parameter.
     - sensitivity: root mean square change (n,) of the residual per range of each parameter.
-    - shifts: change (n, r) of each parameter, to first order, per change of each row of the residual; 0 for a parameter
-      on a bound or without effect.
+    - shifts: change (n, r) of each parameter, to first order, per change of each row of the residual. For a parameter on a
+      bound it is that of the minimum beyond the bound; 0 for a parameter without effect.
     - unknown: undetermined directions (d, n) in parameter space, as relative changes (relative to the
       range if a value is 0).
     - rows: number of independent rows of the residual; NaN without intervals.
@@ -186,7 +186,16 @@ def compute_intervals(
 
     # Shift (J^T J)^-1 J^T of the parameters by a change of each row, from the unit cube to their units
     shifts = np.zeros((n, model.rows))
-    shifts[free] = model.space.derivatives(u)[free, None] * (inverse @ jacobian[:, free].T)
+    shifts[free] = inverse @ jacobian[:, free].T
+
+    # A parameter on a bound is shifted as if it were free: e / |e|^2 with the part e of its column that the free parameters
+    # do not compensate.
+    for k in np.flatnonzero(((u <= 0) | (u >= 1)) & has_effect):
+        effect = jacobian[:, k] - jacobian[:, free] @ (shifts[free] @ jacobian[:, k])
+        size = np.linalg.norm(effect)
+        if size > MIN_SINGULAR_VALUE * norms[k]:
+            shifts[k] = effect / size**2
+    shifts *= model.space.derivatives(u)[:, None]
 
     # Linear interval u_k +- t sqrt(cov_kk). To its end the other free parameters change by the multiple cov_ik/cov_kk of
     # u_k; if the sum of squares does not grow as expected on this line, or if u_k is on a bound, its profile is followed.

@@ -253,7 +253,7 @@ def add_errors(
     for name, parts in split_errors(values, errors).items():
         value = float(values[name])
         error = total_error(name, value, parts.values(), min_relative_error, amplitude)
-        floor = float(error_floor(name, size))
+        floor = float(error_floor(name, values, size))
         measures[name] = Measure(
             value, find_definition(name).unit, float(error), floor, parts=parts
         )

@@ -268,7 +268,7 @@ MOTION_MEASURE_ROWS = (
         "largest friction force on the whole interface, of a bench during the whole run",
         lambda s: None if s.load is None else compute_peak(s.window.force),
         group="friction",
-        flags="interface level loop",
+        flags="interface level loop force",
         friction_scale=lambda scale: scale.limit,
     ),
     MeasureDefinition(
@@ -590,9 +590,9 @@ def select_names(flag: str) -> tuple[str, ...]:
 
 
 INTERFACE_MEASURES = select_names("interface")
-# Upper limit of the floor of a displacement error, relative to the displacement caused by the drive
-# alone.
-MAX_DISPLACEMENT_FLOOR = 1e-5
+# Upper limit of the floor of the error of a displacement, relative to the displacement caused by the drive alone, and of
+# that of a friction force, relative to the normal load.
+MAX_RELATIVE_FLOOR = 1e-5
 
 
 def compute_measures(last_cycles: LastCycles) -> Values:
@@ -625,25 +625,31 @@ def add_interface_number(name: str, number: int) -> str:
     return f"{name}_{number + 1}" if number else name
 
 
-def error_floor(name: str, size=np.inf):
+def error_floor(name: str, values: Values, displacement=np.inf):
     """Return the floor of the error of a measure: the magnitude below which it is round-off, in the unit of the measure.
 
-    The floor of a displacement is at most MAX_DISPLACEMENT_FLOOR times `size`.
+    The floor of a displacement is at most MAX_RELATIVE_FLOOR times that of the drive, and that of a friction force at most
+    MAX_RELATIVE_FLOOR times the normal load of its interface.
 
     Parameters
     ----------
     name : str
         Name of the measure, which may end in the number of an interface, such as "slip_amplitude_2".
-    size : float or (n,)
-        Expected displacement of the motion [m], for n cases. With 0 or inf the floor of a displacement is that of the
-        table.
+    values : dict
+        Values by name of one run, or (n,) of n runs. Without a normal load the floor of a force is that of the table.
+    displacement : float or (n,)
+        Displacement caused by the drive alone [m]. With 0 or inf the floor of a displacement is that of the table.
     """
     definition = find_definition(name)
     floor = definition.floor
-    if not definition.has("displacement"):
+    if definition.has("displacement"):
+        size = displacement
+    elif definition.has("force"):
+        size = _find_own_values(name, values).get("normal_load", np.inf)
+    else:
         return floor
     return np.where(
-        np.greater(size, 0), np.minimum(floor, MAX_DISPLACEMENT_FLOOR * np.asarray(size)), floor
+        np.greater(size, 0), np.minimum(floor, MAX_RELATIVE_FLOOR * np.asarray(size)), floor
     )
 
 
@@ -663,14 +669,19 @@ def larger_term(name: str, values: Values):
         Size of the terms; 0 if the measure is not a difference.
     """
     row = find_definition(name)
-    number = name[len(remove_interface_number(name)) :]
     if row.larger_term is None:
         return 0.0
+    return row.larger_term[1](_find_own_values(name, values))
+
+
+def _find_own_values(name: str, values: Values) -> Values:
+    """Return the values by name without a number; of several interfaces, those of the interface of a measure."""
+    number = name[len(remove_interface_number(name)) :]
     own_values = {}
     for other_name, value in values.items():
         base_name = remove_interface_number(other_name)
         own_values[base_name] = values.get(base_name + number, value)
-    return row.larger_term[1](own_values)
+    return own_values
 
 
 def set_final_floors(measures: Measures, tolerance: float) -> Measures:

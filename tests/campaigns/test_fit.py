@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 from command_line import read_json, run_cli, run_successfully
 from friction_loops import dahl_force, elastic_plastic_force, write_loop
+from scene_texts import CROWNED_JOINT
 
 from patchfem import FitOptions, SceneError, build
-from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.fits.loop import BenchModel, fit_hysteresis_loop
+from patchfem.campaigns.fits.problem import FreeKeys, parse_ranges
 from patchfem.campaigns.held_out import select_held_out
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
+from patchfem.runs.patch.mesh_levels import solve_with_coarser
 from patchfem.scene import load, loads
 
 LOAD = 100.0
@@ -113,6 +115,20 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
         result = fit_hysteresis_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
         assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+    assert "could not be measured: the mesh has only 7 columns" in result.keys.warnings[-1]
+
+
+def test_always_mesh_error_of_fit_holds(tmp_path):
+    """The error of the mesh of a fit holds also where a run would refine this mesh further."""
+    time, slide = sine_path(40, 1)
+    path = write_loop(tmp_path / "loop.csv", time, 0.3 * slide, slide)
+    text = CROWNED_JOINT + SINE + "[accuracy]\ntolerance = 1e-5\n"
+    bench_model = BenchModel(FreeKeys(loads(text), []), read_loop(path), time)
+    reading = bench_model([])
+    error = np.abs(bench_model.estimate_mesh_error([])).max()
+    bench_model.patch = solve_with_coarser(build(loads(text)).patch, 1e-5)[0]
+    deviation = np.abs(bench_model([]) - reading).max()
+    assert error > deviation > 1e-4 * np.abs(reading).max()
 
 
 def test_exact_force_of_elastic_pieces_does_not_jump_at_reversals(tmp_path):

@@ -66,7 +66,11 @@ def test_exact_linear_fit_has_closed_form_intervals():
 
 
 def test_exact_value_at_bound_has_profile_interval():
-    """A value at its bound has the profile interval of the parabola of the sum of squares."""
+    """A value at its bound has the profile interval of the parabola of the sum of squares.
+
+    An error of the model widens it by the shift of the minimum beyond the bound, so that it contains the interval of the
+    changed data.
+    """
     data = 1.0 - 0.1 * LINE + 0.1 * RNG.normal(size=40)
     design = np.stack([np.ones(40), LINE], axis=1)
     values, _, covariance, sum_of_squares = solve_linear(design, data)
@@ -86,6 +90,15 @@ def test_exact_value_at_bound_has_profile_interval():
     assert describe_fit(fit, ["a", "b"]) == [
         "b is at its low bound 0.3: widen the range, or try another law"
     ]
+    change = 0.02 * np.cos(3 * LINE)
+    shift = np.abs(solve_linear(design, data + change)[0] - values)[1]
+    widened = fit.widen([change], [(0, 3), (0.3, 5)]).intervals.ends[1]
+    assert widened - fit.intervals.ends[1] == pytest.approx([0, shift], rel=1e-4)
+    for sign in (-1, 1):
+        changed = Problem(
+            lambda v, s=sign: design @ v - data + s * change, [0, 0.3], [3, 5]
+        ).solve()
+        assert changed.intervals.ends[1, 1] <= widened[1]
 
 
 def test_exact_nonlinear_value_has_transformed_interval():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Measure
-from patchfem.response import set_final_floors
+from patchfem.response import AMPLITUDE, error_floor, set_final_floors
 
 
 def test_exact_floors_of_differences_follow_amplitudes():
@@ -12,7 +12,7 @@ def test_exact_floors_of_differences_follow_amplitudes():
     found = {
         "slip_amplitude": Measure(1e-5, "m", 1e-9, 1e-10),
         "slip_amplitude_2": Measure(0.0, "m", 0.0, 1e-10),
-        "relative_displacement_amplitude": Measure(4e-5, "m", 1e-9, 1e-10),
+        AMPLITUDE: Measure(4e-5, "m", 1e-9, 1e-10),
         "loop_area": Measure(1e-3, "J", 0.0),
         "drift_per_cycle": Measure(6e-11, "m", 2.2e-10, 1e-11),
         "drift_per_cycle_2": Measure(0.0, "m", 0.0, 1e-11),
@@ -23,17 +23,18 @@ def test_exact_floors_of_differences_follow_amplitudes():
         "energy_balance": Measure(2e-8, "1", 2e-8, 1e-8),
     }
     floors = {name: one.floor for name, one in set_final_floors(found, 1e-3).items()}
-    assert floors["drift_per_cycle"] == pytest.approx(1e-8) and floors[
-        "drift_per_cycle_2"
-    ] == pytest.approx(4e-8)
-    assert floors["slip_start_phase"] == pytest.approx(np.pi * 1e-3) and floors[
-        "energy_balance"
-    ] == pytest.approx(1e-3)
-    assert floors["equivalent_stiffness"] == pytest.approx(5e3)
-    assert "harmonic_force_ratio" not in floors
-    assert all(
-        floors[name] == found[name].floor
-        for name in ("loop_area", "slip_amplitude", "stick_fraction")
-    )
+    changed = {
+        "drift_per_cycle": 1e-8,
+        "drift_per_cycle_2": 4e-8,
+        "slip_start_phase": np.pi * 1e-3,
+        "equivalent_stiffness": 5e3,
+        "energy_balance": 1e-3,
+    }
+    kept = ("slip_amplitude", "slip_amplitude_2", AMPLITUDE, "loop_area", "stick_fraction")
+    assert floors == pytest.approx(changed | {name: found[name].floor for name in kept})
     # its own floor where the tolerance is tight
     assert set_final_floors(found, 1e-9)["drift_per_cycle"].floor == 1e-11
+    # that of a small friction force follows from the load of its interface
+    loads = {"normal_load": 1.0, "normal_load_2": 1e-3}
+    assert error_floor("friction_force_peak", loads) == 1e-6
+    assert error_floor("friction_force_peak_2", loads) == pytest.approx(1e-8)

@@ -20,7 +20,7 @@ from ...response.errors import convergence_error
 from ...runs.batch.meshes import SharedMeshes
 from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
-from ...runs.patch.mesh_levels import solve_with_coarser
+from ...runs.patch.mesh_levels import solve_on_other_mesh
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
 from ..held_out import select_held_out
@@ -189,18 +189,19 @@ class BenchModel:
         self.steps_per_row //= 2
         return fine - coarse
 
-    def measure_mesh_change(self, values: np.ndarray) -> np.ndarray:
-        """Return the change (k,) of the computed reading from the coarser mesh of a patch to its own; 0 without one.
+    def estimate_mesh_error(self, values: np.ndarray) -> np.ndarray:
+        """Return the error (k,) of the computed reading by the mesh of a patch, with its sign; 0 without a patch.
 
-        `values` (n,) are those of the free keys.
+        `values` (n,) are those of the free keys. The error follows from another mesh. Raises PatchfemError if there is no
+        other mesh, or if the patch cannot be solved on it.
         """
         model = self.keys.build_model(values)
-        if model.patch is None:
+        patch = self._solve_patch(model)
+        if patch is None:
             return np.zeros(self.time.size)
-        fine, coarse, *_ = solve_with_coarser(model.patch, model.accuracy.tolerance)
-        if coarse is None:
-            return np.zeros(self.time.size)
-        return self._compute_reading(model, fine) - self._compute_reading(model, coarse)
+        other = solve_on_other_mesh(patch, model.accuracy.tolerance)
+        change = self._compute_reading(model, patch) - self._compute_reading(model, other)
+        return convergence_error(1.0, ratio=2.0 if other.x.size < patch.x.size else 0.5) * change
 
     def refine_steps(self, values: np.ndarray) -> None:
         """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
@@ -307,15 +308,19 @@ def fit_hysteresis_loop(
         fit = replace(problem, start=first.values).solve(1, "series")
         fit = fit.count_earlier_search(first)
 
-    # The intervals contain the numerical error of the force, from half the steps and from a coarser mesh.
+    # The intervals contain the numerical error of the force, from half the steps and from another mesh. A mesh whose error
+    # cannot be measured does not end the fit.
     step_change = bench.measure_step_change(fit.values)
-    changes = np.array(
-        [
-            convergence_error(1.0, ratio=0.5, order=2.0) * step_change,
-            convergence_error(1.0) * bench.measure_mesh_change(fit.values),
-        ]
-    )
-    fit = keys.widen(fit, changes[:, ~held_out] / scale)
+    changes = [convergence_error(1.0, ratio=0.5, order=2.0) * step_change]
+    warnings = []
+    try:
+        changes.append(bench.estimate_mesh_error(fit.values))
+    except (PatchfemError, MemoryError) as reason:
+        warnings.append(
+            "the intervals do not contain the numerical error of the mesh, which could not be measured: "
+            f"{reason or 'out of memory'}"
+        )
+    fit = keys.widen(fit, np.array(changes)[:, ~held_out] / scale)
 
     # The warnings need the fitted loop, and belong to its keys.
     fitted = FittedLoop(
@@ -326,7 +331,8 @@ def fit_hysteresis_loop(
         step_error=np.abs(step_change).max(),
         steps_per_row=bench.steps_per_row,
     )
-    return replace(fitted, keys=keys.make_fitted_keys(fit, _warn_of_doubtful_fit(fitted)))
+    warnings += _warn_of_doubtful_fit(fitted)
+    return replace(fitted, keys=keys.make_fitted_keys(fit, warnings))
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:

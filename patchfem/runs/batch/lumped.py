@@ -344,7 +344,7 @@ def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.n
     scales : Scales
         Tolerances and reference quantities of the cases.
     """
-    floor = error_floor(name, scales.displacement)
+    floor = error_floor(name, values, scales.displacement)
     return np.fmax(floor, scales.tolerance * larger_term(name, values))
 
 
@@ -485,7 +485,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
         refined.errors["drift_per_cycle"],
         values[AMPLITUDE],
         scales.tolerance,
-        error_floor("drift_per_cycle", scales.displacement),
+        error_floor("drift_per_cycle", values, scales.displacement),
     )
     is_steady = classes == MOTION_CLASSES.index(Outcome.STEADY)
     return MotionEnds(

@@ -7,7 +7,7 @@ expensive (`solve_on_refined_meshes`).
 
 from functools import partial
 
-from ...core import NotConverged, Outcome
+from ...core import NotConverged, Outcome, PatchfemError
 from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
@@ -21,7 +21,7 @@ from .grids import (
     predict_condensing_seconds,
 )
 from .measures import max_mesh_error_ratio, with_static_measures
-from .press import Patches, solve_patch_contact
+from .press import Patch, Patches, solve_patch_contact
 
 # Largest number of columns of a mesh that has no coarser mesh.
 MAX_COLUMNS_WITHOUT_COARSER = 8
@@ -110,17 +110,42 @@ def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshe
     The error follows from two coarser grids, or from the unstructured mesh with all edges halved. Meshes with few columns
     have none of them.
     """
-    lower, upper = make_piece_meshes(patch_model)
-    levels = [(lower, upper)]
-    if not isinstance(lower, TensorGrid):
-        if lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
-            levels.append(tuple(None if body is None else body.refine() for body in (lower, upper)))
-        return levels
-    while len(levels) < 3 and lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
-        lower = lower.coarsen()
-        upper = None if upper is None else upper.coarsen()
-        levels.append((lower, upper))
+    levels = [make_piece_meshes(patch_model)]
+    n_levels = 3 if isinstance(levels[0][0], TensorGrid) else 2
+    while len(levels) < n_levels and levels[-1][0].x.size > MAX_COLUMNS_WITHOUT_COARSER:
+        levels.append(_change_elements(levels[-1]))
     return levels
+
+
+def _change_elements(
+    bodies: "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]",
+) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
+    """Return grids with elements twice as long, or unstructured meshes, which have no coarser ones, with halved edges."""
+    is_grid = isinstance(bodies[0], TensorGrid)
+    lower, upper = (body and (body.coarsen() if is_grid else body.refine()) for body in bodies)
+    return lower, upper
+
+
+def solve_on_other_mesh(patch: Patch, tolerance: float) -> Patch:
+    """Solve a patch on a mesh whose elements are twice or half as long, so that a change shows the error of its mesh.
+
+    Parameters
+    ----------
+    patch : Patch
+        Solved patch.
+    tolerance : float
+        Relative error of the static measures.
+
+    Raises
+    ------
+    PatchfemError
+        If the mesh has too few columns to be coarsened, or if the patch cannot be solved on the other mesh.
+    """
+    n_columns = patch.pair.meshes[0].x.size - 1
+    if n_columns < MAX_COLUMNS_WITHOUT_COARSER:
+        raise PatchfemError(f"the mesh has only {n_columns} columns; use smaller elements", "")
+    pair = condense(patch.model, *_change_elements(patch.pair.meshes))
+    return solve_on_pairs(patch.model, [pair], tolerance)[0]
 
 
 def solve_on_refined_meshes(

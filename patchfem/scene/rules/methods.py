@@ -111,7 +111,7 @@ ENGINE_SUPPORT = {
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
-ENGINE_KEY = "accuracy.method"
+METHOD_KEY = "accuracy.method"
 
 
 def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> str:
@@ -189,12 +189,12 @@ def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
     method = draft.values.accuracy.method
     if method in list_unused_methods(kind):
         draft.add_remark(
-            ENGINE_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
+            METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
     if method and kind in ("rig", "linear"):
         reason = _find_obstacle(method, find_motion_features(draft.tables, kind))
         if reason:
-            draft.add_mistake(ENGINE_KEY, reason)
+            draft.add_mistake(METHOD_KEY, reason)
 
 
 def list_unused_methods(kind: str) -> tuple[str, ...]:

@@ -53,7 +53,8 @@ motion may still decay. The window of a bench is its last cycle; its energies, i
 `friction_force_peak` and `friction_ratio_peak`, are those of the whole run. A measure "per cycle" is the mean over the
 cycles of the window. A number at the end of a name is the number of an interface, or of a strip if the strips slide
 separately: `slip_amplitude_2` is the slip amplitude of the second interface or strip. The floor of a displacement is at
-most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a.
+most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a, and that of
+`friction_force_peak` at most 1e-5 of the normal load.
 """
 
     STUDIES = """\
