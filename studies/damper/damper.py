@@ -16,7 +16,6 @@ Run: python studies/damper/damper.py FILE.csv [PICTURE.svg]
 
 import sys
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -134,7 +133,7 @@ def main(file, names=tuple(LAWS)) -> list:
         text, free = LAWS[name]
         offset = 0.0
         for _ in range(2):
-            record = replace(loop, reading=loop.reading - offset)
+            record = loop._replace(reading=loop.reading - offset)
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "loop.csv"
                 count = write_with_run_in(path, loop.time, loop.displacement, record.reading)

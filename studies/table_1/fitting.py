@@ -238,12 +238,12 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
             before_descent=computed.reset_motions,
         )[0]
         best, others = group_valleys(
-            cells, computed, seen, last, [(box.to_values(one.u), one.rms) for one in ends]
+            cells, computed, seen, last, [(box.to_values(one.u), end_rms(one)) for one in ends]
         )
         random = starts
         if best > 1 or 2 * starts > most:
             valleys = {"starts": len(ends), "best": best, "tied": others}
-            return box.to_values(last.u), [one.rms for one in ends], valleys
+            return box.to_values(last.u), [end_rms(one) for one in ends], valleys
         starts *= 2
 
 
@@ -255,6 +255,11 @@ def _screen_points(quick, points, forget) -> np.ndarray:
         found = quick(u)
         costs.append(np.inf if found is None else float(found @ found))
     return points[int(np.argmin(costs))]
+
+
+def end_rms(end: Descent) -> float:
+    """Return the rms of the residual at the end of a descent; NaN if the model failed at its start."""
+    return float(np.sqrt(end.cost / end.rows)) if np.isfinite(end.cost) else np.nan
 
 
 def group_valleys(cells, computed, seen, last, ends) -> tuple:
@@ -279,13 +284,14 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
         return residual(values)
 
     least = at(box.to_values(last.u))
+    least_rms = end_rms(last)
     count = 0
     valleys = []
     for values, score in sorted(ends, key=lambda one: (not one[1] < np.inf, one[1])):
-        if not score <= TIED_FACTOR * last.rms:
+        if not score <= TIED_FACTOR * least_rms:
             continue
         here = at(values)
-        if score <= SAME_VALLEY_FACTOR * last.rms and rms(here - least) < VALLEY_DISTANCE:
+        if score <= SAME_VALLEY_FACTOR * least_rms and rms(here - least) < VALLEY_DISTANCE:
             count += 1
         elif rms(here - least) >= VALLEY_DISTANCE and all(
             rms(here - other) >= VALLEY_DISTANCE for other, _ in valleys

@@ -1,5 +1,7 @@
 """Power laws without mechanics, with which the rungs of Table 1 are compared."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from study_module import make_study_fixture
@@ -28,3 +30,23 @@ def test_exact_table_1_null_models_agree_with_closed_forms(models, fitting):
     assert numbers["acceleration"] == pytest.approx(
         {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
     )
+
+
+def test_exact_search_of_the_ladder_finds_the_constant_null_model(models, fitting):
+    """The search from two random starts ends at the optimum in closed form and states its rms."""
+    cells = read_response_table(fitting.TABLE)
+    train = ~cells.unstable
+
+    def computed(values, conditions):
+        """Return readings proportional to the input; `values` are the logarithms of both factors."""
+        return np.exp(values)[:, None] * cells.conditions[:, 1]
+
+    ranges = [SimpleNamespace(low=low, high=high) for low, high in ((-3, 3), (-17, -12))]
+    computed.models = SimpleNamespace(ranges=ranges)
+    computed.reset_motions = lambda: None
+    values, ends, valleys = fitting.search_starts(cells, computed, train, 2, 2)
+    logs, numbers = models.fit_null_model(cells, "constant", train)
+    factors = [numbers[kind]["factor"] for kind in ("acceleration", "displacement")]
+    assert np.exp(values) == pytest.approx(factors, rel=1e-6)
+    assert ends == pytest.approx([fitting.rms(logs[train])] * 2, rel=1e-6)
+    assert valleys == {"starts": 2, "best": 2, "tied": []}
