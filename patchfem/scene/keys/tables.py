@@ -226,7 +226,8 @@ class Mode(Table):
     base: optional(
         Number,
         "participation of the mode in the base motion; default: the value of `slide` for the "
-        "first mode, 0 for the others; the sum of the squares over all modes must be at most 1",
+        "first mode (give `base` where `slide` is not 1), 0 for the others; the sum of the squares over "
+        "all modes must be at most 1",
     )
     output: optional(
         Number,
