@@ -54,7 +54,7 @@ def test_always_last_two_cycles_have_hundred_samples_each(name, tmp_path):
         tmp_path / "a.csv",
         np.c_[time, value],
         delimiter=",",
-        header="time [s],acceleration [m/s^2]",
+        header="time [s],base_acceleration [m/s^2]",
         comments="",
     )
     text, changes = CASES[name]
