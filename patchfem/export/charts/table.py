@@ -364,7 +364,7 @@ FIT_CHARTS = (
         "points",
         x_label="row",
         y_label="fitted - measured",
-        caption="A pattern along the rows is an error of the model; scatter around zero is noise of the record.",
+        caption="A pattern along the fitted rows is an error of the model; scatter around zero is noise of the record.",
     ),
     Chart(
         "Frequency",
