@@ -347,9 +347,9 @@ class Reduced(Table):
     ) = "craig-bampton"
     moved: optional(
         array(Coordinate),
-        "coordinates that a base drive moves along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows "
-        "from a to b), nodes or directions; default: all coordinates in direction x, or all coordinates if the files "
-        "name no directions",
+        "coordinates that a base drive moves along x: row numbers, ranges of rows (['1..39:20'] means 20 evenly "
+        "spaced rows from 1 to 39), nodes or directions; default: all coordinates in direction x, or all coordinates "
+        "if the files name no directions",
     )
     slide: optional(
         MassPair,
