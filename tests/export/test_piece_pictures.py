@@ -9,7 +9,7 @@ from exported import write_small_series
 from PIL import Image
 
 from patchfem.export.fields.film import contact_window, make_stress_panels
-from patchfem.export.fields.vtkhdf import VTKHDF_FILE, read_frames
+from patchfem.export.fields.vtkhdf import read_frames
 from patchfem.export.pieces import draw_pieces, magnify_pieces
 
 WHOLE = (-1.0, 1.0, -1.0, 1.0)  # [m], a window that contains all pieces
@@ -26,7 +26,7 @@ def small_folder(tmp_path_factory):
 @pytest.mark.parametrize("magnify", [None, 0.0, 2500.0])
 def test_exact_drawn_gap_is_magnified_gap(bench_folder, magnify):
     """The pieces move by displacement times factor, the slide has its own factor, and the gap is the computed one."""
-    frames = read_frames(bench_folder / VTKHDF_FILE)
+    frames = read_frames(bench_folder / "fields.vtkhdf")
     numbers = np.arange(len(frames.times))
     lower, upper, line = (frames.blocks[name] for name in ("lower", "upper", "interface"))
     slide = line.point_data["holder_slide"][:, 0].astype(float)
@@ -59,7 +59,7 @@ def test_exact_drawn_gap_is_magnified_gap(bench_folder, magnify):
 
 def test_exact_colours_are_stress_of_frame(bench_folder):
     """Cells of both panels have the stress of the frame that is shown, on one scale of all frames."""
-    frames = read_frames(bench_folder / VTKHDF_FILE)
+    frames = read_frames(bench_folder / "fields.vtkhdf")
     numbers = np.arange(len(frames.times))
     figure, show = draw_pieces(frames, numbers, "a title")
     pieces, contact = (axes.collections[0] for axes in figure.axes[:2])
@@ -121,5 +121,5 @@ def test_refuses_invalid_options(small_folder, tmp_path, monkeypatch, arguments,
 def test_labels_of_stress_film_differ_after_long_wear(tmp_path):
     """The labels of the frames of the last cycle begin at 0, also after 1e6 s of wear."""
     write_small_series(tmp_path / "out", times=1e6 + 1e-3 * np.arange(3))
-    (panel,) = make_stress_panels(tmp_path / "out" / VTKHDF_FILE)
+    (panel,) = make_stress_panels(tmp_path / "out" / "fields.vtkhdf")
     assert [curve.name for curve in panel.curves] == ["0 ms", "1 ms", "2 ms"]

@@ -109,11 +109,10 @@ class SweepTable:
     measures : dict
         MeasureColumn by name.
     messages : dict
-        Error message of each failed case, by its number.
+        Error message of each failed case, and sentences on the end of each other case that has not settled, by its
+        number.
     faults : dict
         Sentences on internal faults after which cases were run one by one, as keys.
-    endings : dict
-        Sentences on each case that has neither failed nor settled, by its number.
     """
 
     keys: tuple[SweptKey, ...]
@@ -124,7 +123,6 @@ class SweepTable:
     measures: dict[str, MeasureColumn] = field(default_factory=dict)
     messages: dict[int, str] = field(default_factory=dict)
     faults: dict[str, None] = field(default_factory=dict)
-    endings: dict[int, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -179,7 +177,7 @@ class SweepTable:
         for k, outcome in enumerate(map(str, part.outcome)):
             if outcome in tuple(Outcome) and outcome not in FINAL_OUTCOMES:
                 warnings = part.warnings.get(k, ()) if outcome == Outcome.NOT_CONVERGED else ()
-                self.endings[int(numbers[k])] = " ".join([Outcome(outcome).sentence, *warnings])
+                self.messages[int(numbers[k])] = " ".join([Outcome(outcome).sentence, *warnings])
 
     def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of the measure `name` that count for statements on it, or NaN for others.

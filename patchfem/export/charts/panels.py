@@ -83,9 +83,8 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
                 weight = 1.0
                 if chart.thin:
                     weight = THIN_CURVE_WEIGHT if name in chart.thin.split() else BOLD_CURVE_WEIGHT
-                panel_curves += [
-                    replace(curve, is_line=names is chart.lines, weight=weight) for curve in drawn
-                ]
+                drawing = {"is_line": names is chart.lines, "weight": weight}
+                panel_curves += [replace(curve, **drawing) for curve in drawn]
         for curve in panel_curves:
             name = join_names(label, curve.name if len(panel_curves) > 1 else "")
             curves.append(replace(curve, name=name))

@@ -1,6 +1,7 @@
 """Panels as JSON of plotly.js figures; sliders and menus are part of this JSON, so that pages need no code of their own."""
 
 import base64
+from itertools import chain
 from operator import itemgetter
 from typing import Any
 
@@ -91,7 +92,8 @@ def _make_traces(panel: Panel) -> list[Figure]:
         style = "line" if curve.is_line else panel.style
         groups.append((curve.weight, _make_curve_traces(curve, style, colour)))
     # later traces lie above earlier ones
-    return [trace for _, group in sorted(groups, key=itemgetter(0)) for trace in group]
+    groups.sort(key=itemgetter(0))
+    return list(chain.from_iterable(group for _, group in groups))
 
 
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:

@@ -13,6 +13,7 @@ from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...response import rows
+from ...runs.batch.case_results import FAILED_OUTCOME
 from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
@@ -169,9 +170,9 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
                 data[name + ending] = variable
 
     words = {"outcome": (table.outcome, "how the case ended")}
-    if messages := table.endings | table.messages:
-        texts = [messages.get(number, "") for number in range(len(table))]
-        words["message"] = (texts, "why the case failed or did not settle")
+    if table.messages:
+        messages = [table.messages.get(number, "") for number in range(len(table))]
+        words["message"] = (messages, "why the case failed or did not settle")
     if len(case_folders):
         words["folder"] = (case_folders, "folder of the case inside cases/")
     for name, (values, text) in words.items():
@@ -200,7 +201,8 @@ def _describe_key(key: SweptKey) -> str:
 
 def _describe_failures(table: SweepTable) -> tuple[str, ...]:
     """Return the most frequent messages of failed cases, each with the number of cases."""
-    counts = Counter(table.messages[number] for number in sorted(table.messages))
+    failed = np.flatnonzero(table.outcome == FAILED_OUTCOME).tolist()
+    counts = Counter(table.messages[number] for number in failed)
     return tuple(
         f"{message} ({count} of {len(table)} cases)"
         for message, count in counts.most_common(MAX_FAILURE_MESSAGES)

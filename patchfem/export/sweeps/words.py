@@ -163,7 +163,9 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
         return "The only case settled and meets the tolerance."
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    advice = " The column message of sweep.csv says why." if table.endings else ""
+    advice = ""
+    if len(table.messages) > cases["failed"]:
+        advice = " The column message of sweep.csv says why."
     return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}.{advice}"
 
 
