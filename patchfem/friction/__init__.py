@@ -3,7 +3,7 @@
 In: keys of a table [friction] and a load. Out: the law of a contact in the form that the engines take (`protocol`).
 `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named *kernels are compiled:
 those of `laws/` are for the harmonic balance, those of `bonds/` for the contact points of `points`. `grooves` has matched
-grooves, whose flanks the load climbs. `path_work` computes the friction work of samples and the phase of slip. Read
+grooves, whose flanks the load climbs. `path_work` computes the friction work of samples. Read
 `protocol` first, then `laws/elastic_plastic`.
 """
 
@@ -62,10 +62,7 @@ PUBLIC = {
         "relaxation_length",
     ),
     "laws.stretch_kernels": ("relax_stretch",),
-    "path_work": (
-        "mean_slip_phase",
-        "sampled_work",
-    ),
+    "path_work": ("sampled_work",),
     "protocol": ("Element",),
     "record": (
         "make_law",
