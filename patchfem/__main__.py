@@ -177,8 +177,7 @@ def _describe_removed_option(arguments: list) -> str:
 
     for argument in arguments[1:]:
         option = argument.partition("=")[0]
-        sentence = describe_removed(f"{arguments[0]} {option}", f"{arguments[0]} {option}")
-        if argument.startswith("--") and sentence:
+        if sentence := describe_removed(f"{arguments[0]} {option}"):
             return sentence
     return ""
 
