@@ -82,7 +82,7 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
     assert fitted["low"] / fitted["value"] < 0.75 < 1.5 < fitted["high"] / fitted["value"]
     # a bound within this error ends the interval of the coefficient, which is said
     high = fitted["value"] * (1 + error / 2)
-    low = ("--free", f"wear.coefficient=1e-16 m^2/N..{high} m^2/N")
+    low = ("--free", f"wear.coefficient=1e-16 m^2/N..{high} m^2/N", "-o", tmp_path / "bound")
     content = run_cli("fit", scene, "--to", "worn_depth_mean=20 nm", *low, "--json").content
     assert "raise the high bound" in content["warnings"][-1]
     for name in ("common_length", "registration"):  # 1.0 wrote no common length
