@@ -29,8 +29,8 @@ from .sweep import CaseOptions
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """List every mistake in SCENE and in the files that it names; nothing is computed. A table [sweep] in which every
-    case is invalid counts as a mistake.
+    """List every mistake in SCENE and in the files that it names; nothing is computed, so that mistakes that need the
+    stiffness of the contact show in `patchfem plan`. A table [sweep] in which every case is invalid counts as a mistake.
 
     Example: patchfem check rig.toml
     """

@@ -233,7 +233,10 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     share = f"{100 * fit.rms / peak:.2g} %"
     residual = f"The residual of {n_rows} rows is {text} rms, {share} of the peak."
     if loop.quantity == "force":
-        works = np.trapezoid([loop.reading, fit.model], loop.displacement)
+        # the steps between two fitted rows
+        is_used = ~(fit.held_out[1:] | fit.held_out[:-1])
+        pairs = np.array([loop.reading, fit.model])
+        works = (pairs[:, 1:] + pairs[:, :-1]) / 2 @ (np.diff(loop.displacement) * is_used)
         scores["work_measured"], scores["work_fitted"] = (Quantity(work, "J") for work in works)
         share = format_number(100 * works[1] / works[0], 4)
         residual += f" The fitted loop dissipates {share} % of the measured work."
@@ -243,7 +246,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         "slide": (loop.displacement, "m"),
         loop.quantity: (loop.reading, unit),
         "fitted": (fit.model, unit),
-        "residual": (fit.model - loop.reading, unit),
+        "residual": (np.where(fit.held_out, np.nan, fit.model - loop.reading), unit),
         "row": (np.arange(loop.reading.size), "1"),
         "held": (fit.held_out.astype(np.int8), ""),
     }

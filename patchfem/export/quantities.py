@@ -125,8 +125,8 @@ QUANTITIES: dict[str, Definition] = {
     "held_out_rms": Definition(
         "1", "root mean square of predicted minus measured values of the rows that are held out"
     ),
-    "work_measured": Definition("J", "work of the measured force over the record"),
-    "work_fitted": Definition("J", "work of the fitted force over the record"),
+    "work_measured": Definition("J", "work of the measured force over the fitted rows"),
+    "work_fitted": Definition("J", "work of the fitted force over the fitted rows"),
     "frequency_residual_rms": Definition(
         "1", "root mean square of the relative deviation of the fitted frequency"
     ),

@@ -30,7 +30,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     Parameters
     ----------
     path : path-like
-        CSV file with a header like ``time [s],acceleration [g]``, or a universal file
+        CSV file with a header like ``time [s],acceleration [g]`` or ``time [s],base_acceleration [g]``, or a universal file
         with one time response of the quantity, in the unit of its label, of dataset 164 or in SI.
     quantity : {"acceleration", "force"}
         What the record contains.
@@ -53,15 +53,16 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     if path.suffix.lower() in UNIVERSAL_EXTENSIONS:
         time, value = _read_universal(path, quantity)
     else:
+        base_name = f"base_{quantity}"
         table = TableFormat(
             CHANNEL_UNITS,
-            ("time", quantity),
+            ("time", f"{quantity} {base_name}"),
             f"time [s],{quantity} [{SI_UNITS[quantity]}]",
             "a drive",
         )
         values = read_columns(path, table).values
         time = values["time"]
-        value = values[quantity]
+        value = values.get(base_name, values.get(quantity))
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)

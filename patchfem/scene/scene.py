@@ -20,7 +20,7 @@ from .lines import find_scene_value, locate_key, split_assignment
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
 from .rules.scene_draft import SceneDraft, SceneError
-from .rules.structure import describe_default_outputs
+from .rules.structure import describe_mode_defaults
 from .rules.support import check_combinations
 from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
@@ -239,7 +239,7 @@ def finish_scene(
         kind=kind,
         remarks=draft.remarks,
         sets=sets,
-        notes=tuple(describe_default_outputs(draft.tables)),
+        notes=tuple(describe_mode_defaults(draft.tables)),
         **{name: getattr(completed, name) for name in tables.Tables.model_fields},
     )
 

@@ -125,7 +125,8 @@ def _advise_on_slides(omega, joint) -> str:
     mass = np.ceil(rounded**-2)
     return (
         "; `slide` of the modes is too large or `moving_mass` too small: multiply `slide` of every mode by "
-        f"{rounded:.2g} or less, or check whether the mass is {mass:.2g} times as large"
+        f"{rounded:.2g} or less (and give `base`, which is `slide` for the first mode by default), or check whether "
+        f"the mass is {mass:.2g} times as large"
     )
 
 

@@ -19,11 +19,11 @@ without segments also has:
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..core import DriveSegment
+from ..core import DriveSegment, ModalBasis
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
 
@@ -200,6 +200,19 @@ class SweepDrive:
         return amplitude * np.sin(self.phase(t))
 
 
+class LineLoss(NamedTuple):
+    """Loss of a record whose rows are joined by straight lines.
+
+    - frequency: frequency [Hz] at which it is given.
+    - rows: rows per cycle of this frequency.
+    - fraction: part of the amplitude that is lost.
+    """
+
+    frequency: float
+    rows: float
+    fraction: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordedDrive:
     """Recorded drive signal, interpolated linearly between its rows and zero after the last row.
@@ -238,6 +251,25 @@ class RecordedDrive:
     def values(self, t):
         """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]."""
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
+
+    def find_line_loss(self, modes: ModalBasis) -> LineLoss:
+        """Estimate what the straight lines between the rows take from the record of a smooth signal.
+
+        They multiply a sine of frequency f, sampled at f_s, by sinc(f/f_s)^2. It is given at the frequency at which the
+        linear `modes` of the rig respond most.
+        """
+        step = float(np.median(np.diff(self.time)))
+        grid = step * np.arange(round(self.duration / step))
+        frequency = np.fft.rfftfreq(grid.size, step)[1:]
+        omega = 2 * np.pi * frequency[:, None]
+
+        # The finite record widens the resonances.
+        width = 2 * modes.zeta * modes.omega + 2 * np.pi / self.duration
+        receptance = modes.base / (modes.omega**2 - omega**2 + 1j * width * omega)
+        signal = np.fft.rfft(self.values(grid))[1:]
+        largest = np.argmax(np.abs(signal) ** 2 * np.sum(np.abs(receptance) ** 2, axis=1))
+        main = float(frequency[largest])
+        return LineLoss(main, 1 / (main * step), 1 - float(np.sinc(main * step)) ** 2)
 
 
 def _build_levels(drive: DriveKeys) -> PiecewiseDrive:

@@ -30,6 +30,7 @@ class RandomRecord(RecordedDrive):
     """
 
     band: tuple[float, float] = (0.0, 0.0)
+    find_line_loss = None  # `draw_random_record` chooses the rows
 
     @property
     def max_frequency_ratio(self) -> float:

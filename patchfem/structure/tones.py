@@ -31,6 +31,7 @@ class TonesRecord(RecordedDrive):
     beat: float = 1.0
     max_frequency: float = 0.0
     tones: tuple[tuple[float, float, float], ...] = ()
+    find_line_loss = None  # the signal is smooth between the rows
 
     @property
     def max_frequency_ratio(self) -> float:

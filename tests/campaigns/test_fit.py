@@ -275,7 +275,7 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     assert run.force[at] == pytest.approx(fitted, abs=1e-9)
     measures = read_json(tmp_path / "out/summary.json")["measures"]
     for name, force in (("work_measured", written.reading), ("work_fitted", fitted)):
-        work = np.trapezoid(force, written.displacement)
+        work = np.trapezoid(force[:25], written.displacement[:25])
         assert measures[name]["value"] == pytest.approx(work, rel=1e-12)
 
 

@@ -8,7 +8,7 @@ from command_line import run_cli, run_successfully
 from exported import write_small_series
 from PIL import Image
 
-from patchfem.export.fields.film import contact_window
+from patchfem.export.fields.film import contact_window, make_stress_panels
 from patchfem.export.fields.vtkhdf import VTKHDF_FILE, read_frames
 from patchfem.export.pieces import draw_pieces, magnify_pieces
 
@@ -116,3 +116,10 @@ def test_refuses_invalid_options(small_folder, tmp_path, monkeypatch, arguments,
         monkeypatch.delenv(name, raising=False)
     answer = run_cli("view", small_folder, *arguments)
     assert answer.code == code and message in answer.err and not list(tmp_path.iterdir())
+
+
+def test_labels_of_stress_film_differ_after_long_wear(tmp_path):
+    """The labels of the frames of the last cycle begin at 0, also after 1e6 s of wear."""
+    write_small_series(tmp_path / "out", times=1e6 + 1e-3 * np.arange(3))
+    (panel,) = make_stress_panels(tmp_path / "out" / VTKHDF_FILE)
+    assert [curve.name for curve in panel.curves] == ["0 ms", "1 ms", "2 ms"]

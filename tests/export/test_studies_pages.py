@@ -9,7 +9,7 @@ import xarray as xr
 from command_line import read_json, read_page, run_successfully
 from friction_loops import elastic_plastic_force, write_loop
 from measured_rows import make_linear_rows, write_rows
-from page_data import find_strange_curves, find_wrong_numbers, read_charts
+from page_data import find_strange_curves, find_wrong_numbers, read_charts, read_figures
 from scene_texts import DRIVE, MODE, PLASTIC, POINT
 from sweep_tables import read_rows
 
@@ -106,6 +106,9 @@ def test_exact_backbone_files_agree(folders):
     assert "<p>Frequency is " in read_page(folders / "single backbone")
     # the rows of the recommended method come first
     assert rows[0]["method"] == "balance" and rows[-1]["method"] == "quasi-static"
+    traces = read_figures(read_page(folder))[0]["data"]
+    thin, bold = (trace["line"]["width"] for trace in traces if "name" in trace)
+    assert bold > 2 * thin and traces[-1]["name"] == "balance frequency"
     with xr.open_dataset(folder / "backbone.nc") as data:
         for method, curve in curves.items():
             mine = [row for row in rows if row["method"] == method]

@@ -54,11 +54,12 @@ def test_always_last_two_cycles_have_hundred_samples_each(name, tmp_path):
         tmp_path / "a.csv",
         np.c_[time, value],
         delimiter=",",
-        header="time [s],acceleration [m/s^2]",
+        header="time [s],base_acceleration [m/s^2]",
         comments="",
     )
     text, changes = CASES[name]
     result = run_scene(text, changes, tmp_path / "a.toml", estimate=False)
+    assert any("rows per cycle of" in text for text in result.warnings) == (name == "file")
     response = result.response
     period, end = result.plan.model.rig.drive.signal.period, result.window.time[-1]
     assert (np.diff(response.time) > 0).all() and response.time.size >= 100

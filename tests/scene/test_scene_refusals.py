@@ -290,7 +290,8 @@ def test_refuses_unreadable_file(tmp_path):
         ),
         (
             "[structure.reduced]\nboundary = [1, true]\n",
-            "structure.reduced.boundary[2]: whole numbers or texts are needed, such as [1, '12:x'], not true",
+            "structure.reduced.boundary[2]: whole numbers or texts are needed, such as [1, '12:x'] or "
+            "['1..39:20'], not true",
         ),
         (
             '[structure.reduced]\nmass = "m"\n',

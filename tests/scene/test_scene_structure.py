@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, LINEAR, STRUCTURE, get_only_mistake
+from scene_texts import COULOMB, LINEAR, POINT, STRUCTURE, get_only_mistake
 
 import patchfem as pf
 from patchfem.model import compute_named_motions
@@ -214,3 +214,23 @@ def test_exact_force_drive_acts_where_first_mode_moves_by_one(output):
     notes = [note for note in result.notes if "(default of `output`)" in note]
     assert len(notes) == (not output)
     assert all("the patch moves by 0.0118" in note for note in notes)
+
+
+@pytest.mark.parametrize("base, n_notes", [("", 1), ("base=0.5", 0)])
+def test_note_states_default_of_base(base, n_notes):
+    """Unless `base` is given, a note states that the base drives the first mode by its `slide`."""
+    scene = loads(
+        LINEAR,
+        sets=["structure.mode.axial.slide=0.1", *(f"structure.mode.axial.{base}",) * bool(base)],
+    )
+    assert sum("participation 0.1" in note for note in scene.notes) == n_notes
+
+
+@pytest.mark.parametrize("method", ["exact", "harmonic"])
+def test_exact_zero_friction_moves_as_no_friction(method):
+    """Coulomb friction with static = 0 leaves the amplitude of the rig unchanged."""
+    sets = [f"accuracy.method={method}"]
+    rubbing = run(plan(loads(POINT + COULOMB + STRUCTURE, sets=[*sets, "friction.static=0"])))
+    free = run(plan(loads(STRUCTURE, sets=sets)))
+    name = "relative_displacement_amplitude"
+    assert rubbing.measures[name].value == pytest.approx(free.measures[name].value, rel=1e-8)

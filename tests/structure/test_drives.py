@@ -11,7 +11,7 @@ from patchfem.core import Outcome, SineDrive
 from patchfem.points.contacts import make_contact
 from patchfem.points.time_march import march
 from patchfem.scene import loads
-from patchfem.structure.drives import SweepDrive, make_levels, make_step
+from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
 from patchfem.structure.tones import make_tones
 
 OMEGA = 2 * np.pi * 143
@@ -87,6 +87,16 @@ def test_exact_step_response_agrees_with_closed_form():
         -2 * zeta * OMEGA * response.slide_rate - OMEGA**2 * response.slide, abs=1e-9
     )
     assert response.base_acceleration == pytest.approx(9.0)
+
+
+def test_exact_loss_of_straight_lines():
+    """A sine with 8 rows per cycle loses the part of its amplitude that `find_line_loss` states."""
+    time = np.arange(801) / (8 * 50.0)
+    drive = RecordedDrive(time, np.sin(100 * np.pi * time), 0.02)
+    loss = drive.find_line_loss(make_modal_basis(100 * np.pi, 0.01))
+    fine = np.linspace(0, 2, 200_000, endpoint=False)
+    amplitude = 2 * np.mean(drive.values(fine) * np.sin(100 * np.pi * fine))
+    assert loss == pytest.approx((50.0, 8.0, 1 - amplitude), rel=1e-4)
 
 
 # ---- scenes

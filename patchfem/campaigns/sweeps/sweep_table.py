@@ -112,6 +112,8 @@ class SweepTable:
         Error message of each failed case, by its number.
     faults : dict
         Sentences on internal faults after which cases were run one by one, as keys.
+    endings : dict
+        Sentences on each case that has neither failed nor settled, by its number.
     """
 
     keys: tuple[SweptKey, ...]
@@ -122,6 +124,7 @@ class SweepTable:
     measures: dict[str, MeasureColumn] = field(default_factory=dict)
     messages: dict[int, str] = field(default_factory=dict)
     faults: dict[str, None] = field(default_factory=dict)
+    endings: dict[int, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -173,6 +176,10 @@ class SweepTable:
             column.floors[numbers] = np.nan_to_num(part.floors[name])
         self.messages.update({int(numbers[k]): text for k, text in part.messages.items()})
         self.faults.update(dict.fromkeys(part.faults))
+        for k, outcome in enumerate(map(str, part.outcome)):
+            if outcome in tuple(Outcome) and outcome not in FINAL_OUTCOMES:
+                warnings = part.warnings.get(k, ()) if outcome == Outcome.NOT_CONVERGED else ()
+                self.endings[int(numbers[k])] = " ".join([Outcome(outcome).sentence, *warnings])
 
     def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of the measure `name` that count for statements on it, or NaN for others.

@@ -74,7 +74,11 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
             label = curve.name if symbol == "circle" else None  # the entry of the legend
             axes.plot(*points, marker, color=colour, label=label, zorder=3)
         return
-    axes.plot(curve.x, curve.y, color=colour, label=curve.name)
+    options = {
+        "lw": MATPLOTLIB_STYLE["lines.linewidth"] * curve.weight,
+        "zorder": 2 + curve.weight / 10,
+    }
+    axes.plot(curve.x, curve.y, color=colour, label=curve.name, **options)
     filling = {"color": colour, "alpha": ERROR_BAND_OPACITY, "lw": 0}
     if curve.low is not None:
         axes.fill_between(curve.x, curve.low, curve.high, **filling)

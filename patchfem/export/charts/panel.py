@@ -53,6 +53,8 @@ class Curve:
         Whether the curve is a line in a chart of points.
     symbols : (k,) ndarray of str or None
         Symbols of the points: "circle" or "x".
+    weight : float
+        Width of a line over the usual one; a bolder line lies above the others.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Curve:
     meanings: tuple[str, ...] = ()
     is_line: bool = False
     symbols: np.ndarray | None = None
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -11,6 +11,8 @@ from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
+BOLD_CURVE_WEIGHT = 1.8  # width of a recommended curve over the usual one
+THIN_CURVE_WEIGHT = 0.6  # width of the other curves in the same chart
 SWEEP_CHART_STYLES = ("relative", "menu", "maps")
 N_MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_CHARTED_INTERFACES = 6  # largest number of interfaces with charts of their own
@@ -78,7 +80,12 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
         for names in (chart.y, chart.lines):
             for name, own_x in _split_names(names):
                 drawn = _make_curves(data, chart, name, own_x, axes)
-                panel_curves += [replace(curve, is_line=names is chart.lines) for curve in drawn]
+                weight = 1.0
+                if chart.thin:
+                    weight = THIN_CURVE_WEIGHT if name in chart.thin.split() else BOLD_CURVE_WEIGHT
+                panel_curves += [
+                    replace(curve, is_line=names is chart.lines, weight=weight) for curve in drawn
+                ]
         for curve in panel_curves:
             name = join_names(label, curve.name if len(panel_curves) > 1 else "")
             curves.append(replace(curve, name=name))

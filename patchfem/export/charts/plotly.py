@@ -1,6 +1,7 @@
 """Panels as JSON of plotly.js figures; sliders and menus are part of this JSON, so that pages need no code of their own."""
 
 import base64
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -80,15 +81,17 @@ def _make_traces(panel: Panel) -> list[Figure]:
             largest = float(max(np.nanmax(curve.y) for curve in panel.curves))
             traces = [trace | {"zmin": 0.0, "zmax": largest} for trace in traces]
         return traces
-    traces = []
+    groups = []
     for number, curve in enumerate(panel.curves):
         colour = CURVE_COLOURS[number % len(CURVE_COLOURS)]
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAID_CURVE_COLOURS)]
             colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
-        traces += _make_curve_traces(curve, "line" if curve.is_line else panel.style, colour)
-    return traces
+        style = "line" if curve.is_line else panel.style
+        groups.append((curve.weight, _make_curve_traces(curve, style, colour)))
+    # later traces lie above earlier ones
+    return [trace for _, group in sorted(groups, key=itemgetter(0)) for trace in group]
 
 
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
@@ -101,7 +104,7 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
         "y": curve.y,
         "name": curve.name,
         "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
-        "line": {"color": colour, "width": 1.7},
+        "line": {"color": colour, "width": 1.7 * curve.weight},
         "marker": {"color": colour, "size": 7},
     }
     if curve.symbols is not None:

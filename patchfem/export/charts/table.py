@@ -36,6 +36,8 @@ class Chart:
         Variables whose values are vertical lines.
     lines : str
         Further variables of the vertical axis, drawn as lines beside points.
+    thin : str
+        Variables of the vertical axis that are drawn thin, below the others, which are bold.
     x_label, y_label : str
         Names of the axes, or "" for the name of the variable, "*" for its description.
     caption : str
@@ -51,6 +53,7 @@ class Chart:
     by: str = ""
     marks: str = ""
     lines: str = ""
+    thin: str = ""
     x_label: str = ""
     y_label: str = ""
     caption: str = ""
@@ -320,7 +323,8 @@ def _draw_methods(title: str, name: str, **options) -> Chart:
     """Return the chart of a quantity of a backbone over the amplitude, with the curves of all methods."""
     x = " ".join(f"{method}_amplitude" for method in BACKBONE_METHODS)
     y = " ".join(f"{method}_{name}@{method}_amplitude" for method in BACKBONE_METHODS)
-    return Chart(title, x, y, x_label="amplitude at the output", **options)
+    thin = " ".join(f"{method}_{name}" for method in BACKBONE_METHODS[1:])
+    return Chart(title, x, y, thin=thin, x_label="amplitude at the output", **options)
 
 
 BACKBONE_CHARTS = (
@@ -364,7 +368,7 @@ FIT_CHARTS = (
         "points",
         x_label="row",
         y_label="fitted - measured",
-        caption="A pattern along the rows is an error of the model; scatter around zero is noise of the record.",
+        caption="A pattern along the fitted rows is an error of the model; scatter around zero is noise of the record.",
     ),
     Chart(
         "Frequency",

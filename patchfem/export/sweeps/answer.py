@@ -169,9 +169,9 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
                 data[name + ending] = variable
 
     words = {"outcome": (table.outcome, "how the case ended")}
-    if table.messages:
-        messages = [table.messages.get(number, "") for number in range(len(table))]
-        words["message"] = (messages, "why the case failed")
+    if messages := table.endings | table.messages:
+        texts = [messages.get(number, "") for number in range(len(table))]
+        words["message"] = (texts, "why the case failed or did not settle")
     if len(case_folders):
         words["folder"] = (case_folders, "folder of the case inside cases/")
     for name, (values, text) in words.items():

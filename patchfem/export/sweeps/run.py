@@ -228,7 +228,8 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     for name in sort_measures(table):
         columns[name] = _format_numbers(table.measures[name].values, "{!r}")
         columns[f"{name}_error"] = _format_numbers(table.measures[name].errors, "{:.6g}")
-    columns["message"] = (table.messages.get(number, "") for number in range(len(table)))
+    messages = table.endings | table.messages
+    columns["message"] = (messages.get(number, "") for number in range(len(table)))
     if case_folders:
         columns["case"] = case_folders
     # the rows are made one by one, because the cells of all cases would fill the memory

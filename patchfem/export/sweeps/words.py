@@ -163,7 +163,8 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
         return "The only case settled and meets the tolerance."
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}."
+    advice = " The column message of sweep.csv says why." if table.endings else ""
+    return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}.{advice}"
 
 
 def _describe_unsettled(table: SweepTable) -> str:

@@ -8,6 +8,8 @@ from math import inf
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = True
+# Smallest coefficient of static friction: the margin of a rest is relative to it, and its force is at round-off
+MIN_STATIC = 1e-12
 
 
 def force_and_rates(p, memory, point, s, rates):
@@ -95,4 +97,4 @@ def from_law(law, load):
     load : float
         Mean load [N].
     """
-    return LawNumbers("coulomb", (law.static, law.kinetic), stiffness=inf)
+    return LawNumbers("coulomb", (max(law.static, MIN_STATIC), law.kinetic), stiffness=inf)

@@ -145,6 +145,21 @@ def _warn_of_peak_at_end_frequency(run) -> Iterator[str]:
             return
 
 
+def _warn_of_sparse_record(run) -> Iterator[str]:
+    """Warn if the straight lines between the rows of drive.file lose more than the tolerance."""
+    find_line_loss = getattr(run.model.rig.drive.signal, "find_line_loss", None)
+    if find_line_loss is None:
+        return
+    loss = find_line_loss(run.model.rig.modes)
+    tolerance = run.model.accuracy.tolerance
+    if loss.fraction > tolerance:
+        yield (
+            f"drive.file has {loss.rows:.3g} rows per cycle of {loss.frequency:.4g} Hz, where it moves the rig most; the "
+            f"straight lines between its rows lower a sine of this frequency by {100 * loss.fraction:.2g} %, which the "
+            f"errors do not contain; resample it to {np.ceil(np.pi / np.sqrt(3 * tolerance)):.0f} rows per cycle or more"
+        )
+
+
 def _warn_of_large_slides(run) -> list[str]:
     """Warn of interfaces that slide by a large part of their contact, at which the computation keeps the pressure."""
     return merge_sentences(
@@ -214,6 +229,7 @@ MOTION_WARNINGS = (
     _warn_of_single_points,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
+    _warn_of_sparse_record,
     _warn_of_large_slides,
 )
 MOTION_NOTES = (

@@ -170,7 +170,7 @@ def _describe_array_requirement(types: tuple[KeyType, ...]) -> str:
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
     if str in types:
-        return "whole numbers or texts are needed, such as [1, '12:x']"
+        return "whole numbers or texts are needed, such as [1, '12:x'] or ['1..39:20']"
     return f"{'' if _is_open_array(types) else 'two '}whole numbers are needed, such as [1, 2]"
 
 

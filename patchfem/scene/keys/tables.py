@@ -226,7 +226,8 @@ class Mode(Table):
     base: optional(
         Number,
         "participation of the mode in the base motion; default: the value of `slide` for the "
-        "first mode, 0 for the others; the sum of the squares over all modes must be at most 1",
+        "first mode (give `base` where `slide` is not 1), 0 for the others; the sum of the squares over "
+        "all modes must be at most 1",
     )
     output: optional(
         Number,
@@ -346,9 +347,9 @@ class Reduced(Table):
     ) = "craig-bampton"
     moved: optional(
         array(Coordinate),
-        "coordinates that a base drive moves along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows "
-        "from a to b), nodes or directions; default: all coordinates in direction x, or all coordinates if the files "
-        "name no directions",
+        "coordinates that a base drive moves along x: row numbers, ranges of rows (['1..39:20'] means 20 evenly "
+        "spaced rows from 1 to 39), nodes or directions; default: all coordinates in direction x, or all coordinates "
+        "if the files name no directions",
     )
     slide: optional(
         MassPair,

@@ -166,11 +166,12 @@ def default_output(index: int) -> float:
     return 0.0 if index else 1.0
 
 
-def describe_default_outputs(tables: Tables) -> list[str]:
-    """Return a sentence on each mode whose default of `output` decides what a drive or sensor does.
+def describe_mode_defaults(tables: Tables) -> list[str]:
+    """Return a sentence on each mode whose default of `output` or `base` decides what a drive or sensor does.
 
-    The default is 1 for the first mode, which matters if a force drives the output point, and 0 for the others, which
-    matters for those that slide and have no sensor key. `tables` are those of the scene.
+    The default of `output` is 1 for the first mode, which matters if a force drives the output point, and 0 for the
+    others, which matters for those that slide and have no sensor key. The default of `base` is `slide` for the first
+    mode, which matters if the base moves. `tables` are those of the scene.
     """
     modes = tables.structure.mode if tables.structure is not None else ()
     drive = tables.drive
@@ -183,6 +184,11 @@ def describe_default_outputs(tables: Tables) -> list[str]:
             sentences.append(
                 f"the force acts at the output point, which moves by 1 per unit of the coordinate of mode '{mode.name}' "
                 f"(default of `output`); the patch moves by {mode.slide:g} (`slide`)"
+            )
+        if mode.base is None and kind == "base" and mode.slide != 1:
+            sentences.append(
+                f"the base drives mode '{mode.name}' with the participation {mode.slide:g}, its `slide` (default of "
+                "`base`); give `base` if it differs"
             )
 
     for mode in modes[1:]:

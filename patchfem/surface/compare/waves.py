@@ -83,8 +83,7 @@ def compare_waves(
     errors = (band_noise, noise / step)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
         blocks = [_average_squares(np.array_split(size, n_blocks, 1)) for size in sizes]
-        smallest = min(block.mean() for block in blocks)
-        if not smallest > 0 or error**2 > MAX_NOISE_OVER_SIZE * smallest:
+        if _is_noise(error, blocks):
             values[name] = name_unknown(name, "noise")
             continue
         values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
@@ -103,6 +102,16 @@ def _subtract_polynomial(z, degree: int) -> np.ndarray:
 def _average_squares(parts: list[np.ndarray]) -> np.ndarray:
     """Return the mean squares (k,) of k arrays of values."""
     return np.array([np.mean(part**2) for part in parts])
+
+
+def _is_noise(error: float, squares: Sequence[np.ndarray]) -> bool:
+    """Return whether noise of a size is so large a part of one of two sizes that their ratio is unknown.
+
+    Interpolation between the samples lowers the noise of one surface. `squares` are the mean squares (k,) in blocks of
+    the sizes before and after wear.
+    """
+    smallest = min(block.mean() for block in squares)
+    return not smallest > 0 or error**2 > MAX_NOISE_OVER_SIZE * smallest
 
 
 def _divide_means(before, after, power: float) -> np.ndarray:
@@ -174,7 +183,12 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
                 bounds = _divide_means(np.ones(len(values)), values, power)
                 table[side][name] = name_quantity(name, *bounds)
             text = f"{COMPARISON_DEFINITIONS[name][1]}, after wear divided by before"
-            table["ratio"][name] = Quantity(*_divide_means(*pair, power).tolist(), "1", text)
+            ratio = _divide_means(*pair, power).tolist()
+            reason = ""
+            if name == "slope" and _is_noise(depths.noise_level / step, pair):
+                ratio = [None] * 3
+                reason = "noise"
+            table["ratio"][name] = Quantity(*ratio, "1", text, reason)
         regions[region] = table
     return regions, cutoff
 

@@ -315,6 +315,13 @@ def test_exact_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
     assert regions["inside"]["before"]["Ra"].value == pytest.approx(np.abs(part).mean(), rel=0.01)
     assert regions["inside"]["before"]["Rq"].value == pytest.approx(part.std(), rel=0.01)
 
+    # The ratio of slopes of noise is that of an interpolated and a measured trace.
+    found = compare_surfaces(*make_pair(worn, 7, noise=60 * NM, surface=surface))
+    assert found.values["slope_ratio"].reason == "noise"
+    for region in found.evidence.roughness.values():
+        assert region["ratio"]["slope"][:3] == (None,) * 3
+        assert region["ratio"]["Ra"].value > 0
+
 
 def test_refuses_short_traces():
     """Traces of too few heights are refused."""
