@@ -7,30 +7,31 @@ Read the package in this order. A module imports only from its own entry of the 
 3. `formatting`   numbers as text: readable units, digits that match the error
 4. `cost_model`   CPU times per unit of work
 5. `core`         exchanged records: interface, compliance, contact state, modal basis, response, measure, outcome
-6. `effects`      physical effects and methods that a scene can request
-7. `disk`         atomic writes, locks and the user's cache
-8. `compiled`     machine code of the kernels and its cache
-9. `closed_forms` exact solutions of contact at rounded edges
-10. `scene`        parsing and validation of a TOML file, with values in SI units
-11. `inputs`       measured data files: columns, slide paths, signals, loops
-12. `mesh`         tagged meshes of two coated pieces
-13. `surface`      measured height profiles for roughness, wear and gaps
-14. `elasticity`   static condensation of the pieces to their interface, and stress recovery
-15. `contact`      gap shapes, unilateral contact, asperity layers, strips
-16. `friction`     friction laws and the sum over bonds along the path
-17. `slip`         partial slip of the pieces: elements, shear modes, tangents
-18. `structure`    modes and drive of the rig
-19. `hybrid`       motion from event to event by steps of order 8
-20. `points`       steps of order 2: many contact points, and sweeps over many cases
-21. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-22. `response`     measures of a run: outcome, events, levels and free vibration
-23. `wear`         wear depth over many cycles
-24. `runs`         patch, bench and rig: static contact, friction and dynamics combined
-25. `identify`     parameters from measurements, with confidence intervals
-26. `campaigns`    studies with many runs: fits, error against cost, sweeps
-27. `export`       summary, netCDF, VTK, report
-28. `api`          Python interface: load, build, plan and run
-29. `commands`     verbs of the command line
+6. `motion_measures`  measures that several engines have: loops, energy balance, reversals
+7. `effects`      physical effects and methods that a scene can request
+8. `disk`         atomic writes, locks and the user's cache
+9. `compiled`     machine code of the kernels and its cache
+10. `closed_forms` exact solutions of contact at rounded edges
+11. `scene`        parsing and validation of a TOML file, with values in SI units
+12. `inputs`       measured data files: columns, slide paths, signals, loops
+13. `mesh`         tagged meshes of two coated pieces
+14. `surface`      measured height profiles for roughness, wear and gaps
+15. `elasticity`   static condensation of the pieces to their interface, and stress recovery
+16. `contact`      gap shapes, unilateral contact, asperity layers, strips
+17. `friction`     friction laws and the sum over bonds along the path
+18. `slip`         partial slip of the pieces: elements, shear modes, tangents
+19. `structure`    modes and drive of the rig
+20. `hybrid`       motion from event to event by steps of order 8
+21. `points`       steps of order 2: many contact points, and sweeps over many cases
+22. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
+23. `response`     measures of a run: outcome, events, levels and free vibration
+24. `wear`         wear depth over many cycles
+25. `runs`         patch, bench and rig: static contact, friction and dynamics combined
+26. `identify`     parameters from measurements, with confidence intervals
+27. `campaigns`    studies with many runs: fits, error against cost, sweeps
+28. `export`       summary, netCDF, VTK, report
+29. `api`          Python interface: load, build, plan and run
+30. `commands`     verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. All imports are lazy: a module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded on first use (`lazy_imports`).
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "1.15.0"
+__version__ = "2.0.0"
 __all__ = [
     "FitOptions",
     "Measure",

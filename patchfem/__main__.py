@@ -177,8 +177,7 @@ def _describe_removed_option(arguments: list) -> str:
 
     for argument in arguments[1:]:
         option = argument.partition("=")[0]
-        sentence = describe_removed(f"{arguments[0]} {option}", f"{arguments[0]} {option}")
-        if argument.startswith("--") and sentence:
+        if sentence := describe_removed(f"{arguments[0]} {option}"):
             return sentence
     return ""
 
@@ -307,7 +306,7 @@ def run_command(arguments: list[str], before=lambda: None) -> int:
         message = str(error)
         if unused:
             message = _describe_unexpected_arguments(arguments[0], unused)
-        print_message(make_printable(f"patchfem: {' '.join(message.split())}"))
+        print_message(f"patchfem: {' '.join(message.split())}")
         return 2
     except CommandExit as end:
         return end.code
@@ -358,13 +357,12 @@ def _report_error(error: Exception) -> int:
     # The message of an error of this package may be followed by tables for the scene file.
     code = getattr(error, "code", None)
     if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-        for line in str(error).split("\n"):
-            print_message(make_printable(rewrite_powers_of_ten(line)))
+        print_message(rewrite_powers_of_ten(str(error)))
         return code
 
     # Any other error is a fault of the package.
     message = " ".join(f"{type(error).__name__}: {error}".split())
-    print_message(make_printable(f"patchfem: internal fault{_locate_fault(error)}: {message}"))
+    print_message(f"patchfem: internal fault{_locate_fault(error)}: {message}")
     print_message(
         "patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
         "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback"

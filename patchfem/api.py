@@ -64,7 +64,7 @@ from .scene import assignments, starting
 from .scene.backbone_scene import BackboneTables
 from .scene.files import require_files
 from .scene.keys.quantities import parse_quantity
-from .scene.keys.removed import describe_removed
+from .scene.keys.removed import describe_removed, refuse_removed
 from .scene.overrides import BaseScene
 from .scene.scene import Scene, SceneError, loads, remember_written
 from .scene.scene import load as load_file
@@ -123,11 +123,12 @@ DICT_NAME = "<dict>"  # displayed file name of a scene that is given as a dict
 LOCATION_PATTERN = re.compile(rf"^(--(set|over): |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
-def _strip_file_and_line_from_errors(function: Callable) -> Callable:
-    """Decorate a function so that its error messages name the key without file and line.
+def _make_verb(function: Callable) -> Callable:
+    """Decorate a function so that it refuses removed options, and its messages name the key without file and line.
 
     Callers who give the keys from Python have written no such file.
     """
+    verb = function.__name__.removesuffix("_")
 
     def strip_file_and_line(message: Any) -> Any:
         """Remove the location at the start of each line of a message."""
@@ -136,6 +137,7 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
     @wraps(function)
     def call_with_short_errors(*args: Any, **keywords: Any) -> Any:
         """Call the function, and remove the locations from its error messages."""
+        refuse_removed(verb, keywords)
         try:
             return function(*args, **keywords)
         except PatchfemError as error:
@@ -147,7 +149,7 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
     return call_with_short_errors
 
 
-@_strip_file_and_line_from_errors
+@_make_verb
 def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
     """Read a scene from a file, from its text, or from a dict of its tables.
 
@@ -227,7 +229,7 @@ def get_base_scene(scene: Scene) -> BaseScene:
 _cached_base_scenes: list[BaseScene] = []
 
 
-@_strip_file_and_line_from_errors
+@_make_verb
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     """Build the model of a scene without solving anything.
 
@@ -263,7 +265,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     return build_model(load(scene, **sets))
 
 
-@_strip_file_and_line_from_errors
+@_make_verb
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     """Choose the engine of a run, and count its unknowns, without solving anything.
 
@@ -296,7 +298,7 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     return plan_model(build(scene, **sets))
 
 
-@_strip_file_and_line_from_errors
+@_make_verb
 def run(
     scene: str | Path | Scene | Model | Plan,
     /,
@@ -578,7 +580,7 @@ def backbone(
     return netcdf.to_dataset(backbones.compute_answer(build_with, request))
 
 
-@_strip_file_and_line_from_errors
+@_make_verb
 def sweep(
     scene: str | Path | Scene,
     over: Mapping[str, Any] | None = None,
@@ -780,6 +782,7 @@ def run_many(
     )
 
 
+@_make_verb
 def fit(
     scene: str | Path | Scene,
     data: str | Path = "",
@@ -839,7 +842,6 @@ def fit(
     names = {field.name for field in fields(FitOptions)}
     changes = {name: value for name, value in keywords.items() if name in names}
     sets = {key: value for key, value in keywords.items() if key not in names | {"to"}}
-    _refuse_removed("fit", sets)
     loaded = remember_written(load(scene, **sets), _count_written(scene))
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
@@ -1063,6 +1065,7 @@ def view(
     convert.view_results(_require_path(folder, "view"), target, frame, magnify)
 
 
+@_make_verb
 def import_(
     file: str | Path,
     out: str | Path,
@@ -1114,7 +1117,6 @@ def import_(
     out = _require_path(out, "import_: out")
     names = imported.EstimateOptions._fields
     if unknown := set(how) - set(names):
-        _refuse_removed("import", unknown)
         raise PatchfemError(
             f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(names))}"
         )
@@ -1247,6 +1249,8 @@ def compare(
                 "compare: give the table of pairs alone, without files or predicted"
             )
         return compared_pairs.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
+    if len(files) == 4:
+        raise PatchfemError(describe_removed("compare of four files"))
     if len(files) != 2:
         raise PatchfemError("compare: give two files, before and after wear, or a table of pairs")
     if any(file.is_dir() for file in files):
@@ -1350,13 +1354,6 @@ def _print_to_stderr(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def _refuse_removed(verb: str, names: Iterable[str]) -> None:
-    """Raise PatchfemError for the first name that was an option of a verb, with what to use instead."""
-    for name in names:
-        if removed := describe_removed(f"{verb} --{name.replace('_', '-')}", f"{verb}: {name}"):
-            raise PatchfemError(removed)
-
-
 def _reject_keys(sets: dict, kind: str) -> None:
     """Raise PatchfemError if keys (`sets`) are given for a Plan or a Model, which cannot be changed.
 
@@ -1391,6 +1388,8 @@ class Measures(Mapping):
         """
         if name in self._measures:
             return self._measures[name]
+        if removed := describe_removed(f"measure {name}"):
+            raise KeyError(removed)
         similar_names = get_close_matches(str(name), self._measures, 1, 0.6)
         advice = f"it has {', '.join(self._measures)}"
         if similar_names:

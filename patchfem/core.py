@@ -29,7 +29,6 @@ __all__ = [
     "ContactState",
     "DriveSegment",
     "InitialState",
-    "IntegratedMeasures",
     "Interface",
     "Measure",
     "MeasureDefinition",
@@ -505,19 +504,3 @@ class Response:
             if n_samples == self.time.size:
                 extra[name] = history[:, samples] if name == "ledger" else history[samples]
         return Response(**columns, extra=extra)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class IntegratedMeasures:
-    """Quantities of the last cycles that an engine computes without sampling the motion.
-
-    If the motion of an engine is in closed form or piecewise polynomial, its peaks, times without slip and work are more
-    accurate than those from samples. A quantity that is missing here is computed from samples (`response.rows`).
-
-    - values: values of measures by name; None if the run has no value.
-    - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
-      largest relative displacement of each cycle.
-    """
-
-    values: dict[str, float | None] = field(default_factory=dict)
-    reversals: tuple[tuple[tuple[float, float], ...], ...] = ()

@@ -7,6 +7,7 @@ from ..campaigns import compare as pressing
 from ..export.surfaces import compare as compared
 from ..export.surfaces import pairs as compared_pairs
 from ..export.surfaces import worn
+from ..scene import describe_removed
 from ..surface.compare.compare import Options
 from .shared import (
     DEFAULT_OUTPUT,
@@ -87,11 +88,10 @@ def compare(
         _compare_pairs(pairs, options, output_options.into(pairs.stem))
         return
     if len(files) != 2:
-        removed = ""
         if len(files) == 4:
-            removed = "; four files were removed in patchfem 1.2, compare each direction by itself"
+            raise UsageError(describe_removed("compare of four files"))
         raise UsageError(
-            f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
+            "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"
         )
 
     output = output_options.into(f"{before.resolve().stem}-{after.resolve().stem}")

@@ -173,7 +173,7 @@ def present(answer: "Answer", output: Output) -> None:
         print(*show.make_lines(answer, output.verbose), sep="\n", flush=True)
     if not output.quiet:
         for text in answer.remarks.warnings:
-            _print_remark(f"warning: {text}")
+            print_message(f"warning: {text}")
         for text in answer.remarks.notes:
             note(text)
     if output.out is not None and not (output.json_ or output.quiet):
@@ -230,26 +230,21 @@ class UsageError(Exception):
 
 
 def print_message(text: str) -> None:
-    """Print a line of text on stderr, or do nothing if the stream cannot be written."""
-    try:
-        print(text, file=sys.stderr, flush=True)
-    except (OSError, ValueError):
-        pass
+    """Print a text on stderr without control characters, which could move the cursor.
+
+    Nothing happens if the stream cannot be written.
+    """
+    # some texts are followed by tables for the scene file
+    for line in text.split("\n"):
+        try:
+            print(make_printable(line), file=sys.stderr, flush=True)
+        except (OSError, ValueError):
+            pass
 
 
 def note(text: str) -> None:
     """Print the text of a note on stderr."""
-    _print_remark(f"note: {text}")
-
-
-def _print_remark(text: str) -> None:
-    """Print the text of a warning or note on stderr, without control characters.
-
-    These could move the cursor.
-    """
-    # some remarks are followed by tables for the scene file
-    for line in text.split("\n"):
-        print_message(make_printable(line))
+    print_message(f"note: {text}")
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):

@@ -55,14 +55,16 @@ def write_report(*folders: Path, out: Path | None = None) -> Path:
     Raises
     ------
     PatchfemError
-        If a folder has no complete result, or if the results are of different kinds.
+        If a folder has no complete result, if the results are of different kinds, or if the page is no .html.
     Missing
         If the page cannot be written.
     """
-    text = make_page([Path(folder) for folder in folders])
     path = Path(
         out or (Path(folders[0]) / store.PAGE_FILE if len(folders) == 1 else store.PAGE_FILE)
     )
+    if path.suffix != ".html":
+        raise PatchfemError(f"{path}: the ending of a page is .html; use -o {store.PAGE_FILE}")
+    text = make_page([Path(folder) for folder in folders])
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -149,7 +149,7 @@ def read_summary(folder: Path) -> Summary:
     Raises
     ------
     PatchfemError
-        If there is none, if it is damaged, or if a version before 2.0 wrote it.
+        If there is none, if it is damaged, or if a version before 1.2 wrote it.
     Missing
         If there is no such folder.
     """
@@ -168,7 +168,7 @@ def read_summary(folder: Path) -> Summary:
         reason = f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}".removeprefix(": ")
     except OSError as error:
         reason = str(error)
-    # every summary since 2.0 has a verdict
+    # every summary since 1.2 has a verdict
     if content and b'"verdict"' not in content:
-        reason = "patchfem before 2.0 wrote it; run the scene again"
+        reason = "patchfem before 1.2 wrote it; run the scene again"
     raise PatchfemError(f"{path}: this summary cannot be read: {reason}")

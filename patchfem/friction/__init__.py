@@ -1,10 +1,10 @@
 """Friction laws: traction as a function of the relative displacement at a given pressure.
 
 In: keys of a table [friction] and a load. Out: the law of a contact in the form that the engines take (`protocol`).
-`laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named *kernels are compiled:
-those of `laws/` are for the harmonic balance, those of `bonds/` for the contact points of `points`. `grooves` has matched
-grooves, whose flanks the load climbs. `path_work` computes the friction work of samples and the phase of slip. Read
-`protocol` first, then `laws/elastic_plastic`.
+`laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named *kernels are compiled
+for the contact points of `points`; the engine `hybrid` has its own files of the laws. `grooves` has matched grooves, whose
+flanks the load climbs. `path_work` computes the friction work of samples. Read `protocol` first,
+then `laws/elastic_plastic`.
 """
 
 # Names that other folders use, by module
@@ -52,20 +52,14 @@ PUBLIC = {
     "grooves": ("Grooves",),
     "laws.bouc_wen_kernels": ("follow_path",),
     "laws.coulomb": ("Coulomb",),
-    "laws.elastic_plastic": (
-        "masing_loop",
-        "parallel_element",
-    ),
+    "laws.elastic_plastic": ("masing_loop",),
     "laws.lugre": ("LuGre",),
     "laws.lugre_kernels": (
-        "rate_equation",
+        "find_force",
         "relaxation_length",
     ),
-    "path_work": (
-        "mean_slip_phase",
-        "sampled_work",
-    ),
-    "protocol": ("Element",),
+    "path_work": ("sampled_work",),
+    "protocol": ("SteadyLoop",),
     "record": (
         "make_law",
         "steady_loop",

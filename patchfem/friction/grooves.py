@@ -114,6 +114,16 @@ class Grooves:
         """Return the slope derivative t' = A k^2 cos(k q - phase) [1/m] at displacements q [m]."""
         return self.max_slope * self.wave_number * np.cos(self._angle(q))
 
+    def find_lift(self, q, velocity, acceleration):
+        """Return the vertical acceleration t q'' + t' q'^2 [m s-2] of what the grooves lift.
+
+        Parameters
+        ----------
+        q, velocity, acceleration : float or array
+            Relative displacement [m], velocity [m/s] and acceleration [m s-2].
+        """
+        return self.slope(q) * acceleration + self.slope_derivative(q) * velocity**2
+
     def force_ratio(self, q, direction, friction: float):
         """Return the ratio of tangential to vertical force, (t + phi)/(1 - phi t), at q [m].
 

@@ -1,9 +1,6 @@
-"""Friction work from samples of the relative displacement and of the friction force, and the phase of slip."""
+"""Friction work from samples of the relative displacement and of the friction force."""
 
 import numpy as np
-
-# Smallest mean resultant length of the doubled phases of slip starts that are one phase.
-MIN_ALIGNMENT = 0.95
 
 
 def sampled_work(rel_disp, force, force_after=None) -> np.ndarray:
@@ -34,22 +31,3 @@ def sampled_work(rel_disp, force, force_after=None) -> np.ndarray:
         is_reversed = (direction != 0) & (direction != np.append(0.0, direction[:-1]))
         force_sum = np.where(is_reversed, 2 * force_after, force_sum)
     return force_sum * steps / 2
-
-
-def mean_slip_phase(count, cosine, sine):
-    """Return the mean phase [rad], modulo pi, at which slip begins, for one run or for (n,) runs.
-
-    It is NaN if there is no onset, and if the onsets differ by more than MIN_ALIGNMENT allows: the
-    mean of several slip phases in a half cycle is the phase of none.
-
-    Parameters
-    ----------
-    count, cosine, sine : array_like
-        Number of slip onsets, and sums of cosine and sine of twice their phases.
-
-    Returns
-    -------
-    array_like
-    """
-    have_common_phase = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
-    return np.where(have_common_phase, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]

@@ -43,8 +43,8 @@ def stick_stiffness(friction, load: float) -> float:
         return friction.static * load / friction.bond_length
     if law_has_trait(friction.law, "averaged"):
         return inf
-    element = make_law(friction, load).element(load)
-    return element.limit / element.length if element.length else inf
+    law = make_law(friction, load)
+    return law.static * load / law.length if law.length else inf
 
 
 def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:

@@ -30,8 +30,8 @@ A module imports its own entry of this list and the entries before it:
 13. `periodic`        periodic motions by shooting
 14. `continuation`    curves of solutions through folds
 15. `periodic_curves` curves of periodic motions
-16. `free_motions`    motions without a drive: backbones and limit cycles
-17. `quasi_static`    quasi-static motions of a mode
+16. `quasi_static`    quasi-static motions of a mode
+17. `free_motions`    motions without a drive: backbones and limit cycles
 
 Limits. The method is explicit: a law or mode that is 1e4 times faster than the drive takes as many more steps, and a
 run ends with a message after `cases.MAX_STEPS`. Margins are evaluated at three points of a step and at nearly

@@ -517,12 +517,14 @@ def run_cycles(rig, state, record):
         if status != Status.DONE:
             return status
 
-        # The remaining change is that of a geometric series of the last two changes.
+        # The remaining change is that of a geometric series of the last two changes. The first cycle may be a part of a
+        # period, after which the same motion is no repetition.
         if repeat == 1 and not in_window:
             change = find_change(rig, state)
             ratio = min(max(change / last_change, MIN_CONTRACTION), MAX_CONTRACTION)
             last_change = max(change, 1e-300)
-            if change * ratio / (1 - ratio) < REPEAT_TOL * rig.settings[Setting.RTOL]:
+            remaining = change * ratio / (1 - ratio)
+            if cycle > 0 and remaining < REPEAT_TOL * rig.settings[Setting.RTOL]:
                 count = count_repeated(rig, state, record, cycle)
                 skip_cycles(rig, state, record, cycle, count)
                 cycle += count

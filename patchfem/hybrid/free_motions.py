@@ -122,8 +122,8 @@ class FreeMotion(NamedTuple):
     - amplitude: half the range of the output [m]
     - omega, rate: frequency [rad/s], and damping rate 2 zeta omega [1/s] or a multiple of the force
     - loss: work of friction per cycle [J]
-    - distance: largest part of the next Newton step, relative to the scale of each unknown; that of the rate is RATE_SCALE
-      omega
+    - distance: largest part of the next Newton step with the error of the steps, relative to the scale of each unknown;
+      that of the rate is RATE_SCALE omega
     - sticks: whether an interface with rigid friction rests for a part of the cycle
     - shooting: map of a period
     - state: state at its start
@@ -376,7 +376,8 @@ class FreeShooting(LoopShooting):
         n_friction = self.case.n_friction
         work = split_integrals(self.case, self.state.y)[:n_friction, 0]
         stuck = self.record.faces[:n_friction, Window.STUCK].copy()
-        distance = self.find_multipliers(state)[1]
+        # The integration misses each unknown by round-off of its scale, also where the next step is smaller.
+        distance = self.find_multipliers(state)[1] + ERROR_FLOOR * FINE.rtol
         rigid = [is_rigid(one.law.law) for one in self.motions.rig.interfaces[:n_friction]]
         return FreeMotion(
             amplitude=self.amplitude,

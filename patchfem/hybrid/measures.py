@@ -5,7 +5,7 @@ Names and definitions are those of `response.rows`. A value without a meaning is
 
 import numpy as np
 
-from ..friction import path_work
+from ..motion_measures import Observations, energy_balance, measure_acceleration, measure_interface
 from .cases import Case
 from .records import (
     N_FACE_INTEGRALS,
@@ -28,8 +28,8 @@ from .records import (
 MIN_ENERGY = (
     1e-6  # imbalance that counts as round-off, relative to the energy of the smallest speed
 )
-MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which there is no distortion
-FULL_STICK = 1e-12  # fraction by which a time of stick may miss the whole window
+# Measures of every interface; those of further ones carry its number. Other measures are those of the first one alone.
+INTERFACE_MEASURES = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")
 
 
 def compute_measures(case: Case, state: State, record: Record) -> dict[str, float]:
@@ -45,56 +45,48 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
         What the run recorded.
     """
     period = case.rig.settings[Setting.PERIOD]
-    # Extremes of a window that the run has not reached have no value.
-    extremes = np.where(np.isinf(record.extremes), np.nan, record.extremes)
-    half_ranges = (extremes[:, Extreme.MAX] - extremes[:, Extreme.MIN]) / 2
-    peaks = np.maximum(extremes[:, Extreme.MAX], -extremes[:, Extreme.MIN])
     span = state.clock[Clock.SPAN]
-    has_cycle = span > period * (1 - 1e-6)
-    harmonic_1 = harmonic_3 = np.nan
-    if has_cycle:
-        row = record.integrals[Probe.ACCELERATION]
-        harmonic_1 = np.hypot(row[Integral.COS_1], row[Integral.SIN_1]) * 2 / span
-        harmonic_3 = np.hypot(row[Integral.COS_3], row[Integral.SIN_3]) * 2 / span
-    distortion = harmonic_3 / harmonic_1 if harmonic_1 > MIN_ACCELERATION else np.nan
+    # Extremes of a window that the run has not reached have no value, nor have sums over less than a cycle.
+    extremes = np.where(np.isinf(record.extremes), np.nan, record.extremes)
+    whole = 1.0 if span > period * (1 - 1e-6) else np.nan
+    cosines = record.integrals[:, [Integral.COS_1, Integral.COS_3]]
+    sines = record.integrals[:, [Integral.SIN_1, Integral.SIN_3]]
+    harmonics = whole * (cosines - 1j * sines)
     values = {
-        "relative_displacement_amplitude": half_ranges[Probe.GAUGE],
-        "absolute_acceleration_peak": peaks[Probe.ACCELERATION],
-        "absolute_acceleration_fundamental": harmonic_1,
-        "acceleration_distortion": distortion,
+        "relative_displacement_amplitude": np.ptp(extremes[Probe.GAUGE]) / 2,
+        "absolute_acceleration_peak": np.abs(extremes[Probe.ACCELERATION]).max(),
+        **measure_acceleration(*harmonics[Probe.ACCELERATION], span),
+        **_compute_work(case, state),
     }
-    values |= _compute_work(case, state)
-    if not case.n_friction:
+    count = case.n_friction
+    if not count:
         return values
 
-    # Measures of every interface; those of further ones carry its number.
-    work = (split_integrals(case, state.y) - split_integrals(case, state.rows[WINDOW_START]))[:, 0]
-    for i, row in enumerate(record.faces[: case.n_friction]):
-        first = Probe.FACES + Probe.COUNT * i
-        suffix = f"_{i + 1}" if i else ""
-        # A reversal without stick takes a time of the size of round-off.
-        stuck = row[Window.STUCK] / span
-        if min(abs(stuck), abs(stuck - 1)) <= FULL_STICK:
-            stuck = round(stuck)
-        values |= {
-            f"slip_amplitude{suffix}": half_ranges[first + Probe.SLIP],
-            f"stick_fraction{suffix}": stuck,
-            f"friction_force_peak{suffix}": peaks[first + Probe.FORCE],
-            f"loop_area{suffix}": work[i] * period / span if has_cycle else np.nan,
-        }
-
-    # Measures of the first interface alone.
-    row = record.faces[0]
-    values["slip_start_phase"] = path_work.mean_slip_phase(
-        row[Window.STARTS], row[Window.COS_START], row[Window.SIN_START]
+    # A row for each interface, with an entry for each of its quantities.
+    faces = extremes[Probe.FACES :].reshape(-1, Probe.COUNT, 2)[:count]
+    phasors = harmonics[Probe.FACES :, 0].reshape(-1, Probe.COUNT)[:count]
+    work = split_integrals(case, state.y) - split_integrals(case, state.rows[WINDOW_START])
+    windows = record.faces[:count].T
+    cycles = record.cycles[record.cycles[:, Cycle.WINDOW] >= 0]
+    observations = Observations(
+        span=span,
+        period=period,
+        force=faces[:, Probe.FORCE],
+        slip=faces[:, Probe.SLIP],
+        stick=windows[[Window.STUCK, Window.STARTS, Window.COS_START, Window.SIN_START]],
+        work=whole * work[:count, 0],
+        harmonics=phasors[:, [Probe.SLIDE, Probe.FORCE]].T,
+        cycles=whole * cycles[None, :, Cycle.SLIDE : Cycle.FORCE_AT_MAX + 1],
     )
+    for name, column in measure_interface(observations, case.first_stiffness).items():
+        for i, value in enumerate(column if name in INTERFACE_MEASURES else column[:1]):
+            values[f"{name}_{i + 1}" if i else name] = value
+
     if case.rig.faces[0, Face.SWING] or case.rig.faces[0, Face.STIFFNESS]:
-        loads = extremes[Probe.FACES + Probe.LOAD]
-        values["normal_load_least"] = loads[Extreme.MIN]
-        values["normal_load_peak"] = loads[Extreme.MAX]
-        values["open_fraction"] = row[Window.OPEN] / span
-    loop = _compute_loop(case, record, values["loop_area"])
-    return values | (loop if has_cycle else dict.fromkeys(loop, np.nan))
+        values["normal_load_least"] = faces[0, Probe.LOAD, Extreme.MIN]
+        values["normal_load_peak"] = faces[0, Probe.LOAD, Extreme.MAX]
+        values["open_fraction"] = windows[Window.OPEN, 0] / span
+    return values
 
 
 def split_integrals(case: Case, y) -> np.ndarray:
@@ -137,47 +129,6 @@ def _compute_work(case: Case, state: State) -> dict[str, float]:
     values = {"friction_work": work, "energy_dissipated": loss, "energy_stored": work - loss}
     if settings[Setting.IS_BENCH]:
         return values
-    energies = compute_energies(case, state)
-    gap = abs(energies["work_in"] - energies["viscous"] - energies["friction"] - energies["stored"])
-    size = energies["power"] + energies["peak_stored"]
     n = case.rig.modes.shape[1]
-    if gap <= MIN_ENERGY * settings[Setting.MASS] * case.rig.scales[n] ** 2 or size == 0:
-        gap = 0.0
-    return values | {"energy_balance": gap / (size or 1.0)}
-
-
-def _compute_loop(case: Case, record: Record, loop_area: float) -> dict[str, float]:
-    """Return stiffness, damping and drift of the first interface, from its cycles in the window.
-
-    Parameters
-    ----------
-    case : Case
-        The case, with the stiffness to which damping refers.
-    record : Record
-        What the run recorded.
-    loop_area : float
-        Friction work per cycle [J].
-    """
-    phasors = record.integrals[:, Integral.COS_1] - 1j * record.integrals[:, Integral.SIN_1]
-    slide = phasors[Probe.FACES + Probe.SLIDE]
-    force = phasors[Probe.FACES + Probe.FORCE]
-
-    # Ranges and forces at the reversals of every cycle.
-    cycles = record.cycles[record.cycles[:, Cycle.WINDOW] >= 0]
-    ranges = cycles[:, Cycle.MAX_SLIDE] - cycles[:, Cycle.MIN_SLIDE]
-    slopes = (cycles[:, Cycle.FORCE_AT_MAX] - cycles[:, Cycle.FORCE_AT_MIN]) / ranges
-    slopes = slopes[np.isfinite(slopes)]
-    half_range = ranges.mean() / 2
-    damping = np.nan
-    if case.first_stiffness > 0:
-        damping = loop_area / (2 * np.pi * case.first_stiffness * half_range**2)
-    values = {
-        "equivalent_stiffness": (force / slide).real,
-        "harmonic_force_ratio": abs(force / slide),
-        "secant_stiffness": slopes.mean() if slopes.size else np.nan,
-        "equivalent_damping": damping,
-    }
-    if len(cycles) > 1:
-        means = cycles[:, Cycle.SLIDE] / case.rig.settings[Setting.PERIOD]
-        values["drift_per_cycle"] = (means[-1] - means[0]) / (len(cycles) - 1)
-    return values
+    round_off = MIN_ENERGY * settings[Setting.MASS] * case.rig.scales[n] ** 2
+    return values | {"energy_balance": energy_balance(compute_energies(case, state), round_off)}

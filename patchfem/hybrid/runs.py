@@ -124,22 +124,10 @@ class Motion:
 
         if m and rig.faces[0, Face.SWING]:
             extra["normal_load"] = self._columns(rows, 1)[:, 0]
-        if m > 1:
-            extra |= {
-                "slides": slides,
-                "slide_rates": slide_rates,
-                "forces": forces[:, :m],
-                "slips": slips,
-            }
-
-        # Without friction the slide of the modes stands for an interface that carries no force.
-        zeros = np.zeros(time.size)
-        interface = (z @ modes.slide, rate @ modes.slide, zeros, zeros)
-        if m:
-            interface = (slides[:, 0], slide_rates[:, 0], forces[:, 0], slips[:, 0])
+        interfaces = (slides, slide_rates, forces[:, :m], slips)
         pull = forces @ rig.rows[0]
         return make_response(
-            modes, drive, drive.values(time), (time, z, rate), pull, interface, extra
+            modes, drive, drive.values(time), (time, z, rate), pull, interfaces, extra
         )
 
 

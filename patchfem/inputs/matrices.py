@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
+from ..scene import advise_on_name, describe_removed
 from . import matlab
 from .damage import list_some, refuse_damage
 from .packed import open_arrays
@@ -24,6 +25,8 @@ MATRIX_NAMES = {
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
+# Files of Nastran, which have a refusal of their own because earlier versions read them.
+NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 MAX_MATRIX_VALUES = 5 * 10**7  # largest number of values in a matrix
 MAX_MATRIX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 
@@ -48,8 +51,14 @@ def read_matrix(path, matrix_name: str) -> Matrix:
     a square, symmetric matrix of finite real numbers.
     """
     path = Path(path)
+    extension = path.suffix.lower()
+    if extension not in READERS_BY_EXTENSION:
+        advice = advise_on_name(extension, READERS_BY_EXTENSION)
+        if extension in NASTRAN_EXTENSIONS:
+            advice = describe_removed("reading files of Nastran")
+        raise PatchfemError(f"{path}: {advice}")
     with refuse_damage(f"{path} cannot be read"):
-        matrix = READERS_BY_EXTENSION[path.suffix.lower()](path, matrix_name)
+        matrix = READERS_BY_EXTENSION[extension](path, matrix_name)
     values = symmetrize(sparse.csr_array(matrix.values), f"{path}: the {matrix_name}")
     return matrix._replace(values=values.tocsr())
 

@@ -151,10 +151,6 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
             raise PatchfemError(f"{path}: not a readable .inp file ({fault})") from None
     elif path.suffix in (".msh", ".vtu", ".med"):
         mesh = _convert_mesh(path, _read_with_meshio(path))
-    elif path.suffix == ".unv":
-        raise PatchfemError(
-            f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh"
-        )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
 

@@ -439,7 +439,7 @@ def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMo
         mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
     if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
-        contact_mass = float(unbonded.mass / slide[first] ** 2)
+        contact_mass = float(unbonded.mass / max(slide[first] ** 2, 1e-300))
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.
     unbonded_from_modes = np.eye(slide.size)

@@ -6,9 +6,9 @@ changes its sign, or a rigid point is released, is halved up to LEVELS times, be
 its path; events of a rigid point are then located by linear interpolation. A motion that repeats is not computed again.
 
 Kernels get the rows of one case: `case` has its constants (`case_rows.Number`), such as MOBILITY, the acceleration of the
-slide per friction force [1/kg]; `now` is its state at the end of the last step (`case_rows.Now`), and `seen` what was
-observed in the window (`case_rows.Seen`). `numbers[:, j]` and `memory[:, j]` are those of its law; the table of
-`return_maps_kernels` names their rows.
+slide per friction force [1/kg]; `now` is its state at the end of the last step (`case_rows.Now`), `seen` what was observed
+in the window (`case_rows.Seen`), and `loop` a cycle of the window (`case_rows.Loop`). `numbers[:, j]` and `memory[:, j]` are
+those of its law; the table of `return_maps_kernels` names their rows.
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .case_rows import SAME_CASE_CYCLE, Now, Number, Seen
+from .case_rows import SAME_CASE_CYCLE, Loop, Now, Number, Seen
 from .return_maps_kernels import (
     Law,
     MeanForce,
@@ -478,8 +478,8 @@ def find_turn(dt, value, rate, last_value, last):
 
 
 @njit(**NJIT_KERNEL)
-def observe_extremes(dt, start, now, seen, observes):
-    """Update the extremes of the slide in the cycle (`Now.MIN`, `Now.MAX`), and the friction forces there in `seen`.
+def observe_extremes(dt, start, now, loop):
+    """Update the extremes of the slide in the cycle (`Now.MIN`, `Now.MAX`), and the friction forces there in `loop`.
 
     Parameters
     ----------
@@ -489,10 +489,8 @@ def observe_extremes(dt, start, now, seen, observes):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
-    seen : (29,) array
-        What was observed, in the order of `case_rows.Seen` (changed in place).
-    observes : bool
-        Whether the cycle is measured.
+    loop : (5,) array
+        The cycle, in the order of `case_rows.Loop` (changed in place).
     """
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
@@ -504,12 +502,10 @@ def observe_extremes(dt, start, now, seen, observes):
 
     if q > now[Now.MAX]:
         now[Now.MAX] = q
-        if observes:
-            seen[Seen.FORCE_AT_MAX] = force
+        loop[Loop.FORCE_AT_MAX] = force
     if q < now[Now.MIN]:
         now[Now.MIN] = q
-        if observes:
-            seen[Seen.FORCE_AT_MIN] = force
+        loop[Loop.FORCE_AT_MIN] = force
 
 
 @njit(**NJIT_KERNEL)
@@ -578,7 +574,7 @@ def observe_acceleration(waves, dt, is_steep, case, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     q = now[Now.SLIDE]
@@ -600,7 +596,7 @@ def observe_acceleration(waves, dt, is_steep, case, start, now, seen):
 
 @njit(**NJIT_KERNEL)
 def observe_harmonics(time, dt, omega, start, now, seen):
-    """Add the integrals of slide and force times cos and sin (COS_1 to FORCE_SIN_3, LAST_MEAN) over a step to `seen`.
+    """Add the integrals of slide and force times cos and sin (COS_1 to FORCE_SIN_3, SLIDE) over a step to `seen`.
 
     Slide and force are a cubic and a parabola in the step, which Gauss's rule with three points integrates.
 
@@ -616,7 +612,7 @@ def observe_harmonics(time, dt, omega, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     # Force: parabola through both ends with the mean of the step
@@ -640,7 +636,7 @@ def observe_harmonics(time, dt, omega, start, now, seen):
         seen[Seen.FORCE_SIN_1] += force * w
         seen[Seen.FORCE_COS_3] += force * c * (4 * c * c - 3)
         seen[Seen.FORCE_SIN_3] += force * w * (3 - 4 * w * w)
-        seen[Seen.LAST_MEAN] += value
+        seen[Seen.SLIDE] += value
     seen[Seen.SPAN] += dt
 
 
@@ -658,7 +654,7 @@ def add_stick(angle, turn, speeds, first, last, mean, seen):
         Magnitudes of the velocity at both ends [m/s].
     first, last, mean : float
         Irreversible part of the motion at the start and at the end of the piece, and its mean.
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     first = abs(first)
@@ -702,7 +698,7 @@ def observe_stick(angle, turn, share, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the order of `case_rows.Now`.
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     first = seen[Seen.SHARE]
@@ -782,7 +778,7 @@ def observe_forces(dt, work, share, start, now, numbers, j, load, seen):
         Number of the point.
     load : float
         Normal load [N].
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
     dq = now[Now.SLIDE] - start[0]
@@ -815,39 +811,33 @@ def start_window(now, seen):
 
 
 @njit(**NJIT_KERNEL)
-def end_cycle(now, seen, history):
-    """Write extremes and phasor of a cycle to `history`, and add its range and secant stiffness to `seen`.
+def end_cycle(now, seen, loop, history):
+    """Record extremes and phasor of a cycle, and the extremes and the mean of one that is measured.
 
     Parameters
     ----------
     now : (20,) array
-        State of the case, in the order of `case_rows.Now` (changed in place).
-    seen : (29,) array
-        What was observed, in the order of `case_rows.Seen` (changed in place).
+        State of the case, in the order of `case_rows.Now`.
+    seen : (22,) array
+        What was observed, in the order of `case_rows.Seen`.
+    loop : (5,) array
+        The cycle, in the order of `case_rows.Loop` (changed in place).
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor (output).
     """
-    history[0] = now[Now.MIN]
-    history[1] = now[Now.MAX]
+    loop[Loop.SLIDE] = seen[Seen.SLIDE]
+    history[0] = loop[Loop.MIN_SLIDE] = now[Now.MIN]
+    history[1] = loop[Loop.MAX_SLIDE] = now[Now.MAX]
     history[2] = now[Now.COS]
     history[3] = now[Now.SIN]
-    change = now[Now.MAX] - now[Now.MIN]
-    seen[Seen.RANGE] += change
     if now[Now.SLIDE] == now[Now.MAX] and now[Now.VELOCITY] > 0:
-        seen[Seen.FORCE_AT_MAX] = nan  # the slide still grows: no reversal
+        loop[Loop.FORCE_AT_MAX] = nan  # the slide still grows: no reversal
     if now[Now.SLIDE] == now[Now.MIN] and now[Now.VELOCITY] < 0:
-        seen[Seen.FORCE_AT_MIN] = nan
-    secant = (seen[Seen.FORCE_AT_MAX] - seen[Seen.FORCE_AT_MIN]) / change
-    if change > 0 and secant == secant:
-        seen[Seen.SECANT] += secant
-        seen[Seen.N_SECANTS] += 1
-    if seen[Seen.N_CYCLES] == 0:
-        seen[Seen.FIRST_MEAN] = seen[Seen.LAST_MEAN]
-    seen[Seen.N_CYCLES] += 1
+        loop[Loop.FORCE_AT_MIN] = nan
 
 
 @njit(**NJIT_KERNEL)
-def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
+def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen, loop):
     """March a case over a cycle.
 
     Parameters
@@ -868,8 +858,10 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
-    seen : (29,) array
+    seen : (22,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
+    loop : (5,) array
+        The cycle, in the order of `case_rows.Loop` (changed in place).
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -888,7 +880,8 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
     now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
     now[Now.COS] = now[Now.SIN] = 0.0
     # An extreme at the border of two cycles has no force of its own.
-    seen[Seen.FORCE_AT_MIN] = seen[Seen.FORCE_AT_MAX] = nan
+    loop[Loop.FORCE_AT_MIN] = loop[Loop.FORCE_AT_MAX] = nan
+    seen[Seen.SLIDE] = 0.0
     while tick < steps * TICKS:
         size = TICKS >> level
         dt = step / (1 << level)
@@ -918,7 +911,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
         cosine = middle_cosine * half_cosine - middle_sine * half_sine
         now[Now.COS] += 0.5 * dt * (start[0] * last_cosine + now[Now.SLIDE] * cosine)
         now[Now.SIN] += 0.5 * dt * (start[0] * drive[0] + now[Now.SLIDE] * sine)
-        observe_extremes(dt, start, now, seen, observes)
+        observe_extremes(dt, start, now, loop)
         if observes:
             share = slip_share(numbers, memory, j, case[Number.LOAD], now[Now.VELOCITY])
             observe_forces(dt, work, share, start, now, numbers, j, case[Number.LOAD], seen)
@@ -932,7 +925,7 @@ def march_cycle(steps, table, observes, case, now, numbers, memory, j, seen):
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_cases(steps, tables, parameters, numbers, memory, nows, seens, histories):
+def march_cases(steps, tables, parameters, numbers, memory, nows, seens, histories, loops):
     """March cases over their cycles.
 
     Parameters
@@ -949,10 +942,13 @@ def march_cases(steps, tables, parameters, numbers, memory, nows, seens, histori
         Memory of the laws (changed in place).
     nows : (c, 20) array
         States of the cases, in the order of `case_rows.Now` (output).
-    seens : (c, 29) array
+    seens : (c, 22) array
         What was observed, in the order of `case_rows.Seen` (output).
     histories : (c, n, 4) array
         Extremes and phasor of every cycle (output).
+    loops : (c, 1 + w, 5) array
+        Cycles of the window, in the order of `case_rows.Loop`, after a row for those before it. Cycles that are not
+        measured keep their values (output).
     """
     for j in range(parameters.shape[0]):
         case = parameters[j]
@@ -982,11 +978,9 @@ def march_cases(steps, tables, parameters, numbers, memory, nows, seens, histori
                 )
             begin = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE]
             sums = now[Now.WORK_IN], now[Now.POWER], now[Now.VISCOUS], now[Now.FRICTION]
-            if observes:
-                seen[Seen.LAST_MEAN] = 0.0
-            march_cycle(steps, tables[j], observes, case, now, numbers, memory, j, seen)
-
-            end_cycle(now, seen, histories[j, cycle])
+            loop = loops[j, max(loops.shape[1] - n_cycles + cycle, 0)]
+            march_cycle(steps, tables[j], observes, case, now, numbers, memory, j, seen, loop)
+            end_cycle(now, seen, loop, histories[j, cycle])
             cycle += 1
 
             # The cycles up to the last ones are repetitions of one that ends as it began.

@@ -89,7 +89,7 @@ class Now(IntEnum):
 
 
 class Seen(IntEnum):
-    """Columns of what is observed (c, 29) in the window of c cases.
+    """Columns of what is observed (c, 22) in the window of c cases.
 
     Kernels get the row of one case.
 
@@ -105,13 +105,9 @@ class Seen(IntEnum):
     - WORK: friction work by the mean forces of the steps [J]
     - SAMPLED: friction work by the trapezoidal rule [J]
     - PASSED: sum over the steps of the magnitude of the friction work [J]
-    - FIRST_MEAN, LAST_MEAN: integrals of the slide over the first and over the last cycle [m s]
-    - RANGE: sum over the cycles of the range of the slide [m]
-    - SECANT, N_SECANTS: sum of the secant stiffnesses of the cycles [N/m], and their number
-    - FORCE_AT_MIN, FORCE_AT_MAX: friction force [N] at the smallest and largest slide of the cycle, or NaN if unknown
     - START_SLIDE, START_VELOCITY: at the start of the window [m], [m/s]
     - SPAN: duration [s]
-    - N_CYCLES: number of cycles
+    - SLIDE: integral of the slide over the present cycle [m s]
     - FORCE_COS_3, FORCE_SIN_3: integrals of the friction force times cos(3 OMEGA t) and sin(3 OMEGA t) [N s]
     """
 
@@ -131,19 +127,29 @@ class Seen(IntEnum):
     WORK = 13
     SAMPLED = 14
     PASSED = 15
-    FIRST_MEAN = 16
-    LAST_MEAN = 17
-    RANGE = 18
-    SECANT = 19
-    N_SECANTS = 20
-    FORCE_AT_MIN = 21
-    FORCE_AT_MAX = 22
-    START_SLIDE = 23
-    START_VELOCITY = 24
-    SPAN = 25
-    N_CYCLES = 26
-    FORCE_COS_3 = 27
-    FORCE_SIN_3 = 28
+    START_SLIDE = 16
+    START_VELOCITY = 17
+    SPAN = 18
+    FORCE_COS_3 = 19
+    FORCE_SIN_3 = 20
+    SLIDE = 21
+
+
+class Loop(IntEnum):
+    """Columns of the last cycles (c, w, 5) of c cases, as in `motion_measures.Observations`.
+
+    Kernels get the row of one cycle. A cycle that is not measured has NaN.
+
+    - SLIDE: integral of the slide over the cycle [m s]
+    - MIN_SLIDE, FORCE_AT_MIN: smallest slide [m], and the friction force there [N], NaN if it is unknown
+    - MAX_SLIDE, FORCE_AT_MAX: the same of the largest slide
+    """
+
+    SLIDE = 0
+    MIN_SLIDE = 1
+    FORCE_AT_MIN = 2
+    MAX_SLIDE = 3
+    FORCE_AT_MAX = 4
 
 
 class Cases(NamedTuple):

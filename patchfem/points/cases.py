@@ -6,14 +6,16 @@ import numpy as np
 
 from .. import compiled
 from ..core import ModalBasis, SineDrive
-from ..friction import path_work
+from ..motion_measures import (
+    Observations,
+    energy_balance,
+    measure_acceleration,
+    measure_interface,
+    ratio_or_zero,
+)
 from .case_kernels import LEVELS, TICKS
-from .case_rows import Cases, Now, Number, Seen
+from .case_rows import Cases, Loop, Now, Number, Seen
 from .exponentials import exponential
-
-ALWAYS_STUCK = 1e-12  # fraction of the time below which slip is round-off
-MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
-MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
 
 
 class CaseMarch(NamedTuple):
@@ -79,16 +81,18 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
+    # The first row is for the cycles before the window.
+    loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
     compiled.load_compiled_module("points.case_kernels").march_cases(
         steps, make_responses(columns, steps), cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history,
+        cases.memory.copy(), now, seen, history, loops,
     )  # fmt: skip
 
     output = columns[Number.OUTPUT][:, None]
     phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
     with np.errstate(all="ignore"):
         return CaseMarch(
-            compute_measures(cases, now, seen, history),
+            compute_measures(cases, now, seen, history, loops[:, 1:]),
             np.sort(history[..., :2] * output[..., None], axis=-1),
             phasors * output,
         )
@@ -124,8 +128,8 @@ def make_responses(columns, steps: int) -> np.ndarray:
     return table
 
 
-def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
-    """Return the measures (c,) of cases by name, from what the march has observed.
+def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.ndarray]:
+    """Return the measures (c,) of a sweep row by name.
 
     Parameters
     ----------
@@ -133,72 +137,73 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
         The cases that were run.
     now : (c, 20) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 29) array
+    seen : (c, 22) array
         What was observed, in the order of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.
+    loops : (c, w, 5) array
+        Cycles of the window, in the order of `case_rows.Loop`.
     """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
-    ratio = columns[Number.OUTPUT]
-    mass = 1 / columns[Number.MOBILITY]
-    count = seen[:, Seen.N_CYCLES]
     span = seen[:, Seen.SPAN]
-    window = int(columns[Number.WINDOW].max(initial=1))
-
-    # Sums and extremes of the window.
-    low = history[:, -window:, 0].min(axis=1)
-    high = history[:, -window:, 1].max(axis=1)
+    output = history[:, -loops.shape[1] :, :2] * columns[Number.OUTPUT][:, None, None]
     work = seen[:, Seen.WORK]
-    stuck = seen[:, Seen.STUCK] / (omega * span)
+    energies = _compute_energies(cases, now)
+    exchanged = seen[:, Seen.PASSED] + energies["power"] + energies["peak_stored"]
 
-    energies = _compute_energies(cases, now, mass)
-    gap = np.abs(seen[:, Seen.SAMPLED] - work)
-    size = seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])
-
-    # The relative displacement is that of the output; the loop area is that of one cycle.
     values = {
-        "relative_displacement_amplitude": (high - low) / 2 * np.abs(ratio),
+        "relative_displacement_amplitude": np.ptp(output, axis=(1, 2)) / 2,
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
-        "friction_force_peak": seen[:, Seen.MAX_FORCE],
-        "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
-        "stick_fraction": np.where(stuck > 1 - ALWAYS_STUCK, 1.0, stuck),
-        "slip_start_phase": path_work.mean_slip_phase(
-            seen[:, Seen.STARTS], seen[:, Seen.SLIP_START_PHASE_COS], seen[:, Seen.SLIP_START_PHASE_SIN]
-        ),
         "normal_load": columns[Number.LOAD],
-        "loop_area": work / count,
-        "drift_per_cycle": (seen[:, Seen.LAST_MEAN] - seen[:, Seen.FIRST_MEAN])
-        * omega / (2 * np.pi) / np.maximum(count - 1, 1),
-        "work_check": np.divide(gap, size, out=np.zeros_like(gap), where=size > 0),
-    }  # fmt: skip
-    return values | energies | _compute_harmonics(cases, now, seen, values["loop_area"], high - low)
-
-
-def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
-    """Return the energies [J] of the whole run and the relative error of their balance.
-
-    `now` (c, 20) are the states of the cases at the end, in the order of `case_rows.Now`, and `mass` (c,) [kg] are their
-    moving masses. Energies in `now` and in the parameters are per unit of this mass.
-    """
-    columns = cases.parameters.T
-    stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)
-    first = 0.5 * (
-        columns[Number.VELOCITY] ** 2 + columns[Number.STIFFNESS] * columns[Number.SLIDE] ** 2
-    )
-    gap = now[:, Now.WORK_IN] + first - stored - now[:, Now.VISCOUS] - now[:, Now.FRICTION]
-    size = now[:, Now.POWER] + now[:, Now.STORED]
-    work = mass * now[:, Now.FRICTION]
-    return {
-        "energy_balance": np.divide(np.abs(gap), size, out=np.zeros_like(gap), where=size > 0),
-        "friction_work": work,
-        "energy_dissipated": work - now[:, Now.ELASTIC],
+        "work_check": ratio_or_zero(np.abs(seen[:, Seen.SAMPLED] - work), exchanged),
+        "energy_balance": energy_balance(energies),
+        "friction_work": energies["friction"],
+        "energy_dissipated": energies["friction"] - now[:, Now.ELASTIC],
         "energy_created": np.zeros_like(work),
     }
+    # The time of stick in place of the phase of the drive that passes during stick.
+    stick = seen[:, Seen.STUCK : Seen.SLIP_START_PHASE_SIN + 1].T.copy()
+    stick[0] /= omega
+    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
+    force = seen[:, Seen.FORCE_COS_1] - 1j * seen[:, Seen.FORCE_SIN_1]
+    observations = Observations(
+        span=span,
+        period=2 * np.pi / omega,
+        force=seen[:, [Seen.MAX_FORCE]],
+        slip=seen[:, [Seen.MIN_SLIP, Seen.MAX_SLIP]],
+        stick=stick,
+        work=work,
+        harmonics=np.array([slide, force]),
+        cycles=loops,
+    )
+    values |= measure_interface(observations, cases.reference)
+    return values | measure_acceleration(*_integrate_acceleration(cases, now, seen, slide), span)
 
 
-def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
-    """Return the measures that follow from the first and third harmonics of slide, force and acceleration.
+def _compute_energies(cases: Cases, now) -> dict[str, np.ndarray]:
+    """Return the energies (c,) [J] of the whole run by name, for the balance of `motion_measures`.
+
+    `now` (c, 20) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
+    parameters are per unit of the moving mass.
+    """
+    columns = cases.parameters.T
+    stiffness = columns[Number.STIFFNESS]
+    last = now[:, Now.VELOCITY] ** 2 + stiffness * now[:, Now.SLIDE] ** 2
+    first = columns[Number.VELOCITY] ** 2 + stiffness * columns[Number.SLIDE] ** 2
+    energies = {
+        "work_in": now[:, Now.WORK_IN],
+        "viscous": now[:, Now.VISCOUS],
+        "power": now[:, Now.POWER],
+        "friction": now[:, Now.FRICTION],
+        "stored": 0.5 * (last - first),
+        "peak_stored": now[:, Now.STORED],
+    }
+    return {name: energy / columns[Number.MOBILITY] for name, energy in energies.items()}
+
+
+def _integrate_acceleration(cases: Cases, now, seen, slide) -> tuple[np.ndarray, np.ndarray]:
+    """Return the integrals (c,) [m/s] of the absolute acceleration times exp(-i omega t) and exp(-3 i omega t).
 
     Over a window of whole cycles, the integral of q'' exp(-i w t) is [q'] + i w ([q] + i w Q) with the integral Q of
     q exp(-i w t), where [x] is the change of x over the window (integration by parts). At w = 3 omega the drive has no part,
@@ -214,55 +219,24 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, 
         The c cases that were run.
     now : (c, 20) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 29) array
+    seen : (c, 22) array
         What was observed, in the order of `case_rows.Seen`.
-    area : (c,) array
-        Friction work per cycle [J].
-    slide_range : (c,) array
-        Range of the slide in the window [m].
+    slide : (c,) array
+        Integral of the slide times exp(-i omega t) [m s].
     """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
-    span = seen[:, Seen.SPAN]
-    base = -0.5j * span * columns[Number.BASE]
+    ratio = columns[Number.OUTPUT]
     q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
     v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
+    first = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
+    base = -0.5j * seen[:, Seen.SPAN] * columns[Number.BASE]
 
-    # Integrals of slide, force and relative acceleration times exp(-i omega t)
-    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
-    force = seen[:, Seen.FORCE_COS_1] - 1j * seen[:, Seen.FORCE_SIN_1]
-    acceleration_1 = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
-
-    # The same of exp(-3 i omega t), with the slide from the force
+    # The third harmonic of the slide follows from that of the force.
     w = 3j * omega
-    force_3 = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
     damping = columns[Number.DAMPING]
-    load_3 = -columns[Number.MOBILITY] * force_3 - v_jump - (w + damping) * q_jump
-    slide_3 = load_3 / (columns[Number.STIFFNESS] + w * (w + damping))
-    acceleration_3 = v_jump + w * (q_jump + w * slide_3)
-
-    # Amplitudes of the absolute acceleration of the output: an integral over the window is span/2 times the amplitude.
-    ratio = columns[Number.OUTPUT]
-    fundamental = np.abs(ratio * acceleration_1 + base) * 2 / span
-    count = np.maximum(seen[:, Seen.N_CYCLES], 1)
-    half_range = seen[:, Seen.RANGE] / count / 2
-
-    # Stiffness and damping of a point that hardly moves are NaN.
-    n_secants = seen[:, Seen.N_SECANTS]
-    moves = slide_range > MIN_SLIDE_RANGE
-    loss = area / (2 * np.pi * cases.reference * half_range**2)
-    is_known = moves & (cases.reference > 0)
-    return {
-        "absolute_acceleration_fundamental": fundamental,
-        "acceleration_distortion": np.where(
-            fundamental > MIN_ACCELERATION,
-            np.abs(ratio * acceleration_3) * 2 / span / fundamental,
-            np.nan,
-        ),
-        "harmonic_force_ratio": np.abs(force / slide),
-        "equivalent_stiffness": np.where(moves, (force / slide).real, np.nan),
-        "equivalent_damping": np.where(is_known, loss, np.nan),
-        "secant_stiffness": np.where(
-            moves & (n_secants > 0), seen[:, Seen.SECANT] / n_secants, np.nan
-        ),
-    }
+    force = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
+    load = -columns[Number.MOBILITY] * force - v_jump - (w + damping) * q_jump
+    slide_3 = load / (columns[Number.STIFFNESS] + w * (w + damping))
+    third = v_jump + w * (q_jump + w * slide_3)
+    return ratio * first + base, ratio * third

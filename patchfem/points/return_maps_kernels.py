@@ -43,7 +43,7 @@ from ..friction.bonds.point_kernels import (
     shape_functions,
 )
 from ..friction.laws.bouc_wen_kernels import follow_path
-from ..friction.laws.lugre_kernels import rate_equation, relaxation_length
+from ..friction.laws.lugre_kernels import find_force, relaxation_length
 from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
@@ -260,9 +260,9 @@ def _mean_lugre(numbers, stretch, j, load, step):
     last = step.end_velocity
     # By Simpson's rule the velocities at both ends and in the middle have the mean dq / duration.
     middle = 1.5 * dq / duration - 0.25 * (first + last)
-    begin = relaxation_length(numbers[:, j], first)[0]
-    centre = relaxation_length(numbers[:, j], middle)[0]
-    end = relaxation_length(numbers[:, j], last)[0]
+    begin = relaxation_length(numbers[:, j], first)
+    centre = relaxation_length(numbers[:, j], middle)
+    end = relaxation_length(numbers[:, j], last)
     path = duration / 6 * (abs(first) / begin + 4 * abs(middle) / centre + abs(last) / end)
 
     # The distance to the steady stretch decays as exp(-x), with the mean f1 over the path and the mean of that mean f2.
@@ -283,8 +283,7 @@ def _lugre_force(numbers, j, load, stretch, velocity):
 
     `numbers` (k, m) are those of the laws of m points, and `load` [N] is the normal load.
     """
-    direction = 1.0 if velocity > 0 else -1.0
-    return load * rate_equation(numbers[:, j], stretch, velocity, direction).force
+    return load * find_force(numbers[:, j], stretch, velocity)
 
 
 @njit(**NJIT_CALL)
@@ -629,7 +628,7 @@ def slip_share(numbers, memory, j, load, velocity):
         m = memory[1, j]
         return direction * memory[2, j] * load / (m * m * state)
     if law == Law.LUGRE:
-        return direction * state / relaxation_length(numbers[:, j], velocity)[0]
+        return direction * state / relaxation_length(numbers[:, j], velocity)
     if law == Law.BOUC_WEN:
         share = abs(state) ** numbers[3, j]
         return share if direction * state > 0 else (1 - 2 * numbers[4, j]) * share

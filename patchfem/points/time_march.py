@@ -17,7 +17,8 @@ from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
 from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
-from ..structure.histories import find_accelerations, make_response
+from ..motion_measures import find_extremes
+from ..structure.histories import INTERFACE_HISTORIES, find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
 from .exponentials import exponential
@@ -1096,7 +1097,8 @@ class Record:
         for begin in range(0, max(count, 1), run.steps):
             end = min(begin + run.steps, count)
             cycle = slice(begin, end + 1)
-            self.extremes.append(find_extremes(output[cycle], speed[cycle], run.step))
+            time = run.step * np.arange(end + 1 - begin)
+            self.extremes.append(find_extremes(time, output[cycle], speed[cycle]))
             phase = (first + np.arange(begin, end)) % run.steps / run.steps
             phasor = output[begin:end] @ np.exp(-2j * np.pi * phase)
             self.phasors.append(2 / max(end - begin, 1) * phasor)
@@ -1168,34 +1170,6 @@ class Record:
         )
 
 
-def find_extremes(q, v, step: float) -> tuple[float, float]:
-    """Return the smallest and largest of samples (k,) of a displacement, those of the cubics between them included.
-
-    Parameters
-    ----------
-    q, v : (k,) array
-        Displacement [m] and velocity [m/s].
-    step : float
-        Distance of the samples [s].
-    """
-    # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
-    turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * (v**2).max())
-    # The velocity is the parabola v(x) = first + linear x + square x^2 of the fraction x of the step, with the velocities at
-    # both ends and the mean of the increment. The displacement is the integral up to the root of v.
-    first = v[turn]
-    last = v[turn + 1]
-    mean = (q[turn + 1] - q[turn]) / step
-    square = 3 * (first + last) - 6 * mean
-    linear = 6 * mean - 4 * first - 2 * last
-    root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
-    # A displacement that jumps, as at a stop within round-off, has its extreme at a sample: the quotient is infinite.
-    with np.errstate(divide="ignore"):
-        x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
-    peaks = q[turn] + step * x * (first + x * (linear / 2 + x * square / 3))
-    values = np.append(q, peaks)
-    return float(values.min()), float(values.max())
-
-
 def make_histories(run: March, rows) -> Response:
     """Return rows (k, w) of a record as histories.
 
@@ -1242,24 +1216,13 @@ def make_histories(run: March, rows) -> Response:
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
     is_interface = np.array([not point_set.is_spring for point_set in sets], bool)
-    if len(sets) > 1:
-        parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
-        if is_interface.any():
-            extra |= {name: part[:, is_interface] for name, part in parts.items()}
-
-    # A lifted mass m adds m z'' to the load, with z'' = t q'' + t' q'^2 on a flank of slope t(q).
+    interfaces = [part[:, is_interface] for part in (slides, rates, forces, columns[..., 1])]
+    if is_interface.any() and not is_interface.all():
+        extra |= dict(zip(INTERFACE_HISTORIES, interfaces))
     grooves = contact.grooves
     if grooves is not None and grooves.lifted_mass:
         sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
-        lift = grooves.slope(slides[:, 0]) * sliding
-        lift = lift + grooves.slope_derivative(slides[:, 0]) * rates[:, 0] ** 2
-        extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
+        motion = slides[:, 0], rates[:, 0], sliding
+        extra["normal_load"] = contact.preload + grooves.lifted_mass * grooves.find_lift(*motion)
 
-    if is_interface.any():
-        # The first interface has the histories of force and slip.
-        face = int(np.flatnonzero(is_interface)[0])
-        interface = slides[:, face], rates[:, face], forces[:, face], columns[:, face, 1]
-    else:
-        zeros = np.zeros(len(rows))
-        interface = z @ modes.slide, rate @ modes.slide, zeros, z @ modes.slide
-    return make_response(modes, run.drive, push, (time, z, rate), pull, interface, extra)
+    return make_response(modes, run.drive, push, (time, z, rate), pull, interfaces, extra)

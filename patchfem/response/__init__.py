@@ -63,11 +63,8 @@ PUBLIC = {
         "secant_stiffness",
     ),
     "measures": (
-        "MAX_RESTING_SLIDE_RANGE",
         "compute_ledger_measures",
         "compute_step_harmonic",
-        "energy_balance",
-        "measure_half_range",
         "peak_sampling_errors",
         "relative_gap",
         "work_difference",

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ..motion_measures import find_reversal_steps
 from .errors import MAX_CONVERGENCE_ORDER, convergence_error
-from .measures import ArrayPair, find_reversal_steps
+from .measures import ArrayPair
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
 CANDIDATE_HALF_SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic, find_reversal_steps
+from ..motion_measures import find_reversal_steps, measure_loop
+from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic
 
 SAME_EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -270,15 +271,8 @@ def interface_loop(
         "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and
         "equivalent_damping" W/(2 pi K A^2) [1]; without measures that have no value.
     """
-    measures = {"loop_area": float(work)}
-    if not (amplitude > 0 and abs(q) > 0):
-        return measures
-    ratio = f / q
-    measures["equivalent_stiffness"] = float(ratio.real)
-    measures["harmonic_force_ratio"] = float(abs(ratio))
-    if stiffness > 0:
-        measures["equivalent_damping"] = float(work / (2 * np.pi * stiffness * amplitude**2))
-    return measures
+    values = measure_loop(amplitude, q, f, work, stiffness)
+    return {name: float(value) for name, value in values.items() if not np.isnan(value)}
 
 
 def mean_drift(time, slide, rate, period: float) -> float:

@@ -4,12 +4,16 @@ In: a `Response` of the last cycles of any engine. Out: values by name. `rows` h
 definitions of the measures.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..core import Measure, Response
 from ..friction import path_work
+from ..motion_measures import (
+    MAX_RESTING_SLIDE_RANGE,
+    MIN_ENERGY_DIFFERENCE,
+    mean_slip_phase,
+    ratio_or_zero,
+)
 
 Values = dict[str, float]  # values of measures or their errors by name, in SI units
 Measures = dict[str, Measure]  # by name
@@ -18,35 +22,12 @@ ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
 MAX_STICKING_SLIP_FRACTION = 0.5
 MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
-MIN_ENERGY_DIFFERENCE = 1e-18  # Smallest significant difference of energies [J].
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
 RELATIVE_WORK_ROUND_OFF = 1e-10
-STEP_FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
-# Largest range of the relative displacement [m] of an interface at rest.
-MAX_RESTING_SLIDE_RANGE = 1e-15
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_CURVATURE_RATIO = 4.0
 PLATEAU_TOL = 1e-12  # Difference of samples that count as equal, relative to the range of all.
-
-
-def energy_balance(energies: Values):
-    """Return the relative error of the energy balance [1] of one run, or (n,) of n runs.
-
-    The error is |work in - stored - dissipated| / (integral |power in| + peak stored). Differences up to
-    MIN_ENERGY_DIFFERENCE count as round-off; without energy, the result is 0.
-
-    Parameters
-    ----------
-    energies : dict
-        Energies by name [J].
-    """
-    imbalance = np.abs(
-        energies["work_in"] - energies["stored"] - energies["friction"] - energies["viscous"]
-    )
-    return ratio_or_zero(
-        imbalance * (imbalance > MIN_ENERGY_DIFFERENCE), energies["power"] + energies["peak_stored"]
-    )
 
 
 def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
@@ -73,12 +54,6 @@ def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
         difference * (difference > MIN_ENERGY_DIFFERENCE),
         exchanged_work + RELATIVE_WORK_ROUND_OFF * energy,
     )
-
-
-def ratio_or_zero(part, total):
-    """Return the ratio of two numbers or arrays, 0 where the denominator is not positive."""
-    is_positive = np.asarray(total) > 0
-    return (part / np.where(is_positive, total, 1.0) * is_positive)[()]
 
 
 def compute_harmonic(time, weight, values, omega) -> complex:
@@ -185,9 +160,7 @@ def slip_start_measure(phases) -> Values:
 
     The dict is empty if the phases differ.
     """
-    phase = path_work.mean_slip_phase(
-        len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()
-    )
+    phase = mean_slip_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
     return {} if np.isnan(phase) else {"slip_start_phase": float(phase)}
 
 
@@ -332,63 +305,3 @@ def peak_sampling_errors(window: Response) -> Values:
         ):
             errors[name] = float(bends[np.clip(index - 1, 0, bends.size - 1)])
     return errors
-
-
-class StepReversals(NamedTuple):
-    """Reversals of a motion within time steps.
-
-    - step (r,): indices of the steps.
-    - fraction (r,): time of the reversal as a fraction of the step [1].
-    - position (r,): position at the reversal [m].
-    """
-
-    step: np.ndarray
-    fraction: np.ndarray
-    position: np.ndarray
-
-
-def find_reversal_steps(time, position, rate) -> StepReversals:
-    """Find the reversals of a motion on the cubics through its positions and rates.
-
-    Parameters
-    ----------
-    time, position, rate : (k,)
-        Samples of time [s], position [m] and rate [m/s].
-
-    Returns
-    -------
-    StepReversals
-    """
-    step = np.diff(time)
-    # Two samples at the same time, at a jump of the force, have no cubic between them. The cubic is scaled by its larger
-    # slope, so that squares of tiny motions do not vanish.
-    slopes = np.maximum(np.abs(rate[:-1]), np.abs(rate[1:])) * step
-    k = np.flatnonzero((rate[:-1] * rate[1:] < 0) & (slopes > 0))
-    p = rate[k] * step[k] / slopes[k]
-    q = rate[k + 1] * step[k] / slopes[k]
-    rise = (position[k + 1] - position[k]) / slopes[k]
-    quadratic = 3 * rise - 2 * p - q
-    cubic = p + q - 2 * rise
-    # The slope is zero where p + 2 quadratic s + 3 cubic s^2 = 0. Neither root cancels if the cubic is nearly a parabola, or
-    # if one slope is round-off beside the other.
-    root = np.sqrt(np.maximum(quadratic**2 - 3 * cubic * p, 0.0))
-    scaled_root = -(quadratic + np.copysign(root, quadratic))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = p / scaled_root
-        second = scaled_root / (3 * cubic)
-    is_first = np.abs(first - 0.5) <= 0.5 + STEP_FRACTION_TOL
-    s = np.clip(np.where(is_first, first, second), 0.0, 1.0)
-    height = slopes[k] * s * (p + s * (quadratic + s * cubic))
-    return StepReversals(k, s, position[k] + height)
-
-
-def measure_half_range(time, position, rate) -> float:
-    """Return half the peak-to-peak value [m] of the cubics through positions and rates.
-
-    Parameters
-    ----------
-    time, position, rate : (k,)
-        Samples of time [s], position [m] and rate [m/s].
-    """
-    reversals = find_reversal_steps(time, position, rate)
-    return float(np.ptp(np.concatenate([position, reversals.position]))) / 2

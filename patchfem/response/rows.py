@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import IntegratedMeasures, MeasureDefinition, Response
+from ..core import MeasureDefinition, Response
+from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance
 from ..structure import drive_sizes
 from . import stationary
 from .loops import (
@@ -24,13 +25,11 @@ from .loops import (
     secant_stiffness,
 )
 from .measures import (
-    MAX_RESTING_SLIDE_RANGE,
     Measures,
     Values,
     compute_ledger_measures,
     compute_peak,
     compute_slip_measures,
-    energy_balance,
 )
 from .spectrum import MIN_MOVING_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
 
@@ -47,7 +46,8 @@ class LastCycles:
     - stiffness: stiffness of the first mode at the contact [N/m]; 0 if the damping ratio is not
       computed.
     - is_sine: whether the drive is sinusoidal at the end of the run.
-    - integrated: measures that the engine integrated.
+    - integrated: measures that the engine integrated by name, None without a value. If the motion of an engine is in closed
+      form or piecewise polynomial, they are more accurate than those from samples.
     - loop: first harmonics of relative displacement [m] and friction force [N], and work per cycle
       [J]; None if the window contains no complete cycle.
     - ledger (4, k): friction work, and stored, dissipated and created energy [J] of the whole run, or None.
@@ -64,7 +64,7 @@ class LastCycles:
     load: float | None
     stiffness: float
     is_sine: bool
-    integrated: IntegratedMeasures = field(default_factory=IntegratedMeasures)
+    integrated: dict[str, float | None] = field(default_factory=dict)
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     reversal_rule: str = "rate"
@@ -88,8 +88,6 @@ class LastCycles:
     @cached_property
     def reversals(self) -> list[tuple[Reversal, ...]]:
         """Reversal at the smallest and at the largest displacement in each complete cycle."""
-        if self.integrated.reversals:
-            return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
         w = self.window
         return find_reversals(
             w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.reversal_rule
@@ -169,7 +167,7 @@ class LastCycles:
                 replace(
                     self,
                     window=window,
-                    integrated=IntegratedMeasures(),
+                    integrated={},
                     is_sine=False,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
@@ -601,7 +599,7 @@ def compute_measures(last_cycles: LastCycles) -> Values:
     Measures without a value are omitted. The INTERFACE_MEASURES of further interfaces have the number of the
     interface after the name. A value that the engine integrated replaces the value from samples.
     """
-    known = last_cycles.integrated.values
+    known = last_cycles.integrated
     values = {}
     for row in MOTION_TABLE.values():
         if row.name in known:

@@ -30,7 +30,6 @@ MAX_FIXED_STEP_HALVINGS = 4
 # long.
 MAX_PROPOSED_STRIPS = 64
 USE_ERROR_ADVICE = "use the value with its stated error"
-NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
 ELEMENT_SIZE_KEY = "contact.element_size"
 STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
 # Ratio of the proposed accuracy.max_seconds to the expected CPU time, which varies by tens of per cent.
@@ -163,15 +162,11 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     patch_model = face.model.patch
     strips = patch_model.interface.strips
     peak = missed.measures.get("pressure_peak")
-    is_wear_unbounded = (
-        "worn_depth_max" in missed.find_names() and peak is not None and peak.value is None
-    )
+    if missed.worst == "worn_depth_max" and peak is not None and peak.value is None:
+        return Advice(f"the depth at a sharp edge grows on finer meshes; {USE_ERROR_ADVICE}")
     # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
-    is_zero = (
-        max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic
-    )
-    if is_wear_unbounded or is_zero:
-        return NO_ADVICE
+    if max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic:
+        return Advice(USE_ERROR_ADVICE)
     if patch_model.mesh.file is None and strips is not None and strips.count > 1:
         return _advise_strips(patch_model, missed.excess)
 
@@ -185,15 +180,18 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
 
 
 def _advise_strips(patch_model, excess: Mapping) -> Advice:
-    """Return the advice to divide the width of a patch into more strips, at least twice as many.
+    """Return the advice to divide the width of a patch into more strips, at least twice as many, but not too many.
 
     The error falls with the square of the number of strips. `excess` has the ratio of error to allowed error [1] of each
     measure that misses the tolerance.
     """
+    present = patch_model.interface.strips.count
     ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_CONVERGENCE_ORDER))
-    count = ceil(patch_model.interface.strips.count * ratio)
-    if count > MAX_PROPOSED_STRIPS:
-        return NO_ADVICE
+    count = min(ceil(present * ratio), MAX_PROPOSED_STRIPS)
+    if count < 2 * present:
+        return Advice(
+            f"more than {MAX_PROPOSED_STRIPS} strips may reduce it but take long; {USE_ERROR_ADVICE}"
+        )
     also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE_KEY}"
     return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
 
@@ -265,7 +263,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     if name == rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
-    return NO_ADVICE
+    return Advice(USE_ERROR_ADVICE)
 
 
 def _advise_steps(missed: Missed) -> Advice | None:

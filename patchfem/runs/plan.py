@@ -16,6 +16,7 @@ from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..response import rows
+from ..scene import refuse_attribute
 from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
@@ -96,6 +97,8 @@ class Plan:
             f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}"
         ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
+
+    __getattr__ = refuse_attribute
 
     def modes(self, chain: "of_rig.Chain") -> list[dict[str, str | float | None]]:
         """Return name, free and stuck frequency [Hz] of each mode of a rig.

@@ -49,14 +49,14 @@ PUBLIC = {
         "UNIT_FACTORS",
         "parse_quantity",
     ),
-    "keys.removed": ("describe_removed",),
+    "keys.removed": ("describe_removed", "refuse_attribute", "refuse_removed"),
     "keys.tables": (
         "Drive",
         "Friction",
         "Structure",
         "Tables",
     ),
-    "keys.types": ("Key", "list_keys"),
+    "keys.types": ("Key", "advise_on_name", "list_keys"),
     "lines": (
         "find_scene_value",
         "locate_key",

@@ -88,7 +88,7 @@ def describe_unknown_key(
     """
     # The number of an item, as in structure.mode.0, is no part of the name of its keys.
     pieces = [piece for piece in table_key.split(".") if not piece.isdecimal()]
-    if removed := describe_removed(".".join([*pieces, key]).lstrip(".")):
+    if removed := describe_removed(".".join([*pieces, key]).lstrip("."), "this key"):
         return UnknownKey(removed, "")
     if "." in key and find_key(".".join(filter(None, (table_key, key)))):
         return UnknownKey(f"unknown key; leave out its quotes: {key}", "")

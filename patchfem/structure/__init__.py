@@ -27,6 +27,7 @@ PUBLIC = {
     ),
     "drives": ("make_release",),
     "histories": (
+        "INTERFACE_HISTORIES",
         "find_accelerations",
         "make_response",
     ),

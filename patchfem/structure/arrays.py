@@ -148,5 +148,5 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
     names = ", ".join(data) or "none that patchfem knows"
     removed = ""
     if not data.keys().isdisjoint(REMOVED_ARRAYS):
-        removed = f"; {describe_removed('modes as arrays', 'a file of modes as arrays')}"
+        removed = f"; {describe_removed('a file of modes as arrays')}"
     raise PatchfemError(f"lacks {missing_name}; the file contains {names}{removed}")

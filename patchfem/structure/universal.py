@@ -56,7 +56,7 @@ def read_universal(path: Path) -> MeasuredModes:
     ]
     if not modes:
         types = ", ".join(sorted({str(dataset["type"]) for dataset in datasets}))
-        removed = describe_removed("fit of responses", "the fit of modes to frequency responses")
+        removed = describe_removed("the fit of modes to frequency responses")
         raise PatchfemError(
             f"{path} has no mode shapes (dataset 55, normal or complex modes); its datasets: {types}; {removed}"
         )

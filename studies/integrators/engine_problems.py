@@ -17,7 +17,7 @@ from patchfem.hybrid.laws import masing
 from patchfem.model import build
 from patchfem.points import contacts, laws, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.joints import make_single_law
+from patchfem.runs.rig.joints import list_joints
 from patchfem.scene import scene
 from patchfem.structure import make_release
 
@@ -112,12 +112,8 @@ def problem(name: str) -> Problem:
     )
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    element = make_single_law(
-        model,
-        choose_numerics(model),
-        solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0],
-    )
-    k, y = element.numbers[2:].reshape(2, -1)
+    patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    k, y = list_joints(model, patch, choose_numerics(model).meshed)[0].list_elements()
     numbers = {
         "omega": modes.omega,
         "zeta": modes.zeta,
@@ -133,7 +129,7 @@ def problem(name: str) -> Problem:
         name,
         modes,
         drive,
-        element.limit,
+        float(k @ y),
         20,
         {
             key: value.tolist() if isinstance(value, np.ndarray) else value

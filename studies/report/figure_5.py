@@ -30,7 +30,7 @@ from study_text import read_answer
 
 import patchfem as pf
 from patchfem.model import build
-from patchfem.points.time_march import find_extremes
+from patchfem.motion_measures import find_extremes
 from patchfem.scene import load as load_scene
 
 FOLDER = Path(__file__).parent
@@ -100,7 +100,7 @@ def _by_euler(steps: int, period: float) -> Motion:
     last = slice(-steps - 1, None)
     displacement = motion.z[last] @ rig.modes.output
     velocity = motion.v[last] @ rig.modes.output
-    low, high = find_extremes(displacement, velocity, period / steps)
+    low, high = find_extremes(motion.time[last], displacement, velocity)
     frame = motion.z[last] @ rig.modes.slide - displacement
     return Motion(
         motion.time[last] - 7 * period,

@@ -133,6 +133,9 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "swep rig.toml": [((), ("unknown verb 'swep'; did you mean `sweep`? see `patchfem --help`",))],
     "scatter": [(("--help",), ("unknown verb 'scatter'; see `patchfem --help`",))],
     "help": [((), ("`patchfem run --help`",))],
+    "report none": [
+        (("-o", "a.pdf"), ("a.pdf: the ending of a page is .html; use -o report.html",))
+    ],
     "--foo": [((), ("unknown option '--foo'; see `patchfem --help`",))],
 }
 NOT_THERE = [  # arguments, message on a missing file; exit code 4

@@ -152,7 +152,7 @@ DAMAGES = {  # damage, and part of the message on it
     "no summary": (lambda folder: (folder / "summary.json").unlink(), "it has no summary.json"),
     "summary of 1.1": (
         lambda folder: (folder / "summary.json").write_text('{"kind": "rig"}', "utf-8"),
-        "patchfem before 2.0 wrote it",
+        "patchfem before 1.2 wrote it",
     ),
 }
 

@@ -12,10 +12,10 @@ from scipy.special import gammainc
 
 from patchfem.core import Missing, SineDrive
 from patchfem.friction import Bonds
+from patchfem.motion_measures import energy_balance
 from patchfem.points import time_march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact
 from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]

@@ -13,11 +13,11 @@ import patchfem as pf
 from patchfem import load
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
+from patchfem.motion_measures import energy_balance
 from patchfem.points.contacts import (
     make_flank_contact,
 )
 from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 from patchfem.runs.bench import shear
 from patchfem.scene.keys.tables import Friction
 from patchfem.slip.shear_modes import shear_modes

@@ -10,6 +10,7 @@ from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
+from patchfem.motion_measures import energy_balance
 from patchfem.points import (
     laws,
     make_contact,
@@ -17,7 +18,6 @@ from patchfem.points import (
     make_interlocking_spring,
     march,
 )
-from patchfem.response import energy_balance
 from patchfem.structure import make_release
 
 EVENT_ERROR = 1e-6  # an event is located within 1/2048 of a step

@@ -187,11 +187,6 @@ REFUSALS = [
         "initial_bonds: 1 with order = -0.5",
     ),
     (
-        COATED.replace('load = "26 lbf"\n', "") + '[contact.approach]\ndistance = "1 um"\n',
-        "contact.load_line.offset=2 mm",
-        r"removed in patchfem 1\.4; give contact\.load",
-    ),
-    (
         POINT + COULOMB + STRUCTURE,
         "structure.mode.axial.normal=0.1",
         r"use \[contact\] in place of",

@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from patchfem.contact import ContactSets
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
+from patchfem.motion_measures import energy_balance
 from patchfem.points.contacts import make_pressed_contact
 from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
 LAWS = {

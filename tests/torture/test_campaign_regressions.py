@@ -3,6 +3,7 @@
 import pytest
 from command_line import run_cli
 from scene_texts import BENCH
+from torture.driver import run_trial
 
 WORN = BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 10\n'
 
@@ -43,3 +44,9 @@ def test_always_long_arguments_are_shortened_in_messages():
     length."""
     answer = run_cli("export", "out", "-o", "x.vtu", "--frame", "x" * 3000)
     assert answer.code == 2 and len(answer.err) < 500 and "3002 letters" in answer.err
+
+
+@pytest.mark.parametrize("index", [335, 1001])
+def test_always_repaired_trial_passes(tmp_path, index):
+    """A slide of 1e-320, and the name of a mode with 3000 letters, which a remark repeats, have no raw or long line."""
+    run_trial("grammar", 1, index, tmp_path)

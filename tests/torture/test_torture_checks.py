@@ -50,7 +50,10 @@ def write_summary(folder, **changes):
 @pytest.mark.parametrize(
     "changes, expected",
     [
-        ({"measures": {"energy_balance": {"value": 1e-3}}}, "steady with an energy balance"),
+        (
+            {"measures": {"energy_balance": {"value": 0.2, "error": 0.2}}},
+            "steady with an energy balance",
+        ),
         ({"measures": {"loop_area": {"value": float("nan")}}}, "NaN in JSON"),
         ({"measures": {"loop_area": {"value": None}}}, "without a reason"),
         ({"outcome": "not_converged"}, "without a warning"),

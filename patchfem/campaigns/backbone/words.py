@@ -20,6 +20,10 @@ REASONS_OF_GAPS = {
     "smaller amplitudes, or the mode may stop oscillating",
     "quasi-static": "the static curve does not reach these amplitudes",
 }
+# Why rigid friction may have no such force
+RIGID_FORCE_REASON = (
+    ", where the friction may stop the motion under a force for a part of the cycle"
+)
 # What the curve of each method is for
 METHOD_PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
@@ -75,14 +79,9 @@ def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[st
     missing = curve.amplitude[np.isnan(curve.force)]
     if not missing.size:
         return []
-    if joint.is_rigid:
-        return [
-            f"method {method}: with rigid friction the force in phase resonance is computed for a single mode only; use "
-            'law = "elastic-plastic" with a short bond_length for several modes'
-        ]
     return [
         f"method {method}: no force in phase resonance was found at {missing.size} of {curve.amplitude.size} amplitudes, "
-        f"{describe_span(missing)}"
+        f"{describe_span(missing)}{RIGID_FORCE_REASON * joint.is_rigid}"
     ]
 
 

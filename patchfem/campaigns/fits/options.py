@@ -2,6 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Self
+
+from ...scene import refuse_removed
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,3 +27,8 @@ class FitOptions:
     hold: Sequence[str] = ()
     leave_out: str = ""
     starts: int | None = None
+
+    def __new__(cls, *options: Any, **named_options: Any) -> Self:
+        """Refuse an option that was removed, with what to use instead."""
+        refuse_removed("fit", named_options)
+        return object.__new__(cls)

@@ -150,7 +150,9 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
     measures = content if isinstance(content, dict) else {}
     if isinstance(measures.get("measures"), dict):
         measures = measures["measures"] | measures
-    if COMMON_PART_NAMES & measures.keys():
+    # patchfem 1.0 wrote no common part, but only two runs have `runs` beside their registration
+    is_measured = "registration" in measures and "runs" not in measures
+    if is_measured or COMMON_PART_NAMES & measures.keys():
         raise PatchfemError(
             f"{path}: the worn depth of two measured surfaces is that of one piece and of their common part, but the fit "
             "needs that of both pieces and of the whole patch; to fit the coefficient to two traces run `patchfem compare "

@@ -266,14 +266,11 @@ def _refuse_modal_data(file: Path) -> None:
         return
     datasets = universal_files.read_datasets(file)
     if any(dataset["type"] == 55 for dataset in datasets):
-        raise PatchfemError(
-            describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
-        )
+        raise PatchfemError(f"{file}: {describe_removed('the import of mode shapes')}")
     functions = {int(dataset["func_type"]) for dataset in datasets if dataset["type"] == 58}
     if functions == {FREQUENCY_RESPONSE_FUNCTION_TYPE}:
-        raise PatchfemError(
-            describe_removed("fit of responses", f"{file}: the fit of modes to frequency responses")
-        )
+        removed = describe_removed("the fit of modes to frequency responses")
+        raise PatchfemError(f"{file}: {removed}")
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element
-
 CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
 MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
 
@@ -39,21 +37,6 @@ class Bonds:
     def has_growth(self) -> bool:
         """Return whether the bond length changes by eq. 2.10; otherwise it is always eps_0."""
         return self.rest_growth is not None
-
-    def element(self, load: float) -> Element:
-        """Return the Element of points under a load [N] which all have the same relative displacement.
-
-        It has the reading "stretch" and order 1 (`point_kernels`).
-        """
-        head = [0.0, self.static * load / self.length, self.length]
-        return Element(
-            kernels="friction.laws.stretch_kernels",
-            numbers=np.concatenate([head, growth_numbers(self)]),
-            memory=np.array([self.length, self.initial, 0.0, 0.0, 0.0]),
-            limit=self.static * load,
-            length=self.length,
-            form="points",
-        )
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..protocol import Element, SteadyLoop
+from ..protocol import SteadyLoop
 
 N_HALF_LOOP_POINTS = 20  # number of Gauss points on each piece of a half-loop
 N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
@@ -50,18 +50,6 @@ class BoucWen:
     length: float
     exponent: float = 1.0
     shape: float = 0.5
-
-    def element(self, load: float) -> Element:
-        """Return the `protocol.Element` under a constant load N [N], with limit mu N and bond length eps."""
-        numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
-        return Element(
-            "friction.laws.bouc_wen_kernels",
-            numbers,
-            np.zeros(1),
-            self.static * load,
-            self.length,
-            form="flow",
-        )
 
     def steady_loop(self, load: float, amplitude) -> SteadyLoop:
         """Return the steady loops under a load [N] at amplitudes u [m] of the relative displacement.

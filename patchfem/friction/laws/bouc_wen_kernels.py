@@ -4,13 +4,11 @@ numbers: limit mu N [N], length eps [m], exponent n, shape s; memory: z. Over th
 follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - (1 - 2 s) |y|^n on unloading.
 """
 
-from enum import IntEnum
 from math import exp, log1p
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_KERNEL, NJIT_NO_REFCOUNT
+from ...compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ...compiled.jit import njit
-from ..protocol_kernels import Rates, RelaxedStretch
 
 PIECE = 0.03125  # longest path in lengths that a Runge-Kutta step integrates
 NEARLY_SATURATED = 1e-3  # distance of y from 1 below which any exponent has a closed form
@@ -19,23 +17,6 @@ FIRST_PIECE = 1e-8  # shortest path in lengths beside y = 0, where a fractional 
 GRADING = 0.25  # longest path beside y = 0 relative to y, for such a power
 SATURATED = 1e-14  # distance of |y| from 1 that is round-off
 SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
-
-
-class BoucWenNumber(IntEnum):
-    """Indices of the parameters of the law.
-
-    Index 0 is reserved for the engines.
-
-    - LIMIT: friction limit mu N [N]
-    - LENGTH: length eps [m]
-    - EXPONENT: exponent n
-    - SHAPE: weight s of the two terms of the law
-    """
-
-    LIMIT = 1
-    LENGTH = 2
-    EXPONENT = 3
-    SHAPE = 4
 
 
 class FollowedPath(NamedTuple):
@@ -124,45 +105,3 @@ def follow_path(y, path, power, shape):
         y += piece * (first + 2 * second + 2 * third + fourth) / 6
         left -= piece
     return FollowedPath(y, area / path if path > 0 else y)
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force at the stretch eps z.
-
-    `numbers` are the parameters of the law (`BoucWenNumber`), and `stretch` is in [m]. The force does not depend on the
-    `velocity` of the slip [m/s] and its sign, `direction`.
-
-    Returns
-    -------
-    Rates
-    """
-    stiffness = numbers[BoucWenNumber.LIMIT] / numbers[BoucWenNumber.LENGTH]
-    return Rates(stiffness * stretch, stiffness, 0.0)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def relax_stretch(numbers, stretch, increment, dt):
-    """Return the stretch eps z after an increment, for harmonic balance.
-
-    `numbers` are the parameters of the law (`BoucWenNumber`), and `stretch` [m] is the stretch before the increment [m].
-    The result does not depend on the duration `dt` [s].
-
-    Returns
-    -------
-    RelaxedStretch
-    """
-    length = numbers[BoucWenNumber.LENGTH]
-    power = numbers[BoucWenNumber.EXPONENT]
-    shape = numbers[BoucWenNumber.SHAPE]
-    direction = 1.0 if increment > 0 else -1.0
-    path = abs(increment) / length
-    start = direction * stretch / length
-    end = follow_path(start, path, power, shape).end
-
-    # As dy/dx does not depend on x, the derivative by the start is the ratio of the rates; both vanish at the friction
-    # limit, where their quotient is replaced by its limit.
-    rise = _find_rate(end, power, 1 - 2 * shape)
-    first = _find_rate(start, power, 1 - 2 * shape)
-    by_stretch = rise / first if first > 1e-8 else exp(-power * path)
-    return RelaxedStretch(direction * length * end, by_stretch, rise, 0.0)

@@ -2,10 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..protocol import Element
-
 
 @dataclass(frozen=True, slots=True)
 class Coulomb:
@@ -18,13 +14,10 @@ class Coulomb:
     kinetic: float
     static: float | None = None
 
-    def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N], with the static and kinetic friction force."""
-        static = self.kinetic if self.static is None else self.static
-        limit = static * load
-        return Element(
-            "", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit, form="rigid"
-        )
+    @property
+    def length(self) -> float:
+        """Stretch before slip [m]: a rigid law has none."""
+        return 0.0
 
 
 def from_keys(friction, load: float) -> Coulomb:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element, SteadyLoop
+from ..protocol import SteadyLoop
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,42 +24,13 @@ class ElasticPlastic:
     static: float
     length: float
 
-    def element(self, load: float) -> Element:
-        """Return the Element under a constant load N [N]: a spring mu N/eps that slips at the force mu N."""
-        stiffness = self.static * load / self.length
-        return parallel_element([stiffness], [self.length])._replace(length=self.length)
+    def elements(self, load: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return stiffness [N/m] and yield displacement [m] (1,) under a load [N]."""
+        return np.array([self.static * load / self.length]), np.array([self.length])
 
     def steady_loop(self, load: float, amplitude) -> SteadyLoop:
         """Return the steady loops under a load [N] at amplitudes [m] of the relative displacement."""
-        stiffness = self.static * load / self.length
-        return masing_loop(np.array([stiffness]), np.array([self.length]), amplitude)
-
-
-def parallel_element(stiffness, yield_displacement) -> Element:
-    """Return one Element for parallel elastic-plastic elements (eq. 3.12, extended to reversals).
-
-    Parameters
-    ----------
-    stiffness, yield_displacement : (t,) array_like
-        Stiffness [N/m] of each element, and the stretch [m] at which it slips.
-
-    Returns
-    -------
-    Element
-        Its limit is the sum of the slip forces.
-    """
-    stiffness = np.asarray(stiffness, float)
-    yield_displacement = np.asarray(yield_displacement, float)
-    limit = float(stiffness @ yield_displacement)
-    total = float(stiffness.sum())
-    return Element(
-        "",
-        np.concatenate([[0.0, stiffness.size], stiffness, yield_displacement]),
-        np.zeros(3 + stiffness.size),
-        limit,
-        limit / total if total > 0 else 0.0,
-        form="parallel",
-    )
+        return masing_loop(*self.elements(load), amplitude)
 
 
 def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ..protocol import Element, SteadyLoop
-from .elastic_plastic import parallel_element
+from ..protocol import SteadyLoop
 
 # Number of cells of the power law, each a Jenkins element; the force of first loading is exact to 1e-6 of F_S for
 # chi >= -0.5, and to 5e-6 for chi >= -0.99
@@ -60,10 +59,14 @@ class Iwan:
         """Displacement [m] at which all sliders slip."""
         return max_yield_displacement(self.static, self.stiffness, self.chi, self.beta)
 
-    def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: parallel elements that represent the density."""
-        cells = slider_cells(self.static * load, self.stiffness * load, self.chi, self.beta)
-        return parallel_element(*cells)
+    @property
+    def length(self) -> float:
+        """Slip force over stiffness [m], the stretch before slip of one spring in place of the sliders."""
+        return self.static / self.stiffness
+
+    def elements(self, load: float) -> Sliders:
+        """Return the sliders under a load [N] that represent the density."""
+        return slider_cells(self.static * load, self.stiffness * load, self.chi, self.beta)
 
     def steady_loop(self, load: float, amplitude) -> SteadyLoop:
         """Return the steady loops of the continuous density under a load [N] at amplitudes [m], by Masing's rule.

@@ -9,10 +9,6 @@ Dahl's law, which is eq. 2.17 with reading="stretch" and eps_0 = mu N/stiffness.
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..protocol import Element
-
 
 @dataclass(frozen=True, slots=True)
 class LuGre:
@@ -31,26 +27,10 @@ class LuGre:
     micro_damping: float = 0.0
     viscous: float = 0.0
 
-    def element(self, load: float) -> Element:
-        """Return the `protocol.Element` of a contact under a constant load [N], of form "flow"."""
-        # In the order of `lugre_kernels.LuGreNumber`; the first number is reserved for the engines
-        numbers = [
-            0.0,
-            load * self.static,
-            load * self.kinetic,
-            load * self.stiffness,
-            self.speed,
-            load * self.micro_damping,
-            load * self.viscous,
-        ]
-        return Element(
-            "friction.laws.lugre_kernels",
-            np.array(numbers),
-            np.zeros(1),
-            self.static * load,
-            self.static / self.stiffness,
-            form="flow",
-        )
+    @property
+    def length(self) -> float:
+        """Stretch before slip [m] at rest, mu_s/stiffness."""
+        return self.static / self.stiffness
 
 
 def from_keys(friction, load: float) -> LuGre:

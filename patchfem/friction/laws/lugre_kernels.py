@@ -1,4 +1,4 @@
-"""LuGre law, compiled, in forms that follow from `rate_equation`. Equations: `lugre`.
+"""LuGre law, compiled, for the return maps of `points`. Equations: `lugre`.
 
 numbers: static and kinetic force [N], stiffness [N/m], Stribeck velocity v_s [m/s], micro-damping and viscous damping
 [N s/m]; memory: stretch z [m]. At the constant velocity of a step, z relaxes towards +-g/stiffness over that length of
@@ -10,7 +10,6 @@ from math import exp
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..protocol_kernels import Rates, RelaxedStretch
 
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
@@ -20,7 +19,7 @@ MIN_LIMIT_RATIO = 1e-9
 class LuGreNumber(IntEnum):
     """Indices of the parameters of the law.
 
-    Index 0 is reserved for the engines.
+    Index 0 has the number of the law (`points.law_rows.Law`).
 
     - STATIC, KINETIC: static and kinetic friction force [N]
     - STIFFNESS: stiffness [N/m]
@@ -52,8 +51,8 @@ def relaxation_length(numbers, velocity):
 
     Returns
     -------
-    (float, float)
-        The path [m], and its derivative with respect to the velocity [s].
+    float
+        The path [m].
     """
     stiffness = numbers[LuGreNumber.STIFFNESS]
     kinetic = numbers[LuGreNumber.KINETIC]
@@ -64,64 +63,26 @@ def relaxation_length(numbers, velocity):
     ratio = velocity / speed
     rise = (static - kinetic) * exp(-ratio * ratio)
     limit = max(kinetic + rise, MIN_LIMIT_RATIO * static)
-    return limit / stiffness, -2 * ratio / speed * rise / stiffness
+    return limit / stiffness
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force at a stretch and a velocity, and dz/dx = 1 - z/(g/stiffness).
+def find_force(numbers, stretch, velocity):
+    """Return the force at a stretch z and a velocity, with dz/dx = 1 - z/(g/stiffness) along the path x of the slip.
 
-    The coordinate x increases along the slip. `numbers` are the parameters of the law (`LuGreNumber`), `stretch` is z
-    [m], `velocity` that of the slip [m/s], and `direction` its sign.
-
-    Returns
-    -------
-    Rates
-    """
-    stiffness = numbers[LuGreNumber.STIFFNESS]
-    micro_damping = numbers[LuGreNumber.MICRO_DAMPING]
-    viscous = numbers[LuGreNumber.VISCOUS]
-    length, length_derivative = relaxation_length(numbers, velocity)
-    stretch_rate = 1 - direction * stretch / length
-    length_term = direction * stretch * velocity * length_derivative / (length * length)
-    return Rates(
-        stiffness * stretch + (micro_damping * stretch_rate + viscous) * velocity,
-        stiffness - micro_damping * direction * velocity / length,
-        micro_damping * (stretch_rate + length_term) + viscous,
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def relax_stretch(numbers, stretch, increment, dt):
-    """Return z after an increment at constant velocity, for harmonic balance.
-
-    z relaxes towards +-g/stiffness. If the step takes no time, the limit is the kinetic force. `numbers` are the
-    parameters of the law (`LuGreNumber`), `stretch` is z before the increment [m], and `dt` the duration of the
-    increment [s], 0 or more.
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in the order of `LuGreNumber`.
+    stretch, velocity : float
+        z [m] and the velocity of the slip [m/s].
 
     Returns
     -------
-    RelaxedStretch
+    float
+        Force [N].
     """
-    direction = 1.0 if increment > 0 else -1.0
-    path = abs(increment)
-    limit = max(numbers[LuGreNumber.KINETIC], MIN_LIMIT_RATIO * numbers[LuGreNumber.STATIC])
-    length = limit / numbers[LuGreNumber.STIFFNESS]
-    length_by_path = 0.0  # derivative of the length with respect to the path
-    if dt > 0:
-        length, length_by_velocity = relaxation_length(numbers, path / dt)
-        length_by_path = length_by_velocity / dt
-    x = path / length
-    decay = exp(-x)
-    end = direction * length
-    deviation = stretch - end
-
-    # The length changes with the velocity path/dt, so also with the time of the step.
-    x_by_path = (1 - x * length_by_path) / length
-    by_path = direction * length_by_path * (1 - decay) - deviation * decay * x_by_path
-    by_time = 0.0
-    if dt > 0:
-        length_by_time = -length_by_path * path / dt
-        by_time = direction * length_by_time * (1 - decay)
-        by_time += deviation * decay * x / length * length_by_time
-    return RelaxedStretch(end + deviation * decay, decay, direction * by_path, by_time)
+    direction = 1.0 if velocity > 0 else -1.0
+    stretch_rate = 1 - direction * stretch / relaxation_length(numbers, velocity)
+    damping = numbers[LuGreNumber.MICRO_DAMPING] * stretch_rate + numbers[LuGreNumber.VISCOUS]
+    return numbers[LuGreNumber.STIFFNESS] * stretch + damping * velocity

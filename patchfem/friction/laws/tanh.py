@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element
-
 
 @dataclass(frozen=True, slots=True)
 class TanhLaw:
@@ -20,15 +18,10 @@ class TanhLaw:
     static: float
     speed: float
 
-    def element(self, load: float) -> Element:
-        """Return the `protocol.Element` of a contact under a constant load [N], of form "speed"."""
-        return Element(
-            "friction.laws.tanh_kernels",
-            np.array([0.0, self.static * load, 1 / self.speed]),
-            np.zeros(0),
-            self.static * load,
-            form="speed",
-        )
+    @property
+    def length(self) -> float:
+        """Stretch before slip [m]: a function of the velocity has none."""
+        return 0.0
 
     def limit_fraction(self, dq, dt):
         """Return the ratio of the friction force to its limit for increments dq [m] during dt [s].

@@ -9,6 +9,7 @@ from time import process_time
 
 import numpy as np
 
+from ...motion_measures import energy_balance
 from ...response.loops import (
     find_reversals,
     interface_loop,
@@ -20,7 +21,6 @@ from ...response.loops import (
 from ...response.measures import (
     compute_ledger_measures,
     compute_step_harmonic,
-    energy_balance,
     interpolate_range,
     work_difference,
 )

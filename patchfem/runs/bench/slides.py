@@ -325,7 +325,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     frames = task.frames
     if jenkins_set is not None:
         states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
-        length = make_law(model.friction, 1.0).element(1.0).length
+        length = make_law(model.friction).length
         tau, local = fields.compute_element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
@@ -374,7 +374,7 @@ def _make_contact(task: SlideTask):
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve; rigid pieces are one element of the
     # law itself.
     if model.partial_slip:
-        length = make_law(friction, 1.0).element(1.0).length
+        length = make_law(friction).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
         law = make_elements(jenkins_set.stiffness, jenkins_set.yield_displacement)
         return contacts.make_contact([law], [row]), jenkins_set

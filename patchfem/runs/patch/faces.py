@@ -77,7 +77,7 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> P
     PatchElements
     """
     patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
-    length = record.make_law(interface.numbers, interface.load).element(interface.load).length
+    length = record.make_law(interface.numbers, interface.load).length
     return join_elements(list_elements(patch, interface.numbers.static, length))
 
 
@@ -121,7 +121,7 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
         # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
-            length = record.make_law(law.numbers, law.load).element(law.load).length
+            length = record.make_law(law.numbers, law.load).length
             tau, local = slip_fields.compute_element_fields(face.patch, jenkins_set, states, length)
             fields = make_interface_frames(
                 face.patch,

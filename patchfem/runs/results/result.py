@@ -16,6 +16,7 @@ import numpy as np
 from ...core import Outcome
 from ...formatting import rewrite_powers_of_ten
 from ...response import rows
+from ...scene import refuse_attribute
 from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
 
@@ -248,6 +249,8 @@ class Result:
     faces: tuple = ()
     yielding_faces: dict = field(default_factory=dict)
     shortage: TimeShortage | None = None
+
+    __getattr__ = refuse_attribute
 
     def __repr__(self) -> str:
         measures = _format_count(len(self.measures), "measure")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
-from ...core import IntegratedMeasures, NotConverged, Outcome, Response
+from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -26,7 +26,7 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import MAX_RESTING_SLIDE_RANGE, Values
+from ...response.measures import Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
@@ -341,10 +341,8 @@ class LumpedEvaluator(RunEvaluator):
             response.modal_rate,
             np.outer(response.force, modes.slide),
         )
-        slope = grooves.slope(response.slide)
-        bend = grooves.slope_derivative(response.slide)
-        rise = slope * (accelerations @ modes.slide) + bend * response.slide_rate**2
-        force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
+        lift = grooves.find_lift(response.slide, response.slide_rate, accelerations @ modes.slide)
+        force = self.joints.laws[0][1].mean + grooves.lifted_mass * lift
         return replace(response, extra=response.extra | {"normal_load": force})
 
     def _list_events(self, motion, drive) -> Events | None:
@@ -419,13 +417,15 @@ class LumpedEvaluator(RunEvaluator):
             values |= dict.fromkeys(select_names("sine"))
         window = run.window
         if self.has_friction:
-            values |= self._limit_loop_measures(run)
+            if not first_mode_stiffness(self.model, run.window):
+                # The interface moves in several modes.
+                values["equivalent_damping"] = None
             work = window.extra["ledger"][0]
             energies = run.ledger | compute_sampled_work(window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
         if not self.strips_slide_apart:
             values.pop("energy_stored", None)
-            return {"integrated": IntegratedMeasures(values)}
+            return {"integrated": values}
 
         names = ["slip_start_phase", "energy_stored"]
         for group in STRIP_MEASURE_GROUPS:
@@ -434,26 +434,12 @@ class LumpedEvaluator(RunEvaluator):
         work = np.ptp(window.extra["ledger"][0, [0, -1]])
         cycles = (window.time[-1] - window.time[0]) / drive.period
         return {
-            "integrated": IntegratedMeasures({name: values.get(name) for name in names}),
+            "integrated": {name: values.get(name) for name in names},
             "is_single_interface": True,
             "loop": compute_sampled_loop(window, drive, float(work / cycles)),
             # The other measures need samples of equal distances.
             "window": window.select(_find_even_samples(window)),
         }
-
-    def _limit_loop_measures(self, run) -> dict[str, None]:
-        """Return {name: None} for the measures of the friction loop that a run does not have.
-
-        An interface that hardly moves has no stiffness. A motion in several modes has no equivalent damping, which refers to
-        the stiffness of a single one.
-        """
-        missing = {}
-        if np.ptp(run.window.slide) <= MAX_RESTING_SLIDE_RANGE:
-            names = ("equivalent_stiffness", "secant_stiffness", "harmonic_force_ratio")
-            missing = dict.fromkeys((*names, "equivalent_damping"))
-        elif not first_mode_stiffness(self.model, run.window):
-            missing = {"equivalent_damping": None}
-        return missing
 
     def collect_solution_fields(self, run, drive) -> Fields:
         """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.

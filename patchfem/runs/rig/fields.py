@@ -69,7 +69,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         reduction = getattr(solution.contact, "reduction", None)
-        length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
+        length = 0.0 if reduction is None else record.make_law(f).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = fields.compute_element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)

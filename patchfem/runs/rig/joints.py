@@ -14,8 +14,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...effects import law_has_trait
-from ...friction import protocol, record
-from ...friction.laws import elastic_plastic
+from ...friction import record
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
@@ -66,11 +65,13 @@ class Joint(NamedTuple):
             return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
         return record.make_law(self.law, self.load.mean)
 
-    def make_element(self) -> protocol.Element:
-        """Return the law under its mean load in the form of the march."""
-        if self.stiffness is not None:
-            return elastic_plastic.parallel_element(self.stiffness, self.yields)
-        return self.make_law().element(self.load.mean)
+    @property
+    def length(self) -> float:
+        """Relative displacement [m] over which the law stretches before it slips; 0 without a stretch."""
+        if self.stiffness is None:
+            return self.make_law().length
+        total = self.stiffness.sum()
+        return float(self.stiffness @ self.yields / total) if total > 0 else 0.0
 
     def make_point_law(self) -> point_laws.PointLaw:
         """Return the law under its mean load as a PointLaw, the form for the time integration with equal steps."""
@@ -90,9 +91,10 @@ class Joint(NamedTuple):
 
         Both are empty for a law that is not made of such elements.
         """
-        element = self.make_element()
-        count = int(element.numbers[1]) if element.form == "parallel" else 0
-        return element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
+        if self.stiffness is not None:
+            return self.stiffness, self.yields
+        list_elements = getattr(self.make_law(), "elements", None)
+        return list_elements(self.load.mean) if list_elements else (np.zeros(0), np.zeros(0))
 
 
 class Joints(NamedTuple):
@@ -184,7 +186,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
         return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
-    length = record.make_law(model.friction, load.mean).element(load.mean).length
+    length = record.make_law(model.friction, load.mean).length
     parts = jenkins_elements.list_elements(patch, static, length)
     if slide_apart:
         return [(load, part) for part in parts]
@@ -294,28 +296,17 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     joints = list_joints(model, patch, numerics.meshed)
     laws = [joint.make_point_law() for joint in joints]
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    length = joints[0].make_element().length if joints else 0.0
+    length = joints[0].length if joints else 0.0
     contact = contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 
-def make_single_law(model: Model, numerics: Numerics, patch) -> protocol.Element | None:
-    """Return the law of a rig with one interface under a constant load, or None for bonds that are no single element.
-
-    Parameters
-    ----------
-    model : Model
-        Friction law and load of the interface.
-    numerics : Numerics
-        Method of bond summation and coarser meshes.
-    patch : Patch or None
-        None under [normal].
-    """
-    if law_has_trait(model.friction.law, "bonds") and not model.rig.friction.has_partial_slip:
-        is_spread = model.partial_slip or model.side == "lower"
-        if is_spread or bond_lists.choose_bond_summation(model, numerics).engine != "recursion":
-            return None
-    return list_joints(model, patch, numerics.meshed)[0].make_element()
+def _has_bond_list(model: Model, numerics: Numerics) -> bool:
+    """Return whether the bonds of the only interface are summed over lists, which have no state of a few numbers."""
+    if not law_has_trait(model.friction.law, "bonds") or model.rig.friction.has_partial_slip:
+        return False
+    is_spread = model.partial_slip or model.side == "lower"
+    return is_spread or bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
 
 
 def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
@@ -341,7 +332,7 @@ def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
         has_bonds = joint.stiffness is None and law_has_trait(joint.law.law, "bonds")
         if has_bonds and joint.law.rest_growth is not None:
             raise PatchfemError(NO_STEADY_LOOP)
-    if len(joints) == 1 and make_single_law(model, numerics, patch) is None:
+    if len(joints) == 1 and _has_bond_list(model, numerics):
         raise PatchfemError(NO_STEADY_LOOP)
     laws = [(joint.make_hybrid_law(), joint.load) for joint in joints]
     return UndrivenRig(rig.modes, tuple(list_interfaces(rig, laws)), len(laws))

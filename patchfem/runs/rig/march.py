@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import IntegratedMeasures, Outcome
+from ...core import Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
 from ...response.loops import CycleLoop
@@ -152,7 +152,7 @@ class MarchEvaluator(RunEvaluator):
             missing = {"slip_start_phase": None, "stick_fraction": 1.0}
         values = {"work_check": compute_work_check(energies)} | missing
         return {
-            "integrated": IntegratedMeasures(values),
+            "integrated": values,
             "run_energies": energies,
             "loop": self._compute_hysteresis_loop(run, drive),
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,

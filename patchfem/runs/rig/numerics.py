@@ -22,6 +22,7 @@ WHOLE_CYCLE_TOL = 1e-6
 # e^-6.
 N_TRANSIENT_DECAY_TIMES = 3.0
 MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ class Numerics:
         The engine `hybrid` has a hundredth of the step error, and other engines have twice as many steps.
         """
         if self.local:
-            return replace(self, local=0.01 * self.local)
+            return replace(self, local=max(0.01 * self.local, MIN_RELATIVE_STEP_ERROR))
         return replace(self, steps=2 * self.steps)
 
 
@@ -107,9 +108,9 @@ def choose_numerics(model: Model) -> Numerics:
     if engine is HYBRID:
         # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.
         is_exact = accuracy.method == "exact" or model.friction is None
-        local = (
-            cases.EXACT_RTOL if is_exact else float(np.clip(1e-5 * accuracy.tolerance, 1e-12, 1e-8))
-        )
+        local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
+        if is_exact:
+            local = cases.EXACT_RTOL
         return replace(numerics, local=local, steps=cases.MIN_STEPS)
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.

@@ -30,13 +30,12 @@ from .engines import ENGINES, list_runs_with_other_modes
 from .event_to_event import ElementSnapshot
 from .fields import collect_interface_fields
 from .motion_warnings import collect_remarks
-from .numerics import Numerics, choose_numerics
+from .numerics import MIN_RELATIVE_STEP_ERROR, Numerics, choose_numerics
 from .solution import Solution, compute_peak_frequency
 from .solve import Runner
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 # Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
 MIN_MOTION_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
@@ -328,7 +327,7 @@ def _count_finer_passes(run: CoupledRun) -> int:
     """Return how many times a run can be repeated with smaller steps than before."""
     numerics = run.numerics
     if numerics.local:
-        return max(0, floor(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) + 1e-9))
+        return ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
     if (
         not ENGINES[numerics.engine].has_steps
         or run.model.accuracy.steps_per_cycle is not None

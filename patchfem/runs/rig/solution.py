@@ -11,10 +11,11 @@ import numpy as np
 
 from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
+from ...motion_measures import find_extremes
 from ...response.events import Events
 from ...response.levels import Level
 from ...response.loops import CycleLoop, sample_loop
-from ...response.measures import Measures, Values, measure_half_range
+from ...response.measures import Measures, Values
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import VibratingMode
 from ...response.rows import AMPLITUDE, STEADY_AMPLITUDE
@@ -120,7 +121,8 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     if gauge is None:
         return solution
     window = _compute_gauge_histories(solution.window, gauge)
-    amplitude = measure_half_range(window.time, window.output, window.output_rate)
+    low, high = find_extremes(window.time, window.output, window.output_rate)
+    amplitude = (high - low) / 2
     ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
     errors = solution.errors and solution.errors | {
         AMPLITUDE: ratio * solution.errors.get(AMPLITUDE, 0.0)

@@ -115,8 +115,7 @@ def _check_load_line(patch: TableFacts, half_length: float) -> None:
     `half_length` [m] is half the length over which both faces are flat.
     """
     if patch.approach and (patch.has("load_line") or patch.holder.rotational_stiffness):
-        name = "approach of a piece that can rotate"
-        patch.add_mistake("approach", describe_removed(name, f"an {name}"))
+        patch.add_mistake("approach", describe_removed("an approach of a piece that can rotate"))
     line = patch.load_line
     if abs(line.offset) >= half_length:
         patch.add_mistake(

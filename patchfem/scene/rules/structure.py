@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..files import UNIVERSAL_EXTENSIONS
-from ..keys.removed import describe_removed
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
 from .facts import TableFacts
@@ -13,9 +12,6 @@ from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
-MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
-# Files of Nastran, which have a refusal of their own because earlier versions read them.
-NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
@@ -88,7 +84,7 @@ def _check_joint(structure: TableFacts) -> None:
 
 
 def _check_reduced(structure: TableFacts) -> None:
-    """Report files of [structure.reduced] that cannot be read by their extension, and wrong coordinates.
+    """Report wrong coordinates of [structure.reduced].
 
     Parameters
     ----------
@@ -96,16 +92,6 @@ def _check_reduced(structure: TableFacts) -> None:
         Table [structure] with the table [structure.reduced].
     """
     reduced = structure.reduced
-    for key in MATRIX_KEYS:
-        file = getattr(reduced.table, key)
-        if not isinstance(file, str) or Path(file).suffix.lower() in MATRIX_EXTENSIONS:
-            continue
-        extension = Path(file).suffix.lower()
-        advice = advise_on_name(extension, MATRIX_EXTENSIONS)
-        if extension in NASTRAN_EXTENSIONS:
-            removed = describe_removed("files of Nastran", "reading files of Nastran")
-            advice = f"{removed}; {advice}"
-        structure.add_mistake(f"reduced.{key}", f"{_describe_extension(extension)}; {advice}")
 
     # Coordinates of the boundary, of the base and of the joint.
     boundary = tuple(reduced.boundary)

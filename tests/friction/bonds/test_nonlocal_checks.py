@@ -18,9 +18,9 @@ from patchfem.core import SineDrive
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.friction.bonds.list_rows_kernels import MAX_STRIP_LENGTH
+from patchfem.motion_measures import energy_balance
 from patchfem.points.contacts import make_bond_contact
 from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
