@@ -62,7 +62,7 @@ def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
         )
         values = read_columns(path, table).values
         time = values["time"]
-        value = values.get(base_name, values.get(quantity))
+        value = values.get(quantity, values.get(base_name))
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)

@@ -293,10 +293,6 @@ def test_refuses_unreadable_file(tmp_path):
             "structure.reduced.boundary[2]: whole numbers or texts are needed, such as [1, '12:x'] or "
             "['1..39:20'], not true",
         ),
-        (
-            '[structure.reduced]\nmass = "m"\n',
-            "structure.reduced.mass: the name has no extension; use one of .mtx, .mat, .npz",
-        ),
         ("[wear.friction]\ndepth = [0]\n", "wear.friction.depth[1]: a bare number without a unit"),
         (
             '[structure]\nfile = "a.uff"\n',

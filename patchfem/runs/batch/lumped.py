@@ -536,5 +536,6 @@ def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
     for case, model in enumerate(models):
         if warnings := [*model.source.remarks, *model.rig.structure.notes]:
             results.warnings[case] = list(shorten_file_names(warnings, model.source.path))
-        if creeps:
-            results.notes[case] = note_on_creep(model.friction)
+        notes = [*model.source.notes, *(note_on_creep(model.friction) if creeps else ())]
+        if notes:
+            results.notes[case] = notes
