@@ -34,7 +34,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     lower, upper : TensorGrid or PieceMesh
         The upper piece is like the lower one if left out.
     path : Path
-        A .msh file (format 2.2, physical names) or a .vtu file (cell array `tag`).
+        A .msh file (format 2.2 or 4.1, physical names) or a .vtu file (cell array `tag`).
 
     Raises
     ------
