@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ..core import PatchfemError
 from ..inputs.tables import TableFormat, find_factors, read_text
 
-REQUIRED_COLUMNS = ("before", "after")  # columns that every table has
+REQUIRED_COLUMNS = ("before", "after")  # files of a pair; the other columns are optional
 # Possible cells of the column `direction`, "" if it is not known
 DIRECTION_CELLS = ("", "x", "y")
 

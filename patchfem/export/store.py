@@ -83,7 +83,7 @@ def write_json(content: JsonObject, path: Path) -> None:
 
 
 def make_summary(answer: Answer) -> JsonObject:
-    """Return the contents of summary.json, which are those of `run --json` for a run."""
+    """Return the contents of summary.json: title, kind, origin, outcome, verdict, measures, notes, warnings and details."""
     details = dict(answer.details) if answer.is_run else {}
     summary = {
         "patchfem": answer.origin.get("patchfem", __version__),

@@ -21,7 +21,7 @@ PLANE_ELEMENT_PATTERN = re.compile(r"CP(?:E|S|EG)([3468])(?:M|R|H|I|RH|IH|MH)?$"
 # Numbers of nodes of line elements, which only name edges
 LINE_ELEMENT_NODE_COUNTS = {"T2D2": 2, "T3D2": 2, "B21": 2, "B31": 2, "R2D2": 2}
 LINE_ELEMENT_NODE_COUNTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3}
-# Elements in meshio by number of nodes; a surface names the sides of plane elements
+# Names of the elements in meshio by their number of nodes
 MESHIO_PLANE_NAMES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 MESHIO_LINE_NAMES = {2: "line", 3: "line3"}
 PART_KEYWORDS = ("PART", "ASSEMBLY", "INSTANCE")

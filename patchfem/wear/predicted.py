@@ -26,7 +26,7 @@ MAX_REFINED_POSITIONS = 24
 MIN_PATCH_OVERLAP = 0.25
 # Part of half the patch beyond its ends, whose unworn depths show where the wear ends
 END_MARGIN_OVER_HALF_PATCH = 0.1
-# Largest coefficient relative to that of the run for which the shape is known
+# Largest wear coefficient, relative to that of the computed run, for which the run has the shape of the worn profile
 MAX_COEFFICIENT_RATIO = 2.0
 # Largest relative coefficient of the search, so that a message can propose one
 MAX_SEARCHED_COEFFICIENT_RATIO = 1e4

@@ -31,7 +31,7 @@ WORN_DEPTH_NAMES = ("worn_depth_mean", MAX_WORN_DEPTH_NAME)
 # Names in compare.json of the part that two measured surfaces of a piece have in common
 COMMON_PART_NAMES = {"common_length", "common_area"}
 MAX_WEAR_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
-# Largest ratio of the relative error of the computed depth to the specified tolerance.
+# Largest relative difference of computed and measured depth, over the tolerance, at which the search ends.
 MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"

@@ -9,7 +9,7 @@ from ..charts.panel import Curve, Panel, make_axis
 from .vtkhdf import Frames, read_frames
 
 FILM_GRID_POINTS = (61, 60)  # columns and rows of the grid
-MAX_FILM_FRAMES = 30  # largest number of frames of a film
+MAX_FILM_FRAMES = 30  # largest number of frames, chosen evenly in the last cycle
 WINDOW_HEIGHT_OVER_WIDTH = 0.6  # height of the window around the contact over its width
 # Largest contact, over the length of the pieces, that the window shows as a whole.
 MAX_SHOWN_CONTACT_FRACTION = 0.25

@@ -25,7 +25,7 @@ def export_histories(folder: Path, out: Path) -> str:
     folder : Path
         Of a run, or of a fit to a loop.
     out : Path
-        File with one of the LAB_FILE_ENDINGS.
+        File whose ending names the format, one of LAB_FILE_ENDINGS such as .mat or .uff.
 
     Raises
     ------

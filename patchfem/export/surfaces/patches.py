@@ -51,7 +51,7 @@ def read_patch(folder: Path) -> PatchRun:
             f"{folder}: result.nc contains no {' and no '.join(missing)}; run the scene again"
         )
 
-    # with strips, a field may be that of all of them
+    # A field of a patch with strips has a row for each strip, or one row that is valid for all of them.
     x = data["x"].values
     y = data["strip_offset"].values if "strip_offset" in data else None
     shape = x.shape if y is None else (y.size, x.size)

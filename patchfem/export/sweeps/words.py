@@ -13,7 +13,7 @@ from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value
 
 MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
-MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
+MAX_NAMED_KEYS = 3  # largest number of keys whose shares of the variance a sentence names
 
 
 def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:

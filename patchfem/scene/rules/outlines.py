@@ -3,7 +3,7 @@
 from .facts import TableFacts
 from .view import UNKNOWN_VALUE, TableView
 
-# Keys of a patch that hold its two pieces
+# Tables of [contact] with the outline of one piece each
 PIECE_KEYS_OF_PATCH = ("upper", "lower")
 # Keys of a piece for the lengths [m] of its shaped ends
 PIECE_END_KEYS = ("chamfer", "end_radius")

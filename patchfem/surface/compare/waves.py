@@ -23,7 +23,7 @@ MIN_BLOCK_WAVES = 2.0
 CUTOFF_TO_DEVIATION = 0.187
 # Standard deviation of a ratio due to tip, interpolation and datum
 RATIO_RELATIVE_DEVIATION = 0.004
-# Noise relative to the size of the surface above which a ratio is unknown
+# Largest mean square of the noise, relative to that of a surface, at which the ratio after/before of the surfaces is known
 MAX_NOISE_OVER_SIZE = 0.5
 # Smallest length of a trace relative to the longest wave of the band
 MIN_TRACE_WAVES = 3.0
