@@ -244,7 +244,8 @@ class FreeShooting(LoopShooting):
         state = copy_state(state)
         state.y[self.extra[-1] + 1 :] = 0.0
         end = super().advance(state)
-        mirror_state(self.case.rig, end)
+        rig = self.motions.rig
+        mirror_state(end, rig.modes.omega.size, [one.law for one in rig.interfaces])
 
         # Half the range of the output, and the cosine part of its fundamental
         cycle = self.record.cycles[0]

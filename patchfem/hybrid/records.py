@@ -441,7 +441,7 @@ class LawNumbers(NamedTuple):
     - states: its states at the start
     - scales: smallest magnitudes of the states, to which the errors of a step are relative
     - length: stretch before slip [m] of a law whose force follows from the slide alone, else infinite
-    - stiffness: tangent stiffness at rest [N/m], 0 for a rigid law and for one that creeps
+    - stiffness: tangent stiffness at rest [N/m], inf for a rigid law and 0 for one that creeps
     """
 
     law: str

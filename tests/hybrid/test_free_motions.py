@@ -10,17 +10,27 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import NotConverged, PatchfemError
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.bouc_wen import BoucWen
+from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.iwan import Iwan
+from patchfem.friction.laws.lugre import LuGre
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.friction.protocol import SteadyLoop
 from patchfem.hybrid import quasi_static
 from patchfem.hybrid.cases import Interface, Load, UndrivenRig
 from patchfem.hybrid.free_motions import (
     ROUGH,
     FreeMotions,
+    FreeShooting,
+    LinearMotion,
     estimate_amplitude,
     find_limit_cycles,
 )
-from patchfem.hybrid.laws import masing
+from patchfem.hybrid.laws import LAW_OF_NAME, make_law, masing, mirror_state
 from patchfem.hybrid.laws.springs import make_cubic
+from patchfem.hybrid.periodic import copy_state
 from patchfem.hybrid.records import LawNumbers
 
 STIFF = np.array([2e4, 1e4, 3e4])
@@ -368,3 +378,47 @@ def test_always_larger_steps_change_motions_little():
     for motion, other in zip(fine, FreeMotions(rig, 0, accuracy=ROUGH).find(amplitudes, fine)):
         assert motion.omega == pytest.approx(other.omega, rel=1e-7)
         assert motion.zeta == pytest.approx(other.zeta, rel=1e-6)
+
+
+# ---- symmetry
+
+
+RECORDS = {
+    "coulomb": Coulomb(0.3, 0.4),
+    "tanh": TanhLaw(0.3, 5.0),
+    "elastic-plastic": ElasticPlastic(0.3, 0.01),
+    "iwan": Iwan(0.3, 40.0, -0.4, 0.5),
+    "bouc-wen": BoucWen(0.3, 0.01, 1.5, 0.7),
+    "lugre": LuGre(0.3, 0.2, 30.0, 4.0, 0.01, 0.02),
+    "nonlocal": Bonds(0.3, 0.01, rest_growth=1.0, slip_growth=0.01, rest_speed=1e-3),
+}
+
+
+@pytest.mark.parametrize("name", LAW_OF_NAME)
+def test_always_motion_of_opposite_sign_follows_from_the_first_one(name):
+    """A contact at rest that is started to the other side has the opposite motion, so that half a period determines a free
+    motion; its states and memory are those that are given the opposite sign."""
+    law = make_law(name, RECORDS[name], 3e4)
+    shooting = FreeShooting(
+        FreeMotions(make_rig(ONE, law), 0), LinearMotion(900.0, np.ones(1), 0.1), 0.05
+    )
+
+    def mirror(state):
+        state = copy_state(state)
+        mirror_state(state, 1, [law])
+        return state
+
+    # `advance` gives the end of each half period the opposite sign.
+    start = shooting.state
+    other = copy_state(start)
+    other.y[:2] *= -1
+    opposite, same = shooting.advance(start), mirror(shooting.advance(other))
+    for _ in range(3):
+        known = slice(shooting.extra[0])
+        assert opposite.y[known] == pytest.approx(same.y[known], rel=1e-9)
+        assert np.abs(same.y[:2]).min() > 0
+        for one in (opposite, same):
+            one.y[shooting.extra] = start.y[
+                shooting.extra
+            ]  # frequency and rate, which follow the phase
+        opposite, same = shooting.advance(opposite), shooting.advance(same)

@@ -11,16 +11,18 @@ They may call functions of their module that HELPERS lists. `p` are the numbers 
 `records.Memory`. Within a regime force and rates must be smooth. A law needs no tangent, no solver and no error formula.
 `RIGID` says whether it rests without displacement. A law of a table [friction] has `from_law(law, load)`, which returns
 its `records.LawNumbers` from the law of `friction.laws` and a mean load [N]. In a motion of the opposite sign the states
-and `memory[FLAG]` have the factors that STATE_SIGNS and FLAG_SIGN list; without them they keep their values.
+have the opposite sign, or the factors that STATE_SIGNS lists, and `memory[FLAG]` has the factor FLAG_SIGN, 1 by default.
 
 LAWS lists the modules; the number of a law is its place. LAW_OF_NAME gives the module for each `friction.law`, and
 VARYING_LAW_OF_NAME that under a load that varies.
 """
 
+from collections.abc import Sequence
 from importlib import import_module
+from math import inf
 
 from ...core import MIN_LOAD, PatchfemError
-from ..records import Face, LawNumbers, Memory, Rig, State
+from ..records import LawNumbers, Memory, State
 
 LAWS = (
     "coulomb",
@@ -85,7 +87,11 @@ def make_law(name: str, law, load: float, *, varies: bool = False) -> LawNumbers
             f"use {', '.join(table)}",
             "friction.law",
         )
-    return import_module(f"{__name__}.{table[name]}").from_law(law, max(load, MIN_LOAD))
+    module = import_module(f"{__name__}.{table[name]}")
+    load = max(load, MIN_LOAD)
+    at_rest = inf if module.RIGID else 0.0
+    stiffness = law.static * load / law.length if law.length else at_rest
+    return module.from_law(law, load)._replace(stiffness=stiffness)
 
 
 def is_rigid(law: str) -> bool:
@@ -93,23 +99,25 @@ def is_rigid(law: str) -> bool:
     return import_module(f"{__name__}.{law}").RIGID
 
 
-def mirror_state(rig: Rig, state: State) -> None:
-    """Give a motion the opposite sign.
+def mirror_state(state: State, n_modes: int, laws: Sequence[LawNumbers]) -> None:
+    """Give a motion under constant loads the opposite sign.
 
     Parameters
     ----------
-    rig : Rig
-        Arrays of the rig, whose loads are constant.
     state : State
-        Its motion, which is changed.
+        The motion, which is changed.
+    n_modes : int
+        Number of modal coordinates, which stand first in `state.y`, before their velocities.
+    laws : sequence of LawNumbers
+        Laws of the interfaces, whose states follow.
     """
-    n_modes = rig.modes.shape[1]
-    state.y[: 2 * n_modes] *= -1
-    for face, memory in zip(rig.faces, state.memory):
-        law = import_module(f"{__name__}.{LAWS[int(face[Face.LAW])]}")
-        signs = getattr(law, "STATE_SIGNS", ())
-        first = 2 * n_modes + int(face[Face.FIRST_STATE])
-        state.y[first : first + len(signs)] *= signs
-        memory[Memory.FLAG] *= getattr(law, "FLAG_SIGN", 1.0)
+    first = 2 * n_modes
+    state.y[:first] *= -1
+    for law, memory in zip(laws, state.memory):
+        module = import_module(f"{__name__}.{law.law}")
+        last = first + len(law.states)
+        state.y[first:last] *= getattr(module, "STATE_SIGNS", -1.0)
+        first = last
+        memory[Memory.FLAG] *= getattr(module, "FLAG_SIGN", 1.0)
         memory[list(ODD_MEMORY)] *= -1
         memory[Memory.STACK :] *= -1

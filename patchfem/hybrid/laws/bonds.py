@@ -127,5 +127,4 @@ def from_law(law, load):
         growth = (law.rest_growth, law.slip_growth, law.rest_speed)
     numbers = (law.static, length, law.ratio * length, *growth)
     scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
-    states = (law.initial, 0.0, 0.0, length)
-    return LawNumbers("bonds", numbers, states, scales, stiffness=law.static * load / length)
+    return LawNumbers("bonds", numbers, (law.initial, 0.0, 0.0, length), scales)

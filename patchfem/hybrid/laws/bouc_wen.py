@@ -6,7 +6,6 @@
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
-STATE_SIGNS = (-1.0,)
 FLAG_SIGN = -1.0
 
 
@@ -90,6 +89,4 @@ def from_law(law, load):
         Mean load [N].
     """
     numbers = law.static, law.length, law.exponent, law.shape
-    return LawNumbers(
-        "bouc_wen", numbers, (0.0,), (1e-2,), stiffness=law.static * load / law.length
-    )
+    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,))

@@ -3,8 +3,6 @@
 Numbers: mu_s, mu_k. The averaged law of Oden and Pires is Coulomb friction with the average pressure.
 """
 
-from math import inf
-
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = True
@@ -97,4 +95,4 @@ def from_law(law, load):
     load : float
         Mean load [N].
     """
-    return LawNumbers("coulomb", (max(law.static, MIN_STATIC), law.kinetic), stiffness=inf)
+    return LawNumbers("coulomb", (max(law.static, MIN_STATIC), law.kinetic))

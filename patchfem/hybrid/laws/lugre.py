@@ -8,7 +8,6 @@ from math import exp
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
-STATE_SIGNS = (-1.0,)
 MAX_RISE_SPEED = 6.0  # largest speed, relative to v_s, at which g exceeds mu_k by more than e^-36
 MIN_LIMIT = 1e-9  # smallest g relative to mu_s; the rate of z divides by it
 
@@ -93,5 +92,4 @@ def from_law(law, load):
         Mean load [N].
     """
     numbers = (law.static, law.kinetic, law.stiffness, law.speed, law.micro_damping, law.viscous)
-    scale = 1e-2 * law.static / law.stiffness
-    return LawNumbers("lugre", numbers, (0.0,), (scale,), stiffness=law.stiffness * load)
+    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * law.length,))

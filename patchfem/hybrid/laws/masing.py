@@ -420,7 +420,5 @@ def from_law(law, load):
     limit = law.static * load
     if hasattr(law, "chi"):
         numbers = (law.chi, law.beta, limit, law.phi_max, 1, 0.0, law.phi_max, 0.0, limit)
-        return LawNumbers(
-            "masing", numbers, length=law.static / law.stiffness, stiffness=law.stiffness * load
-        )
+        return LawNumbers("masing", numbers, length=law.length)
     return from_elements([limit / law.length], [law.length])
