@@ -49,8 +49,8 @@ def measure_interface(observations: Observations, stiffness) -> Values:
     """
     slides, low, force_at_low, high, force_at_high = np.moveaxis(observations.cycles, -1, 0)
     ranges = high - low
-    half_range = _average_known(ranges) / 2
-    secant = _average_known((force_at_high - force_at_low) / ranges)
+    half_range = _average_finite(ranges) / 2
+    secant = _average_finite((force_at_high - force_at_low) / ranges)
 
     # A reversal without stick takes a time of the size of round-off.
     stuck = observations.stick[0] / observations.span
@@ -171,7 +171,7 @@ def ratio_or_zero(part, total):
     return (part / np.where(is_positive, total, 1.0) * is_positive)[()]
 
 
-def _average_known(values):
+def _average_finite(values):
     """Return the means (...) of those values (..., n) that are finite numbers; NaN without any."""
     is_known = np.isfinite(values)
     return np.where(is_known, values, 0.0).sum(axis=-1) / is_known.sum(axis=-1)

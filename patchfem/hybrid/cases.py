@@ -119,15 +119,15 @@ class UndrivenRig:
         """Tangent stiffness at rest (i,) [N/m] of interfaces and springs; 0 for a law that creeps, inf for a rigid one."""
         return np.array([one.law.stiffness for one in self.interfaces])
 
-    def with_elements(self, change) -> "UndrivenRig":
+    def with_elements(self, transform) -> "UndrivenRig":
         """Return a rig in which a function has changed the elastic-plastic elements of every interface.
 
-        `change` takes stiffness [N/m] and yield displacement [m] (t,) of the elements and returns both.
+        `transform` takes stiffness [N/m] and yield displacement [m] (t,) of the elements and returns both.
         """
         interfaces = []
         for one in self.interfaces:
             if masing.has_stick(one.law):
-                elements = change(*masing.list_elements(one.law))
+                elements = transform(*masing.list_elements(one.law))
                 one = one._replace(law=masing.from_elements(*elements))
             interfaces.append(one)
         return replace(self, interfaces=tuple(interfaces))

@@ -175,7 +175,7 @@ def follow_curve(
     # A step without a solution is halved. The points found so far are a curve also if the next one costs too much.
     try:
         while len(points) < settings.max_points:
-            # The scale of the unknowns rises with their size.
+            # The unit of the unknowns rises with their norm, so that steps have the same relative length.
             point = points[-1]
             unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
             tangent = point.find_tangent(tangent, unit)

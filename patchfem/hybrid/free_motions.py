@@ -57,7 +57,9 @@ MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the fi
 MAX_NEWTON_STEPS = 20  # Newton steps to a motion
 # Largest ratio of the changes over a period after and before a correction at which the derivatives are updated
 MAX_BROYDEN_RATIO = 0.3
-MAX_DETOURS = 3  # Newton steps that are shortened, and Newton steps with new derivatives
+MAX_DETOURS = (
+    3  # largest number of shortened Newton steps, and of Newton steps with new derivatives
+)
 # Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
 LONGEST_STEPS = np.array([0.3, 0.6])
 RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
@@ -477,6 +479,8 @@ class FreeMotions:
         modes = rig.modes
         stuck_mode = modes.compute_stuck_mode(rig.rows, rig.stiffness, self.mode)
         free_mode = (modes.omega[self.mode], np.eye(modes.omega.size)[self.mode])
+
+        # Each pass follows the motions from that at the amplitude before.
         upwards = range(len(amplitudes))
         passes = ((upwards, stuck_mode, STUCK_RATIOS), (upwards[::-1], free_mode, FREE_RATIOS))
         for order, mode, ratios in passes:

@@ -15,7 +15,7 @@ def _choose(number: int, function, other):
 
     @njit(**NJIT_KERNEL)
     def choose(law, *arguments):
-        """Call the function of the law whose number is `law`.
+        """Call `function` if `law` is its number, else go on along the chain.
 
         The `arguments` are those of the function, as `laws` describes.
         """

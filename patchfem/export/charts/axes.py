@@ -65,6 +65,8 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
     if style in ("points", "dots") and not curve.is_line:
         if style == "dots":
             axes.plot(curve.x, curve.y, color=colour, lw=1)
+
+        # Error bars below the symbols, of which each kind is plotted by itself
         if curve.low is not None:
             ends = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
             axes.errorbar(curve.x, curve.y, ends, fmt="none", ecolor=colour)
@@ -74,6 +76,8 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
             label = curve.name if symbol == "circle" else None  # the entry of the legend
             axes.plot(*points, marker, color=colour, label=label, zorder=3)
         return
+
+    # A heavier line lies above the others.
     options = {
         "lw": MATPLOTLIB_STYLE["lines.linewidth"] * curve.weight,
         "zorder": 2 + curve.weight / 10,

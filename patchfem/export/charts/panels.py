@@ -12,7 +12,7 @@ from .table import Chart
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 BOLD_CURVE_WEIGHT = 1.8  # width of a recommended curve over the usual one
-THIN_CURVE_WEIGHT = 0.6  # width of the other curves in the same chart
+THIN_CURVE_WEIGHT = 0.6  # width of the other curves of its chart over the usual one
 SWEEP_CHART_STYLES = ("relative", "menu", "maps")
 N_MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_CHARTED_INTERFACES = 6  # largest number of interfaces with charts of their own

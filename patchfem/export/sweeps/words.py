@@ -152,12 +152,16 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     }
     n_unsettled = cases["count"] - int(table.has_settled.sum()) - sum(counts.values())
     counts[f"unsettled{_describe_unsettled(table)}"] = n_unsettled
+
+    # Of the measures that miss the tolerance, the one that does so in most cases is named.
     missed = cases["over_tolerance"]
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
         others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
         counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
+
+    # One clause for each count that is not 0
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses and len(table) == 1:
         return "The only case settled and meets the tolerance."

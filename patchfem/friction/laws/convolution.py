@@ -116,8 +116,8 @@ def average_pressure(
     if direction < 0:
         return average_pressure(-positions, -nodes[::-1], sigma[::-1], 1.0, length, order)
     is_bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    # The incomplete gamma function of order p + 2 bounds the weights of farther nodes: pressures that are linear between
-    # the nodes add a power of s to phi.
+    # Nodes farther away than `cutoff` have weights below CUTOFF_WEIGHT. A pressure that is linear between two nodes
+    # multiplies phi by a power of s, so that the incomplete gamma function of order p + 2 bounds these weights.
     cutoff = length * float(gammainccinv(order + 2, CUTOFF_WEIGHT))
 
     # Blocks of positions bound the memory; nodes whose weight is below round-off are left out

@@ -205,7 +205,7 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
 
 
 def find_unknown_measures(measures: Measures) -> list[str]:
-    """Return the names of the measures that are hardly known: their error exceeds their value.
+    """Return the names of the measures whose error exceeds their value, so that they are hardly known.
 
     Only measures that are positive by definition and for which the mesh is refined are considered.
     """

@@ -144,6 +144,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
 
+    # The laws must follow from a few numbers, and rigid ones need modes that oscillate by themselves.
     try:
         undriven = make_undriven_rig(model, numerics, patch)
     except PatchfemError:
@@ -151,12 +152,15 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     is_rigid = not np.isfinite(undriven.stiffness).all()
     if is_rigid and not modes.omega.all():
         return LimitCycles([], RIGID_FRICTION_REASON)
+
     try:
         cycles, smallest = free_motions.find_limit_cycles(
             undriven, law.static * first_interface_load(model, patch)
         )
     except NotConverged as missing:
         return LimitCycles([], NO_SLIDING_NOTE if is_rigid else str(missing))
+
+    # Amplitudes below the smallest examined one may have further cycles.
     reason = NO_CYCLE_NOTE
     if smallest:
         reason = NO_SMALLER_CYCLE_NOTE.format(format_length(smallest, 2))

@@ -90,7 +90,7 @@ def _warn_of_single_points(run) -> list[str]:
 
 
 def _is_single_point(run, face: Face) -> bool:
-    """Return whether an interface moves exactly like a single point.
+    """Return whether an interface has the motion of a single point with the same load.
 
     It does if its pieces are rigid in shear, its load is constant, and the pressure moves with the upper piece.
     """

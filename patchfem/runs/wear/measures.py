@@ -106,7 +106,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
 
 
 def _note_on_worn_through_coating(model, evolved) -> list[str]:
-    """Return a list with a note on the coating that is worn through, and where it is.
+    """Return the note on the coating that is worn through and on the place of the deepest wear.
 
     `evolved` is the `WornPatch` at the end of the wear.
     """

@@ -357,6 +357,7 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
+
     # Method harmonic computes a period with the engine hybrid, so that it has the limits of this engine too.
     feature = limits["harmonic"]
     if not feature and limits["hybrid"]:
