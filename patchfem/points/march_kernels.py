@@ -33,7 +33,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
-from ..friction.bonds.point_kernels import bond_mean
+from . import bonds_kernels as bonds
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
@@ -71,6 +71,7 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
 STALLED = 1e3
 LISTS_STALLED = 1e5
+LIST_DAMPING = 0.0625  # weight of the change of a shear increment for lists, whose forces jump
 MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
 INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
@@ -113,6 +114,15 @@ def solve_linear(matrix, vector, n):
     for k in range(n):
         vector[k] /= matrix[k, k]
     return True
+
+
+@njit(**NJIT_CALL)
+def sum_entries(row):
+    """Return the sum of the entries of an array."""
+    total = 0.0
+    for j in range(row.size):
+        total += row[j]
+    return total
 
 
 @njit(**NJIT_CALL)
@@ -304,23 +314,21 @@ def write_forces(system, level, dt):
         slide *= flank[Flank.RATIO] if flank.size and p == 0 else 1.0
         for j in range(points.first[p], points.first[p + 1]):
             values[Point.SLIDE, j] = slide
-    if points.stiffness.size:
-        for j in range(count):
-            values[Point.SLIDE, j] -= sum_products(points.shapes[:, j], points.shear[Shear.TRIAL])
+    slides = values[Point.SLIDE, :count]
+    for k in range(points.stiffness.size):
+        shape = points.shapes[k]
+        increment = points.shear[Shear.TRIAL, k]
+        for j in range(slides.size):
+            slides[j] -= shape[j] * increment
 
     write_point_forces(system, level, dt)
 
     for p in range(n_ports):
-        force = 0.0
-        by_slide = 0.0
-        by_velocity = 0.0
-        for j in range(points.first[p], points.first[p + 1]):
-            force += values[Point.FORCE, j]
-            by_slide += values[Point.BY_SLIDE, j]
-            by_velocity += values[Point.BY_VELOCITY, j]
-        moves[Port.SUM, p] = force
-        moves[Port.BY_SLIDE, p] = by_slide
-        moves[Port.BY_VELOCITY, p] = by_velocity
+        first = points.first[p]
+        end = points.first[p + 1]
+        moves[Port.SUM, p] = sum_entries(values[Point.FORCE, first:end])
+        moves[Port.BY_SLIDE, p] = sum_entries(values[Point.BY_SLIDE, first:end])
+        moves[Port.BY_VELOCITY, p] = sum_entries(values[Point.BY_VELOCITY, first:end])
 
     # On a flank, F = V t + r f and dF/dq = K + r^2 df/ds with the ratio r of path to displacement.
     if flank.size:
@@ -352,21 +360,13 @@ def write_point_forces(system, level, dt):
     ports = system.ports
     points = system.points
     values = points.values
+    if system.options.has_only_bonds and bonds.are_paths_short(points):
+        bonds.write_means(points)
+        return
 
     for j in range(points.port.size):
         if points.numbers[0, j] == Law.LIST:
             lists.write_list_mean(points.numbers, values, system.lists, j, dt)
-            continue
-
-        # Bonds depend on the slide alone; without the step of other laws a patch takes a tenth less time.
-        if points.numbers[0, j] == Law.BONDS:
-            trial = points.trial[:, j]
-            slide = values[Point.SLIDE, j]
-            bonds = bond_mean(trial[1], trial[2], slide, values[Point.LOAD, j], trial[4])
-            stiffness = points.numbers[1, j] / points.numbers[2, j]
-            values[Point.FORCE, j] = stiffness * bonds.mean
-            values[Point.BY_SLIDE, j] = stiffness * bonds.slope
-            values[Point.BY_VELOCITY, j] = 0.0
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
@@ -451,7 +451,7 @@ def write_residual(system, level, dt):
 
     # kappa (b + db/2) = shapes^T f, with a damped change of db.
     shear = points.shear
-    damping = system.options.damping
+    damping = LIST_DAMPING * system.options.has_lists
     forces = points.values[Point.FORCE, : points.port.size]
     for k in range(points.stiffness.size):
         increment = shear[Shear.TRIAL, k]
@@ -500,6 +500,7 @@ def write_matrix(system, level):
     # All points that share shear coordinates act on the port of the first one. The residual of a coordinate has
     # kappa (b + db/2) and the damping of Newton's change of db.
     slopes = points.values[Point.BY_SLIDE, :n_points]
+    damping = LIST_DAMPING * system.options.has_lists
     for k in range(points.stiffness.size):
         row = n_ports + k
         p = points.port[0]
@@ -508,7 +509,7 @@ def write_matrix(system, level):
         for l in range(k + 1):
             total = sum_triples(points.shapes[k], points.shapes[l], slopes)
             matrix[row, n_ports + l] = matrix[n_ports + l, row] = total
-        matrix[row, row] += points.stiffness[k] * (0.5 + system.options.damping)
+        matrix[row, row] += points.stiffness[k] * (0.5 + damping)
         matrix[p, row] = -ratio * slope
         for q in range(n_ports):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
@@ -940,7 +941,10 @@ def commit(system, dt):
     # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
     is_any_held = False
-    for j in range(count):
+    is_short = options.has_only_bonds and bonds.are_paths_short(points)
+    if is_short:
+        bonds.advance_all(points)
+    for j in range(0 if is_short else count):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
         values[Point.TOTAL, j] += slide
@@ -959,16 +963,16 @@ def commit(system, dt):
             step = Step(slide, dt, v0, v1, 0.0)
             advance(points.numbers, points.trial, j, values[Point.LOAD, j], step)
 
-        # The second half of the change of load acts after the slide.
-        if options.has_loads:
-            if points.node[j] == LOWER:
-                # Bonds keep the pressure under which they formed until their point leaves the pressed area.
-                if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
-                    points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
-            elif points.numbers[0, j] != Law.LIST:
-                middle = values[Point.LOAD, j]
-                press(points.numbers, points.trial, j, middle, values[Point.END_LOAD, j])
-            values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
+    # The second half of the change of load acts after the slide.
+    for j in range(count if options.has_loads else 0):
+        if points.node[j] == LOWER:
+            # Bonds keep the pressure under which they formed until their point leaves the pressed area.
+            if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
+                points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
+        elif points.numbers[0, j] != Law.LIST:
+            middle = values[Point.LOAD, j]
+            press(points.numbers, points.trial, j, middle, values[Point.END_LOAD, j])
+        values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
 
     copy_memory(points.numbers, points.trial, points.memory)
 
@@ -1382,7 +1386,14 @@ def write_sample(system, row, sample):
     # Stored energy of pieces and points, and force and slip of each port.
     for k in range(points.stiffness.size):
         energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
-    for j in range(points.port.size):
+    if system.options.has_only_bonds:
+        for p in range(n_ports):
+            sums = bonds.read_port(points, points.first[p], points.first[p + 1])
+            sample[first + N_PORT_COLUMNS * p] = sums.force
+            sample[first + N_PORT_COLUMNS * p + 1] = sums.slip
+            ports.vector[p] = sums.weight
+            energy += sums.energy
+    for j in range(0 if system.options.has_only_bonds else points.port.size):
         p = points.port[j]
         load = points.values[Point.END_LOAD, j]
         state = read_point(system, j)

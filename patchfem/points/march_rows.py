@@ -256,18 +256,18 @@ class Options(NamedTuple):
 
     - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
     - scale: force [N] to whose 1e-11 part a step is solved
-    - damping: weight of the change of a shear increment
     - has_events, has_lists, has_loads: 1 if points have laws without memory, lists of bonds, or loads that change
+    - has_only_bonds: 1 if all points have bonds whose length does not grow, see `bonds_kernels`
     """
 
     mass: float
     step: float
     travel: float
     scale: float
-    damping: float
     has_events: int
     has_lists: int
     has_loads: int
+    has_only_bonds: int
 
 
 class System(NamedTuple):

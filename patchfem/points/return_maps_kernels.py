@@ -126,7 +126,9 @@ def mean_force(numbers, memory, j, load, step):
         slope = 0.5 * memory[1, j] / numbers[2, j] * moved.end * moved.end
         return _end_path(numbers[1, j] * moved.mean, numbers[1, j] * slope, dq)
     if law == Law.BONDS:
-        mean, slope = bond_mean(memory[1, j], memory[2, j], dq, load, memory[4, j])
+        eps = memory[4, j]
+        shapes = shape_functions(abs(dq) / eps)
+        mean, slope = bond_mean(memory[1, j], memory[2, j], dq, load, eps, shapes)
         stiffness = numbers[1, j] / numbers[2, j]
         return _end_path(stiffness * mean, stiffness * slope, dq)
     if law == Law.COULOMB:
@@ -518,7 +520,9 @@ def advance(numbers, memory, j, load, step):
 
     elif law == Law.BONDS:
         # Moments of the bonds after the increment; growing bonds then get their new length (eq. 2.10).
-        bonds = bond_step(memory[1, j], memory[2, j], memory[3, j], dq, load, memory[4, j])
+        eps = memory[4, j]
+        bonds = memory[1, j], memory[2, j], memory[3, j]
+        bonds = bond_step(bonds, dq, load, eps, shape_functions(abs(dq) / eps))
         memory[1, j] = bonds.m
         memory[2, j] = bonds.z
         memory[3, j] = bonds.s2

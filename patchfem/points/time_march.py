@@ -17,7 +17,7 @@ from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
 from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
-from ..motion_measures import find_extremes
+from ..motion_measures import find_reversal_steps
 from ..structure.histories import INTERFACE_HISTORIES, find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
@@ -52,7 +52,6 @@ EVENT_LEVELS = (
     20  # lengths of the steps with laws without memory: whole steps and nineteen halvings
 )
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
-LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of the strongest port at rest if ports outnumber the modes
 MIN_STRENGTH = 0.01  # smallest strength by which ports share a force, relative to the strongest
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
@@ -313,16 +312,15 @@ def make_system(
         *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
     )
 
-    has_lists = Law.LIST in laws
     options = Options(
         mass,
         float(step),
         float(travel),
         max(float(contact.limit), 1e-300),
-        LIST_DAMPING if has_lists else 0.0,
         int(has_events),
-        int(has_lists),
+        int(Law.LIST in laws),
         int(contact.has_loads),
+        int(laws == {Law.BONDS} and (points.numbers[3] < 0).all()),
     )
 
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
@@ -1094,14 +1092,18 @@ class Record:
         # may be a part of a cycle.
         output = samples[:, : n // 2] @ run.modes.output
         speed = samples[:, n // 2 : n] @ run.modes.output
-        for begin in range(0, max(count, 1), run.steps):
-            end = min(begin + run.steps, count)
-            cycle = slice(begin, end + 1)
-            time = run.step * np.arange(end + 1 - begin)
-            self.extremes.append(find_extremes(time, output[cycle], speed[cycle]))
-            phase = (first + np.arange(begin, end)) % run.steps / run.steps
-            phasor = output[begin:end] @ np.exp(-2j * np.pi * phase)
-            self.phasors.append(2 / max(end - begin, 1) * phasor)
+        begins = np.arange(0, max(count, 1), run.steps)
+        ends = np.minimum(begins + run.steps, count)
+        reversals = find_reversal_steps(np.arange(count + 1.0), output, run.step * speed)
+        extremes = []
+        for extreme in (np.minimum, np.maximum):
+            values = extreme(extreme.reduceat(output, begins), output[ends])
+            extreme.at(values, reversals.step // run.steps, reversals.position)
+            extremes.append(values)
+        self.extremes.extend(np.transpose(extremes))
+        phase = (first + np.arange(max(count, 1))) % run.steps / run.steps
+        sums = np.add.reduceat(output[: phase.size] * np.exp(-2j * np.pi * phase), begins)
+        self.phasors.extend(2 * (ends > begins) / np.maximum(ends - begins, 1) * sums)
 
     def _keep(self, part: np.ndarray) -> None:
         """Add a part to the rows that are kept.

@@ -1,6 +1,7 @@
 """A chart with its data in display units, which plotly.js or matplotlib draws."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -137,12 +138,14 @@ def select_curve_points(values: np.ndarray, count: int = MAX_CURVE_INTERVALS) ->
     """
     if values.size <= 2 * count:
         return np.arange(values.size)
+    # An unknown value is no extreme.
+    low = np.where(np.isnan(values), np.inf, values)
+    high = np.where(np.isnan(values), -np.inf, values)
     edges = np.linspace(0, values.size, count + 1).astype(int)
     extremes = [0, values.size - 1]
-    for part in np.split(np.arange(values.size), edges[1:-1]):
-        # an unknown value is no extreme
-        extremes.append(part[np.nan_to_num(values[part], nan=np.inf).argmin()])
-        extremes.append(part[np.nan_to_num(values[part], nan=-np.inf).argmax()])
+    for begin, end in pairwise(edges):
+        extremes.append(begin + low[begin:end].argmin())
+        extremes.append(begin + high[begin:end].argmax())
     return np.unique(extremes)
 
 

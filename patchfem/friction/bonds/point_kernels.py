@@ -26,14 +26,10 @@ from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from .point_rows_kernels import GROWTH
 
-# Largest paths in bond lengths for which the power series SHAPE_SERIES and MOMENT_SERIES are exact to round-off
-MAX_SERIES_PATH = 0.15
-MAX_SHORT_PATH = 0.5
-# Coefficients of the series of (exp(-x) - 1 + x)/x^2 in powers of -x
-SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(10)])
-# Coefficients of the series of the integral of y^3 exp(-y) from 0 to x, divided by x^4, in powers
-# of -x
-MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
+# Largest path in bond lengths for which the power series SHAPE_SERIES is used; it is exact to round-off there
+MAX_SERIES_PATH = 1.0
+# Coefficients of the series of (1 - x + x^2/2 - exp(-x))/x^3 in powers of -x
+SHAPE_SERIES = np.array([1 / factorial(k + 3) for k in range(16)])
 MAX_GROWTH_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
 # Largest relative difference of the speeds at the ends of a step for which their mean determines the growth; it avoids
 # cancellation
@@ -41,11 +37,17 @@ GROWTH_SPEED_TOL = 1e-6
 
 
 class ShapeFunctions(NamedTuple):
-    """Shape functions f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x and decay = exp(-x) of a path x."""
+    """Shape functions of a path x in bond lengths.
+
+    - f1, f2: (1 - exp(-x))/x and (1 - f1)/x
+    - decay: exp(-x)
+    - square: integral of y^2 exp(-y) from 0 to x
+    """
 
     f1: float
     f2: float
     decay: float
+    square: float
 
 
 class MeanStretch(NamedTuple):
@@ -75,38 +77,29 @@ class GrownLength(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _sum_series(coefficients, x):
-    """Return the sum of coefficients[k] (-x)^k by Horner's rule."""
-    total = 0.0
-    for k in range(coefficients.size - 1, -1, -1):
-        total = coefficients[k] - x * total
-    return total
+def shape_series(x):
+    """Return the shape functions of a path x from 0 to `MAX_SERIES_PATH` in bond lengths, without cancellation."""
+    # With f3 = (1/2 - f2)/x by Horner's rule, the other functions follow without a division.
+    f3 = 0.0
+    for k in range(SHAPE_SERIES.size - 1, -1, -1):
+        f3 = SHAPE_SERIES[k] - x * f3
+    f2 = 0.5 - x * f3
+    f1 = 1 - x * f2
+    return ShapeFunctions(f1, f2, 1 - x * f1, x * x * x * (f3 * (2 + 2 * x + x * x) - 0.5 * x))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shape_functions(x):
-    """Return the shape functions of a path x >= 0 in bond lengths, without cancellation; 6 ns."""
+    """Return the shape functions of a path x >= 0 in bond lengths, without cancellation."""
     if x < MAX_SERIES_PATH:
-        f2 = _sum_series(SHAPE_SERIES, x)
-        f1 = 1 - x * f2
-        return ShapeFunctions(f1, f2, 1 - x * f1)
+        return shape_series(x)
     decay = exp(-x)
     f1 = (1 - decay) / x
-    return ShapeFunctions(f1, (1 - f1) / x, decay)
+    return ShapeFunctions(f1, (1 - f1) / x, decay, 2 - decay * (x * x + 2 * x + 2))
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _integrate_square(x, decay):
-    """Return the integral of y^2 exp(-y) from 0 to x; decay = exp(-x)."""
-    if x < MAX_SHORT_PATH:
-        # By parts from the integral of y^3 exp(-y), without the cancellation of nearly equal numbers.
-        cubic = x**4 * _sum_series(MOMENT_SERIES, x)
-        return (cubic + x * x * x * decay) / 3
-    return 2 - decay * (x * x + 2 * x + 2)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_mean(m, z, increment, sigma, eps):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def bond_mean(m, z, increment, sigma, eps, shapes):
     """Return the stretch of the bonds of a point, averaged over the path of an increment.
 
     Parameters
@@ -115,48 +108,50 @@ def bond_mean(m, z, increment, sigma, eps):
         Sums over the bonds before the increment [Pa], [Pa m].
     increment, sigma, eps : float
         Increment [m], pressure [Pa] under which new bonds form, and bond length [m].
+    shapes : ShapeFunctions
+        Shape functions of the path |increment|/eps.
 
     Returns
     -------
     MeanStretch
     """
     x = abs(increment) / eps
-    f1, f2, _ = shape_functions(x)
+    f1 = shapes.f1
+    f2 = shapes.f2
     direction = 1.0 if increment > 0 else -1.0
     density_deficit = sigma - m
-    mean = z * f1 + direction * eps * x * (sigma * f2 - density_deficit * (f1 - f2))
+    mean = z * f1 + increment * (sigma * f2 - density_deficit * (f1 - f2))
     slope = (
         direction * z * (f2 - f1) / eps + sigma * (f1 - f2) - density_deficit * (f2 - x * (f1 - f2))
     )
     return MeanStretch(mean, slope)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_step(m, z, s2, increment, sigma, eps):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def bond_step(bonds, increment, sigma, eps, shapes):
     """Advance the bonds of a contact point by an increment of displacement.
 
     Parameters
     ----------
-    m, z, s2 : float
-        Sums over the bonds before the increment [Pa], [Pa m], [Pa m2].
+    bonds : (float, float, float)
+        Sums m [Pa], z [Pa m] and s2 [Pa m2] over the bonds before the increment.
     increment, sigma, eps : float
         Increment [m], pressure [Pa] under which new bonds form, and bond length [m].
+    shapes : ShapeFunctions
+        Shape functions of the path |increment|/eps.
 
     Returns
     -------
     BondMoments
     """
-    path = abs(increment)
-    x = path / eps
-    f1, _, decay = shape_functions(x)
-    square = _integrate_square(x, decay)
-    direction = 1.0 if increment > 0 else -1.0
+    m, z, s2 = bonds
+    decay = shapes.decay
     density_deficit = sigma - m
-    stretched = s2 + 2 * direction * z * path + m * path * path
+    stretched = s2 + 2 * z * increment + m * increment * increment
     return BondMoments(
         sigma - density_deficit * decay,
-        z * decay + direction * eps * (sigma * x * f1 - density_deficit * x * decay),
-        decay * stretched + sigma * eps * eps * square,
+        z * decay + increment * (sigma * shapes.f1 - density_deficit * decay),
+        decay * stretched + sigma * eps * eps * shapes.square,
     )
 
 
