@@ -94,7 +94,7 @@ def compute_centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     out = np.empty((len(u), cells.is_coating.size, 4))
     for frame, motion in zip(out, u):
         strains = [
-            points.strain(motion[nodes])[..., 0]
+            points.strain(np.take(motion, nodes, axis=0))[..., 0]
             for points, nodes in zip(centres, cells.groups.values())
         ]
         frame[:] = compute_stress(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
@@ -308,30 +308,29 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
         # The same components from the stresses at the centres, recovered at the corners of the cells
         xx, yy, _, xy = stress[frame].T
         at_centres = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear], axis=1)
-        recovered = recovery(at_centres)[recovery.recovery_point]
+        recovered = recovery(at_centres).T[:, recovery.recovery_point]
         first_cell = first_corner = 0
         for (kind, nodes), points in zip(cells.groups.items(), gauss_points):
             # Recovered components of the cells of one element, interpolated to the Gauss points
             n_corners = ELEMENTS[kind].n_corners
             part = slice(first_cell, first_cell + len(nodes))
-            at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
+            end_corner = first_corner + n_corners * len(nodes)
+            at_corners = recovered[:, first_corner:end_corner].reshape(3, len(nodes), n_corners)
             first_cell = part.stop
-            first_corner = first_corner + len(at_corners)
+            first_corner = end_corner
             shape = ELEMENTS_BY_CORNERS[n_corners].evaluate(ELEMENTS[kind].gauss).values
-            at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
+            at_points = at_corners @ shape.T
 
             # Squared difference from the computed components, integrated over each cell
-            exx, eyy, exy = points.strain(motion[nodes])
+            exx, eyy, exy = points.strain(np.take(motion, nodes, axis=0))
             computed = np.stack(
                 [
                     bulk[part, None] * (exx + eyy),
                     shear[part, None] * (exx - eyy),
                     shear[part, None] * 2 * exy,
-                ],
-                axis=-1,
+                ]
             )
-            energy[frame] += (points.weights[..., None] * computed**2).sum()
-            error[frame, part] = (points.weights[..., None] * (at_points - computed) ** 2).sum(
-                axis=(1, 2)
-            )
+            energy[frame] += np.vdot(points.weights, (computed**2).sum(axis=0))
+            squares = ((at_points - computed) ** 2).sum(axis=0)
+            error[frame, part] = (points.weights * squares).sum(axis=1)
     return StressError(frozen_array(error), frozen_array(energy))
