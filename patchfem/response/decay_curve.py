@@ -38,6 +38,8 @@ PERIOD_START_TOL = 1e-9  # Round-off of a period by which a sample may lie befor
 # Largest motion between two reversals, relative to the range in one period, that is attributed to a
 # faster mode.
 MAX_RIPPLE_RATIO = 0.25
+# Shortest last half cycle relative to the one before it; a shorter one ends at a ripple of a faster mode.
+MIN_HALF_DURATION = 0.75
 CURVE_END_TOL = 1e-6  # Relative distance by which a curve is extrapolated beyond its ends.
 
 
@@ -129,10 +131,11 @@ def locate_reversals(time, position, speed) -> ArrayPair:
 
 
 def measure_last_cycle_amplitude(time, position, speed, period: float) -> float | None:
-    """Return half the peak-to-peak value [m] of the last complete cycle of a motion.
+    """Return half the peak-to-peak value [m] of the last whole cycle of a motion, which three turns bound.
 
-    A cycle has three reversals. Motions between reversals that are smaller than MAX_RIPPLE_RATIO times the range
-    in the last period are attributed to a faster mode and ignored.
+    Motions between reversals that are smaller than MAX_RIPPLE_RATIO times the range in the last period are attributed
+    to a faster mode and ignored. The last turn may be such a ripple on the way to the next one; it counts if the half
+    cycle before it has lasted at least MIN_HALF_DURATION times as long as the previous one.
 
     Parameters
     ----------
@@ -144,23 +147,43 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     Returns
     -------
     float or None
-        Half the range in the last period if the motion is at rest there; None if it has fewer than
-        three reversals.
+        Half the range in the last period if the motion is at rest there; None if it has too few turns.
     """
     last_range = float(np.ptp(position[time >= time[-1] - period * (1 + PERIOD_START_TOL)]))
     if last_range <= MIN_HALF_CYCLE_RATIO * np.ptp(position):
         return last_range / 2
-    # Turning points backwards from the end of the motion, where the first one is not a reversal.
-    turns = [float(position[-1])]
-    for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
-        goes_on = len(turns) > 1 and (reversal - turns[-1]) * (turns[-1] - turns[-2]) > 0
-        if goes_on:
-            turns[-1] = reversal
-        elif abs(reversal - turns[-1]) > MAX_RIPPLE_RATIO * last_range:
-            turns.append(reversal)
-        if len(turns) == 5:
-            return float(np.abs(np.diff(turns[1:4])).max()) / 2
-    return None
+    times, places = locate_reversals(time, position, speed)
+    turns = _find_last_turns(places, MAX_RIPPLE_RATIO * last_range)
+    if len(turns) < 3:
+        return None
+    durations = -np.diff(times[turns])
+    first = 0 if durations[0] >= MIN_HALF_DURATION * durations[1] else 1
+    if len(turns) < first + 3:
+        return None
+    return float(np.abs(np.diff(places[turns[first : first + 3]])).max()) / 2
+
+
+def _find_last_turns(places, ripple: float) -> list[int]:
+    """Return the indices of the last four turns, the last one first, of reversals at `places` (k,) [m]; fewer if there are.
+
+    Between successive turns, which are minima and maxima in turn, the motion exceeds the `ripple` [m].
+    """
+    turns = []
+    low = high = places.size - 1
+    for k in range(places.size - 1, -1, -1):
+        if not turns:
+            # The last turn is known once the motion before it exceeds the ripple.
+            low = k if places[k] < places[low] else low
+            high = k if places[k] > places[high] else high
+            if places[high] - places[low] > ripple:
+                turns = [max(low, high), min(low, high)]
+        elif (places[k] - places[turns[-1]]) * (places[turns[-1]] - places[turns[-2]]) > 0:
+            turns[-1] = k
+        elif abs(places[k] - places[turns[-1]]) > ripple:
+            if len(turns) == 4:
+                break
+            turns.append(k)
+    return turns
 
 
 def make_half_cycles(times, positions) -> HalfCycles:

@@ -247,7 +247,8 @@ MOTION_MEASURE_ROWS = (
         1e-10,
         "half the peak-to-peak displacement at the output, relative to "
         "the base; of a release, that of the last whole cycle of the "
-        "motion, from a reversal to the second reversal after it",
+        "motion, from a reversal to the second reversal after it, without "
+        "ripples below a quarter of the range in the last period",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2,
         flags="main level curve displacement",
     ),

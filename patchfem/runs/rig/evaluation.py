@@ -135,7 +135,8 @@ class RunEvaluator:
 
         # The amplitude of a decay is that of its last complete cycle, not of the whole window.
         if model.rig.drive.kind == "free":
-            motion = (window.time, window.output, window.output_rate)
+            # It may begin before the window.
+            motion = (run.response.time, run.response.output, run.response.output_rate)
             amplitude = measure_last_cycle_amplitude(*motion, drive.period)
             if amplitude is not None:
                 values[AMPLITUDE] = amplitude
