@@ -22,7 +22,7 @@ from .event_kernels import (
     hold_or_release,
     start_directions,
 )
-from .motion_kernels import copy_values, find_integrals, find_rates, look, project
+from .motion_kernels import copy_values, find_integrals, find_rates, look, project, rests
 from .records import (
     N_FACE_INTEGRALS,
     WINDOW_START,
@@ -56,6 +56,9 @@ MIN_SEEN = 1e-6  # fraction of a cycle before which an end of motion belongs to 
 MIN_SPEED_FRACTION = 0.9  # part of a step before a `Margin.SPEED` below which the step is repeated
 SPEED_STEP_RATIO = 1.02  # length of the repeated step relative to that part
 MAX_EMPTY_STEPS = 100  # events in a row without progress
+# Events in a row without progress after which the error of a step hides whether an interface rests at its limit or slips.
+# It then rests for a step.
+MAX_UNDECIDED = 20
 MIN_PROGRESS = 1e-13  # fraction of a step that counts as progress
 MIN_STEP = 1e-15  # relative to the end of the run
 REJECTED_FACTOR = 0.1  # ratio of steps after one without a finite error
@@ -190,6 +193,7 @@ def advance(rig, state, record, t_end, cycle):
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]
     n_empty = 0
+    undecided = -1
 
     # A pass is a step of length h, or its part up to the first event.
     while clock[Clock.TIME] < t_end:
@@ -209,9 +213,18 @@ def advance(rig, state, record, t_end, cycle):
             continue
 
         # The part of the step up to its first event is the motion.
-        event = find_event(rig, state)
+        event = find_event(rig, state, undecided)
         fraction = event.fraction
         face = event.face
+        if (
+            n_empty > MAX_UNDECIDED
+            and fraction <= MIN_PROGRESS
+            and event.which == Margin.MOTION
+            and rests(state.memory[face])
+        ):
+            undecided = face
+            n_empty += 1
+            continue
         if event.which == Margin.SPEED and MIN_PROGRESS < fraction < MIN_SPEED_FRACTION:
             # The force changes steeply on one side of this speed. The error of a step with stages far on the other side
             # does not say how exact its dense output is up to the event.
@@ -249,6 +262,7 @@ def advance(rig, state, record, t_end, cycle):
 
         # The interface of the event changes its regime.
         n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
+        undecided = -1 if n_empty == 0 else undecided
         if event.which == Margin.SPEED:
             # The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
             clock[Clock.IS_SMOOTH] = 0.0

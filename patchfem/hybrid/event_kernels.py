@@ -301,10 +301,19 @@ def find_vertex(a, b, c):
 
 
 @njit(**NJIT_KERNEL)
-def find_event(rig, state):
+def find_event(rig, state, undecided):
     """Return the first event of a step: the fraction at which a margin first becomes negative, with its interface.
 
     Row 0 of the margins is that of the start of the step.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    undecided : int
+        Number of an interface that stays in its regime of motion for this step, or -1.
     """
     event = StepEvent(1.0, -1, -1)
     n_faces = rig.faces.shape[0]
@@ -328,7 +337,8 @@ def find_event(rig, state):
                         left = (check - 2 + int(vertex)) / N_CHECKS
                         is_negative = find_value(rig, state, right, i, k) < -MARGIN_TOL
 
-                if is_negative and left < event.fraction:
+                stays = i == undecided and k == Margin.MOTION
+                if is_negative and not stays and left < event.fraction:
                     root = find_margin_root(rig, state, i, k, left, right)
                     if event.face < 0 or root < event.fraction:
                         event = StepEvent(root, i, k)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hybrid_cases import coulomb, make_modes, make_oscillator
 
+import patchfem as pf
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import masing
 from patchfem.hybrid.records import Clock, LawNumbers, Memory, Status
@@ -12,6 +13,44 @@ AMPLITUDE = "relative_displacement_amplitude"
 COULOMB_AMPLITUDE = (
     0.28704671337871602595  # of the oscillator at resonance with friction of 0.8 of the drive
 )
+
+CREEPING_CHAIN = """[structure]
+masses = ["0.302881102 kg", "1.21508789 kg", "0.829137849 kg"]
+output_mass = 3
+[[structure.spring]]
+between = [1, 0]
+stiffness = "138625.485 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "912283.026 N/m"
+[[structure.spring]]
+between = [3, 2]
+stiffness = "313774.042 N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "4.3103431 N s/m"
+[[structure.damper]]
+between = [2, 1]
+coefficient = "27.168485 N s/m"
+[[structure.damper]]
+between = [3, 2]
+coefficient = "26.1201325 N s/m"
+[[structure.interface]]
+between = [2, 0]
+load = "3.54730331 N"
+law = "coulomb"
+static = 0.239760744
+[[structure.interface]]
+between = [3, 0]
+load = "40.9564172 N"
+law = "tanh"
+static = 0.259552615
+reference_speed = "0.00373677567 m/s"
+[drive]
+kind = "free"
+cycles = 28
+displacement = "0.000796542134 m"
+"""
 
 
 def make_rig_case(laws, loads, slides, omegas, *, zeta=0.005, cycles=20, **options):
@@ -120,6 +159,18 @@ def test_chatter_of_many_interfaces_on_many_modes():
     forces = motion.event_rows[:, 1 + case.y.size :][:, :8]
     assert np.abs(forces).max() <= 0.05 * (1 + 1e-6)
     assert len(forces) > 100
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
+def test_a_block_that_creeps_at_its_limit_is_not_refused(tolerance):
+    """A regularised interface that creeps keeps a rigid one at its limit, where the error of a step hides rest or slip.
+
+    The comparison run found no progress and the answer was lost. The work is that of an independent DOP853 with events.
+    """
+    result = pf.run(CREEPING_CHAIN + f"[accuracy]\ntolerance = {tolerance}")
+    work = result.measures["friction_work"]
+    assert work.value == pytest.approx(48.4924e-3, abs=1e-7)
+    assert work.error < 1e-7
 
 
 def test_forty_modes():
