@@ -12,7 +12,17 @@ from .. import compiled
 from ..core import NotConverged
 from .cases import Case, make_arrays
 from .laws import LAWS, masing
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State, Status
+from .records import (
+    N_FACE_INTEGRALS,
+    N_INTEGRALS,
+    Clock,
+    Cycle,
+    Face,
+    Memory,
+    Setting,
+    State,
+    Status,
+)
 from .runs import MESSAGES, Motion, run_case
 
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
@@ -207,7 +217,13 @@ def _measure_growth(case: Case) -> _Growth:
 
 
 class Shooting:
-    """State of a motion at the start of a period, and its map."""
+    """State of a motion at the start of a period, and its map.
+
+    The periods of a search are not measured, which takes more than half of the time of a period; a class whose map needs
+    the measures of a period sets `measures_periods`.
+    """
+
+    measures_periods = False
 
     def __init__(self, case: Case):
         settings = case.rig.settings
@@ -247,6 +263,8 @@ class Shooting:
         state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
         state.clock[Clock.N_STEPS] = self.n_steps
         self.record = make_arrays(self.case)[1]
+        if not self.measures_periods:
+            self.record.cycles[:, Cycle.WINDOW] = -1.0
         compiled.load_compiled_module("hybrid.engine_kernels").run_case(
             self.case.rig, state, self.record
         )

@@ -6,7 +6,7 @@ from hybrid_cases import coulomb, make_oscillator
 
 from patchfem.hybrid import runs
 from patchfem.hybrid.laws import masing
-from patchfem.hybrid.periodic import find_periodic_motion
+from patchfem.hybrid.periodic import Shooting, find_periodic_motion
 from patchfem.hybrid.records import LawNumbers, Memory, Probe
 
 AMPLITUDE = "relative_displacement_amplitude"
@@ -66,6 +66,16 @@ def test_elements_slip_in_no_direction_while_all_of_them_stick():
     sticks = np.abs(force) < 0.8 * (1 - 1e-6)
     assert 10 < sticks.sum() < 390 and not direction[sticks].any()
     assert np.array_equal(direction[~sticks], np.sign(force[~sticks]))
+
+
+def test_only_the_periodic_motion_is_measured():
+    """The periods of a search are not measured, which takes more time than their steps; the motion at its end is."""
+    case = make_oscillator(LAWS["elastic"], acceleration=0.95, zeta=0.01, cycles=1, rtol=1e-9)
+    shooting = Shooting(case)
+    shooting.relax(2)
+    assert not shooting.record.integrals.any() and np.isinf(shooting.record.extremes).all()
+    run = find_periodic_motion(case).run
+    assert run.record.integrals.any() and np.isfinite(run.record.extremes).all()
 
 
 def test_multipliers_of_a_linear_rig():
