@@ -309,7 +309,6 @@ class PeriodEquations:
             error,
             self.tolerance,
             multipliers[np.argsort(-np.abs(multipliers))],
-            shooting.period,
             shooting.n_periods,
         )
 
