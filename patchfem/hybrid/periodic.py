@@ -12,7 +12,17 @@ from .. import compiled
 from ..core import NotConverged
 from .cases import Case, make_arrays
 from .laws import LAWS, masing
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Setting, State, Status
+from .records import (
+    N_FACE_INTEGRALS,
+    N_INTEGRALS,
+    Clock,
+    Cycle,
+    Face,
+    Memory,
+    Setting,
+    State,
+    Status,
+)
 from .runs import MESSAGES, Motion, run_case
 
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
@@ -50,6 +60,12 @@ SEARCH_STEPS_RATIO = (
 # Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
 # are used again. The ratio is about the relative change of the derivatives.
 MAX_REMAINDER = 1e-3
+# The same for a motion that is followed from a similar one. Further corrections with these derivatives take a period each,
+# new derivatives take one for each unknown.
+MAX_FOLLOWED_REMAINDER = 0.1
+MAX_CORRECTIONS = 8  # corrections of such a motion
+# Memory of the laws that tells which reversal points the derivatives of a period belong to
+FOLLOWED_MEMORY = [Memory.DIRECTION, Memory.CONTACT, Memory.COUNT]
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
@@ -62,9 +78,9 @@ class PeriodicMotion(NamedTuple):
     - error: distance of the state from that of the periodic motion, relative to its scale
     - tolerance: largest change at which the motion counts as periodic
     - multipliers: Floquet multipliers; without those of states that a period determines alone
-    - period: [s]
     - n_periods: number of periods that were computed
     - grows: whether the motion from the start grows for ever, so that none is periodic
+    - map: derivatives of the map of a period near the motion, None if the last correction had none
     """
 
     run: Motion
@@ -72,9 +88,14 @@ class PeriodicMotion(NamedTuple):
     error: float
     tolerance: float
     multipliers: np.ndarray
-    period: float
     n_periods: int
     grows: bool = False
+    map: "_Map | None" = None
+
+    @property
+    def period(self) -> float:
+        """Duration of a period [s]."""
+        return float(self.run.case.rig.settings[Setting.PERIOD])
 
     @property
     def is_stable(self) -> bool:
@@ -129,7 +150,7 @@ def find_periodic_motion(
             shooting.relax(1)
             change = shooting.measure_change(before)
             run = run_case(shooting.case)
-            motion = PeriodicMotion(run, change, np.inf, 0.0, np.zeros(0), shooting.period, 1)
+            motion = PeriodicMotion(run, change, np.inf, 0.0, np.zeros(0), 1)
 
     # A periodic motion far beyond the growing one is never reached.
     has_converged = motion.change < motion.tolerance
@@ -178,7 +199,61 @@ def _search(
     # The measures are those of a period from there on.
     run = run_case(shooting.case, start=before)
     return PeriodicMotion(
-        run, change, error, tolerance, multipliers, shooting.period, shooting.n_periods
+        run,
+        change,
+        error,
+        tolerance,
+        multipliers,
+        shooting.n_periods,
+        map=shooting.map,
+    )
+
+
+def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
+    """Find the periodic motion of a case from that of a similar case, without its stability and the error of its state.
+
+    The derivatives of the similar motion serve as long as the corrections with them converge, so that the motion after a
+    small change of the case takes four periods. A fit computes its motions in this way.
+
+    Parameters
+    ----------
+    case : Case
+        Its start and schedule are not used.
+    near : PeriodicMotion
+        Motion of a similar case, in which no motion grows for ever.
+
+    Returns
+    -------
+    PeriodicMotion
+        A change of MAX_KINKED_CHANGE over its period counts as none, because an interface that hardly slips comes to rest
+        only after hundreds of periods. It is larger if the similar motion is too far away.
+    """
+    shooting = _FollowedShooting(case)
+    shooting.state = near.run.final
+    shooting.map = near.map
+    shooting.relax(1)
+    before, change = shooting.approach(MAX_CHANGE * float(case.rig.settings[Setting.RTOL]))
+
+    # The period that is measured begins one more correction nearer to the motion, if that helps.
+    run = None
+    if shooting.serves(before):
+        shooting.correct(before)
+        nearer = shooting.state
+        run = run_case(shooting.case, start=nearer)
+        shooting.state = run.final
+        nearer_change = shooting.measure_change(nearer)
+        if nearer_change < change and shooting.has_same_regime(nearer):
+            change = nearer_change
+        else:
+            run = None
+    return PeriodicMotion(
+        run or run_case(shooting.case, start=before),
+        change,
+        np.inf,
+        MAX_KINKED_CHANGE,
+        np.zeros(0),
+        shooting.n_periods,
+        map=shooting.map,
     )
 
 
@@ -207,7 +282,13 @@ def _measure_growth(case: Case) -> _Growth:
 
 
 class Shooting:
-    """State of a motion at the start of a period, and its map."""
+    """State of a motion at the start of a period, and its map.
+
+    The periods of a search are not measured, which takes more than half of the time of a period; a class whose map needs
+    the measures of a period sets `measures_periods`.
+    """
+
+    measures_periods = False
 
     def __init__(self, case: Case):
         settings = case.rig.settings
@@ -247,6 +328,8 @@ class Shooting:
         state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
         state.clock[Clock.N_STEPS] = self.n_steps
         self.record = make_arrays(self.case)[1]
+        if not self.measures_periods:
+            self.record.cycles[:, Cycle.WINDOW] = -1.0
         compiled.load_compiled_module("hybrid.engine_kernels").run_case(
             self.case.rig, state, self.record
         )
@@ -409,7 +492,7 @@ class Shooting:
                 packed[column] += self.difference * scale[k]
                 slopes[:, k] = self.find_change(self.unpack(before, packed), end)[columns]
                 slopes[:, k] /= self.difference * scale
-            self.map = _Map(columns, slopes, scale)
+            self.map = _Map(columns, slopes, scale, before.memory[:, FOLLOWED_MEMORY])
         return self.map, (end - start)[columns] / self.map.scale
 
     def find_change(self, state: State, end) -> np.ndarray:
@@ -437,17 +520,75 @@ class Shooting:
         self.state = self.unpack(self.state, packed)
 
 
+class _FollowedShooting(Shooting):
+    """Map of a period whose derivatives may be those of a similar motion.
+
+    They serve where the laws have as many reversal points as in this motion, also if a period leaves some of the unknowns
+    as they are.
+    """
+
+    def approach(self, tolerance: float) -> tuple[State, float]:
+        """Correct the state until a period changes it by less than a tolerance, or MAX_CORRECTIONS times.
+
+        Returns
+        -------
+        before : State
+            Last state at the start of a period.
+        change : float
+            Change over this period, relative to the scale of the state.
+        """
+        # The derivatives of the similar motion are used if the first change is a small part of the motion.
+        last = 1.0
+        for _ in range(MAX_CORRECTIONS + 1):
+            before = self.state
+            self.relax(1)
+            change = self.measure_change(before)
+            if change < tolerance and self.has_same_regime(before):
+                break
+            if change > MAX_FOLLOWED_REMAINDER * last:
+                self.map = None
+            last = change
+            advanced = self.state
+            self.correct(before)
+            if not self.is_possible():
+                self.state = advanced
+                self.map = None
+        return before, change
+
+    def serves(self, before: State) -> bool:
+        """Return whether there are derivatives of what a period changes from a state."""
+        return (
+            self.map is not None
+            and np.array_equal(self.map.regime, before.memory[:, FOLLOWED_MEMORY])
+            and bool(np.isin(super().find_columns(before), self.map.columns).all())
+        )
+
+    def has_same_regime(self, before: State) -> bool:
+        """Return whether the laws are in the regimes of another state, whose reversal points may be fewer.
+
+        A loop that round-off makes smaller with each period adds reversal points for ever.
+        """
+        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG]
+        return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
+
+    def find_columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state: those of the derivatives, as long as they serve."""
+        return self.map.columns if self.serves(before) else super().find_columns(before)
+
+
 class _Map(NamedTuple):
     """Linear map of a period in k scaled unknowns.
 
     - columns: (k,) indices of the unknowns in the packed state and memory
     - slopes: (k, k) derivatives of the end of the period by its start
     - scale: (k,) sizes of the unknowns, by which they are divided
+    - regime: (M, 3) memory of the laws at the start that says which reversal points they have
     """
 
     columns: np.ndarray
     slopes: np.ndarray
     scale: np.ndarray
+    regime: np.ndarray
 
     def update(self, step, change) -> "_Map":
         """Return the map that gives a step of the unknowns the change of the residual that was found (Broyden 1965).

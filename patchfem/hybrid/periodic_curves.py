@@ -54,8 +54,11 @@ class LoopShooting(Shooting):
     """Map of a period after which the laws remember the loop of this period alone.
 
     Larger motions of the past would otherwise shift the loop for ever, and the map would have a kink at each periodic
-    motion, because its reversals neither exceed those of the period before nor fall short of them.
+    motion, because its reversals neither exceed those of the period before nor fall short of them. The ends of this loop
+    are measured.
     """
+
+    measures_periods = True
 
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0."""
@@ -306,7 +309,6 @@ class PeriodEquations:
             error,
             self.tolerance,
             multipliers[np.argsort(-np.abs(multipliers))],
-            shooting.period,
             shooting.n_periods,
         )
 

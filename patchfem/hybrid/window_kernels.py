@@ -43,11 +43,37 @@ NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0]
 WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
+# Smallest slope at the end of a step, relative to the mean slope near it, at which no extreme is searched near this end
+MIN_END_SLOPE = 0.5
 MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
 EXTREME_REACH = (
     1e-3  # distance from a located extreme, as a fraction of a step, within which the velocity is 0
 )
 EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
+
+
+@njit(**NJIT_KERNEL)
+def rises_to_end(state, column, end):
+    """Return whether a probe has its extreme at an end of a step because its slope has the same sign up to there.
+
+    The slope is that of the parabola through the three points next to this end.
+
+    Parameters
+    ----------
+    state : State
+        Motion.
+    column : int
+        Column of `State.probes`.
+    end : int
+        Number of the point: the first or the last one.
+    """
+    step = 1 if end == 0 else -1
+    near = end + step
+    far = near + step
+    last = (state.probes[near, column] - state.probes[end, column]) / (NODES[near] - NODES[end])
+    before = (state.probes[far, column] - state.probes[near, column]) / (NODES[far] - NODES[near])
+    change = (last - before) * (NODES[near] - NODES[end]) / (NODES[far] - NODES[end])
+    return last != 0 and (last + change) / last > MIN_END_SLOPE
 
 
 @njit(**NJIT_KERNEL)
@@ -72,14 +98,23 @@ def raise_extreme(rig, state, fraction, column, sign, known):
     known : float
         Value that is known already.
     """
-    # The best of the known points; if it lies far below the extreme so far, nothing is searched.
-    best = 0
+    # The best of the known points. A smooth curve rises above it by less than the range of the points, so that nothing is
+    # searched if it lies further below the extreme so far.
+    best = worst = 0
     for node in range(1, N_NODES):
         if sign * state.probes[node, column] > sign * state.probes[best, column]:
             best = node
+        if sign * state.probes[node, column] < sign * state.probes[worst, column]:
+            worst = node
     value = sign * state.probes[best, column]
-    if value <= sign * known - NEAR_EXTREME * abs(known):
+    rise = value - sign * state.probes[worst, column]
+    if value + min(rise, NEAR_EXTREME * abs(known)) <= sign * known:
         return known, -1.0
+    if best in (0, N_NODES - 1) and rises_to_end(state, column, best):
+        if value <= sign * known:
+            return known, -1.0
+        find_value(rig, state, fraction * NODES[best], -1, column)
+        return sign * value, fraction * NODES[best]
 
     # Successive parabolas through the best point and its neighbours.
     x = NODES[best]

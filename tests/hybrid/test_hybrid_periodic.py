@@ -6,7 +6,7 @@ from hybrid_cases import coulomb, make_oscillator
 
 from patchfem.hybrid import runs
 from patchfem.hybrid.laws import masing
-from patchfem.hybrid.periodic import find_periodic_motion
+from patchfem.hybrid.periodic import Shooting, find_periodic_motion, follow_periodic_motion
 from patchfem.hybrid.records import LawNumbers, Memory, Probe
 
 AMPLITUDE = "relative_displacement_amplitude"
@@ -66,6 +66,35 @@ def test_elements_slip_in_no_direction_while_all_of_them_stick():
     sticks = np.abs(force) < 0.8 * (1 - 1e-6)
     assert 10 < sticks.sum() < 390 and not direction[sticks].any()
     assert np.array_equal(direction[~sticks], np.sign(force[~sticks]))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_followed_motion_equals_that_of_a_search(name):
+    """From a similar motion every law reaches the motion of a search, in four periods after a small change."""
+
+    def make(acceleration):
+        return make_oscillator(
+            LAWS[name], acceleration=acceleration, zeta=0.01, cycles=1, rtol=1e-11
+        )
+
+    motion = find_periodic_motion(make(0.95))
+    for acceleration, max_periods in ((0.95 * (1 + 1e-5), 4), (0.97, 12), (1.2, 20)):
+        case = make(acceleration)
+        motion = follow_periodic_motion(case, motion)
+        assert motion.n_periods <= max_periods
+        searched = find_periodic_motion(case).run.values
+        for measure in (AMPLITUDE, "loop_area"):
+            assert motion.run.values[measure] == pytest.approx(searched[measure], rel=1e-9)
+
+
+def test_only_the_periodic_motion_is_measured():
+    """The periods of a search are not measured, which takes more time than their steps; the motion at its end is."""
+    case = make_oscillator(LAWS["elastic"], acceleration=0.95, zeta=0.01, cycles=1, rtol=1e-9)
+    shooting = Shooting(case)
+    shooting.relax(2)
+    assert not shooting.record.integrals.any() and np.isinf(shooting.record.extremes).all()
+    run = find_periodic_motion(case).run
+    assert run.record.integrals.any() and np.isfinite(run.record.extremes).all()
 
 
 def test_multipliers_of_a_linear_rig():

@@ -175,6 +175,33 @@ def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
     assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)
 
 
+def test_exact_motion_that_comes_to_rest_slowly_has_readings(tmp_path):
+    """An interface that slips less and less in hundreds of cycles has the readings of the motion at their end.
+
+    The search for a periodic motion, which ends at a far smaller change per cycle, was given up, and the readings were those
+    of a motion without a bound.
+    """
+    yaw = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.28459483\n'
+    text = RUBS.replace("[structure.bonded]", yaw + "[structure.bonded]")
+    sets = (
+        "normal.load=26 lbf",
+        "friction.static=0.507092975",
+        "friction.bond_length=0.243 um",
+        "structure.moving_mass=1.19396625 kg",
+        "structure.bonded.stiffness=9.55417327e6 N/m",
+        "structure.bonded.damping=720.798064 N s/m",
+    )
+    scene = write_and_load(tmp_path, text, *sets, "drive.cycles=2000")
+    marched = run(scene).measures
+    names = ("absolute_acceleration_peak", "relative_displacement_amplitude")
+    expected = [marched[name].value for name in names]
+    path = write_rows(tmp_path, [(143.0, 5 * G_N, *expected, "")])
+    wanted = read_free_keys("friction.static=0.2..0.8")
+    models = ConditionModels(scene, read_response_table(path).conditions, wanted, path)
+    readings = ModelReadings(models).predict([0.507092975], [0])
+    assert readings[:, 0] == pytest.approx(expected, rel=1e-5)
+
+
 def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
     """A computed response above a row flagged U has no residual; below it the residual is that of any row."""
     path = write_rows(

@@ -88,15 +88,20 @@ class ShootingFinder:
         rig = self.model.rig
         return cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
 
-    def find_periodic_motion(self, drive, guess=None) -> periodic.PeriodicMotion:
+    def find_periodic_motion(
+        self, drive, guess=None, *, needs_stability: bool = True
+    ) -> periodic.PeriodicMotion:
         """Find the periodic motion under sinusoidal drive, from rest or from a similar motion.
 
         Parameters
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : hybrid.records.State, optional
-            State of a similar motion at phase 0 of the drive.
+        guess : PeriodicMotion, optional
+            Similar motion.
+        needs_stability : bool
+            Whether multipliers and errors are needed. Without them a change over a period of MAX_KINKED_CHANGE counts as
+            none, and a motion that is found from a guess takes a few periods.
 
         Raises
         ------
@@ -104,17 +109,23 @@ class ShootingFinder:
             If no motion is found that repeats after each cycle.
         """
         case = self.make_case(drive)
-        n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
-        motion = periodic.find_periodic_motion(
-            case,
-            start=guess,
-            n_first=n_first,
-            has_kinks=self.joints.has_kinks,
-            is_undamped=self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL,
-        )
+        is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
+        if guess is None or needs_stability or is_undamped:
+            motion = periodic.find_periodic_motion(
+                case,
+                start=guess and guess.run.final,
+                n_first=periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES,
+                has_kinks=self.joints.has_kinks,
+                is_undamped=is_undamped,
+            )
+        else:
+            motion = periodic.follow_periodic_motion(case, guess)
         if motion.grows:
             return motion
-        if motion.run.status != Status.DONE or not motion.change <= motion.tolerance:
+        tolerance = motion.tolerance
+        if not needs_stability:
+            tolerance = max(tolerance, periodic.MAX_KINKED_CHANGE)
+        if motion.run.status != Status.DONE or not motion.change <= tolerance:
             raise NotConverged(
                 f"no periodic motion was found: the motion still changes by {motion.change:.2g} of its amplitude from "
                 'one cycle to the next; use accuracy.method = "auto"'
@@ -187,8 +198,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : State, PathPoint or None
-            State of a similar motion, or the point of a response curve that has this drive.
+        guess : PeriodicMotion, PathPoint or None
+            Similar motion, or the point of a response curve that has this drive.
         """
         # A point of a response curve has its periodic motion already; else it is found from the guess.
         if isinstance(guess, PathPoint):
@@ -313,11 +324,19 @@ class ShootingFinder:
         n_stops = int((faces[:, Window.STARTS] * lasts).max())
         return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
 
-    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
+    def compute_curve_point(self, drive, guess=None, *, needs_stability: bool = True) -> CurvePoint:
         """Compute one point of a response curve, starting from a neighbouring motion or from rest.
 
-        Without friction it has a closed form, except for an undamped resonance. `drive` is the `SineDrive` of the
-        point, and `guess` is the state of the neighbouring motion, None for rest.
+        Without friction it has a closed form, except for an undamped resonance.
+
+        Parameters
+        ----------
+        drive : SineDrive
+            Drive of the point.
+        guess : PeriodicMotion, optional
+            Neighbouring motion; from rest by default.
+        needs_stability : bool
+            Whether stability and errors are needed, as in `find_periodic_motion`.
         """
         # Two motions need no search: that of a linear rig, and that of a mass that leaves its grooves.
         is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
@@ -330,11 +349,11 @@ class ShootingFinder:
 
         # A neighbour beyond a jump of the curve may be too far away as a start.
         try:
-            motion = self.find_periodic_motion(drive, guess)
+            motion = self.find_periodic_motion(drive, guess, needs_stability=needs_stability)
         except NotConverged:
             if guess is None:
                 raise
-            motion = self.find_periodic_motion(drive)
+            motion = self.find_periodic_motion(drive, needs_stability=needs_stability)
         if motion.grows:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
@@ -352,7 +371,7 @@ class ShootingFinder:
             regime=regime if is_stable else f"{regime}, unstable",
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=is_stable,
-            guess=motion.run.final,
+            guess=motion,
         )
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion | None:
@@ -362,20 +381,19 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : hybrid.records.State, optional
-            State of a similar motion at phase 0 of the drive.
+        guess : PeriodicMotion, optional
+            Similar motion.
         needs_histories : bool
             Whether the histories of a cycle are needed.
         """
-        point = self.compute_curve_point(drive, guess)
+        point = self.compute_curve_point(drive, guess, needs_stability=False)
         if not point.values:
             return None
         window = None
         if needs_histories:
             # The closed form of a linear rig has no state from which a cycle starts.
-            laws = self.joints.laws
-            state = point.guess if laws else self.find_periodic_motion(drive).run.final
-            window = self.evaluator.resume(drive, N_CYCLES, state, 0).window
+            motion = point.guess if self.joints.laws else self.find_periodic_motion(drive)
+            window = self.evaluator.resume(drive, N_CYCLES, motion.run.final, 0).window
         sensed = [point.values.get(COLUMN_MEASURES[name]) for name in SENSED_COLUMNS]
         amplitude, peak, fundamental = sensed
         return ObservedMotion(window, peak, amplitude, point.guess, fundamental)
