@@ -10,6 +10,7 @@ from time import process_time
 MARCH_CYCLE_SECONDS = 3e-4  # CPU time [s] per cycle of time stepping with elements
 MARCH_STEP_SECONDS = 4.3e-7  # CPU time [s] per time step with elements
 MARCH_ELEMENT_STEP_SECONDS = 9e-10  # additional CPU time [s] per time step and element
+LIST_STRIP_STEP_SECONDS = 2e-6  # CPU time [s] per time step and strip of a list of bonds
 
 # Steps from event to event.
 HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event

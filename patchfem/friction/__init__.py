@@ -39,6 +39,7 @@ PUBLIC = {
     "bonds.parameters": (
         "Bonds",
         "MAX_LIST_SECONDS",
+        "MAX_STUCK_LIST_SECONDS",
         "growth_numbers",
         "growth_path_ratio",
     ),

@@ -160,14 +160,15 @@ def mean_stroke(slide) -> tuple[float, float]:
 class BondListGuard:
     """Progress callback that stops a run whose lists of bonds take too much CPU time.
 
-    The cost per step does not decrease, because a list never becomes shorter. Therefore the whole
-    run takes at least the elapsed time divided by the completed fraction.
+    The cost per step does not decrease, because a list never becomes shorter. Therefore the rest of the run takes at
+    least as long per step as the last part of it.
     """
 
     def __init__(self, progress=None):
         self.progress = progress
-        # CPU time [s] and completed fraction at the first call, so that compilation does not count.
+        # CPU time [s] and completed fraction at the first call, so that compilation does not count, and at the last one.
         self.start = None
+        self.last = None
 
     def __call__(self, fraction: float) -> None:
         """Report the completed fraction of the steps, and stop a run that takes too long.
@@ -179,18 +180,26 @@ class BondListGuard:
         """
         now = thread_time()
         if self.start is None:
-            self.start = now, fraction
+            self.start = self.last = now, fraction
         spent = now - self.start[0]
-        done = fraction - self.start[1]
-        if done > 0 and spent > MAX_LIST_SECONDS / 60 and spent > MAX_LIST_SECONDS * done:
-            raise Missing(
-                f"the sum over the list of bonds would need a computing time of about {spent / done:.0f} s, more than "
-                f"the limit of {MAX_LIST_SECONDS:.0f} s; lower the number of cycles or accuracy.steps_per_cycle, raise "
-                'accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1',
-                "",
-            )
+        done = fraction - self.last[1]
+        if done > 0 and spent > MAX_LIST_SECONDS / 60:
+            seconds = spent + (now - self.last[0]) / done * (1 - fraction)
+            refuse_slow_list(seconds, MAX_LIST_SECONDS)
+        self.last = now, fraction
         if self.progress is not None:
             self.progress(fraction)
+
+
+def refuse_slow_list(seconds: float, limit: float) -> None:
+    """Raise Missing if the CPU time [s] that the sums over lists of bonds of a run take is above a limit [s]."""
+    if seconds > limit:
+        raise Missing(
+            f"the sum over the list of bonds would need a computing time of about {seconds:.0f} s, more than "
+            f"the limit of {limit:.0f} s; lower the number of cycles or accuracy.steps_per_cycle, raise "
+            'accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1',
+            "",
+        )
 
 
 def uses_parallel_elements(model) -> bool:

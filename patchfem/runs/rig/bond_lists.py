@@ -5,7 +5,7 @@ and whether a longer list of bonds is worth its time.
 
 A law without stiffness (the law as printed, or order 0) holds a block by a reversal in almost every
 time step. Each reversal adds a strip to the list, so that the cost increases with the square of the
-number of steps. `bench.engine.BondListGuard` stops a run that takes too long.
+number of steps (`refuse_long_stick`). `bench.engine.BondListGuard` stops other runs that take too long.
 """
 
 from functools import lru_cache
@@ -13,14 +13,17 @@ from math import ceil, inf, pi, sqrt
 
 import numpy as np
 
+from ... import cost_model
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines
 from ...friction.bonds.list_numbers import sum_form
 from ...friction.bonds.list_rows_kernels import FORM_GROWING
+from ...friction.bonds.parameters import MAX_STUCK_LIST_SECONDS
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..bench import engine as bench_engine
+from .costs import MARCH_COST_FACTOR
 from .numerics import Numerics
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
@@ -124,6 +127,17 @@ def is_stuck_by_printed_law(model: Model) -> bool:
         and model.friction.reading == "report"
         and _find_holding_ratio(model) >= MIN_STUCK_FORCE_RATIO
     )
+
+
+def refuse_long_stick(model: Model, numerics: Numerics, n_lists: int) -> None:
+    """Raise Missing if a block that the printed law holds at rest takes more than MAX_STUCK_LIST_SECONDS of CPU time.
+
+    Each of its `n_lists` lists gets a strip in every step and is summed in every step.
+    """
+    if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
+        steps = numerics.cycles * numerics.steps
+        seconds = cost_model.LIST_STRIP_STEP_SECONDS * n_lists * steps**2 / 2
+        bench_engine.refuse_slow_list(MARCH_COST_FACTOR * seconds, MAX_STUCK_LIST_SECONDS)
 
 
 def compute_holding_force(rig) -> float:

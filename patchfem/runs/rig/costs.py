@@ -24,6 +24,7 @@ MAX_HYBRID_SECONDS = 5.0
 MAX_HYBRID_SECONDS_UNRESOLVED = 60.0  # The same if time steps cannot resolve the modes.
 # Steps of a run and its comparison run, relative to those of the run.
 HYBRID_COST_FACTOR = 1.7
+MARCH_COST_FACTOR = 1.75  # The same of a time integration, which has several coarse runs.
 # Smallest number of steps of `hybrid` per shortest period of the drive.
 MIN_STEPS_PER_SHORTEST_PERIOD = 12
 HYBRID_STEPS_PER_RADIAN = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
@@ -184,7 +185,7 @@ def estimate_march_seconds(model: Model) -> float:
     n_interfaces = len(model.rig.friction.interfaces)
     step = cost_model.MARCH_STEP_SECONDS + cost_model.MARCH_ELEMENT_STEP_SECONDS * count
     return (
-        1.75
+        MARCH_COST_FACTOR
         * model.rig.drive.cycles
         * (cost_model.MARCH_CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
     )

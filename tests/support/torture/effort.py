@@ -1,6 +1,8 @@
 """Rough computing time of a scene, by which expensive random scenes are left out."""
 
+from patchfem import cost_model
 from patchfem.runs import choose_numerics
+from patchfem.runs.rig.bond_lists import has_bond_list, is_stuck_by_printed_law
 from patchfem.runs.rig.costs import estimate_hybrid_seconds
 
 NODE_SECONDS = 4e-5  # CPU time [s] per elastic unknown of the finest mesh
@@ -28,6 +30,10 @@ def estimate_seconds(plan) -> float:
         numerics = choose_numerics(model)
         step = STEP_SECONDS + POINT_STEP_SECONDS * n_points
         motion = MARCH_PASSES * numerics.cycles * numerics.steps * step
+        if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
+            # One strip per step, in the list of each node.
+            strips = max(n_points, 1) * numerics.cycles * numerics.steps
+            motion *= 1 + cost_model.LIST_STRIP_STEP_SECONDS * strips / 2 / step
     if model.wear is not None:
         seconds += (model.wear.jumps or N_JUMPS) * (JUMP_SECONDS + motion)
     return seconds + motion
