@@ -175,7 +175,10 @@ RUN_VARIABLES = {
         "motion.steady.curve.acceleration_distortion",
     ),
     "curve_multiplier": Row(
-        "curve_point", "1", "largest Floquet multiplier", "motion.steady.curve.multiplier"
+        "curve_point",
+        "1",
+        "largest Floquet multiplier; missing under laws of many elements",
+        "motion.steady.curve.multiplier",
     ),
     "decay_time": Row(
         "decay_time", "s", "time at the middle of the evaluated cycle", "motion.decay.time"

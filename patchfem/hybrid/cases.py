@@ -12,6 +12,7 @@ from .laws import LAWS, is_rigid, masing
 from .laws.springs import make_cubic, make_interlocking
 from .records import (
     N_INTEGRALS,
+    N_NODES,
     Clock,
     Cycle,
     Face,
@@ -414,7 +415,7 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
         clock,
         np.zeros((N_STATE_ROWS, n)),
         np.full((5, n_faces, Margin.AFTER), np.inf),
-        np.zeros((6, n_observed + 3 + n_faces)),
+        np.zeros((N_NODES + 1, n_observed + 3 + n_faces)),
         np.zeros((n_faces, n_faces)),
     )
 

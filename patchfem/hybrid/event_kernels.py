@@ -20,7 +20,17 @@ from .motion_kernels import (
     rests,
     update_grip,
 )
-from .records import N_FACE_INTEGRALS, Clock, Face, Margin, Memory, Mode, Probe, Setting
+from .records import (
+    N_FACE_INTEGRALS,
+    N_NODES,
+    Clock,
+    Face,
+    Margin,
+    Memory,
+    Mode,
+    Probe,
+    Setting,
+)
 from .step_kernels import POINT, RATES, read_curve
 from .table_kernels import switch_law, write_law_margins
 
@@ -40,7 +50,7 @@ class StepEvent(NamedTuple):
 
 N_CHECKS = 3  # points of a step at which margins are evaluated, besides its start
 N_MARGINS = 5
-LAST_PROBES = 5  # row of `State.probes` of the last evaluation
+LAST_PROBES = N_NODES  # row of `State.probes` of the last evaluation
 LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
 MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive
 MAX_PIVOTS = 100

@@ -10,6 +10,7 @@ import numpy as np
 
 N_FACE_INTEGRALS = 3  # work, slip and loss of every interface, near the end of a state
 N_INTEGRALS = 4  # number of integrals at the end of a state, see `Tail`
+N_NODES = 7  # points of a step at which the quantities of a window are evaluated
 WINDOW_START = 28  # row of `State.rows` with the state at the start of the window
 
 
@@ -260,7 +261,7 @@ class State(NamedTuple):
     - clock (16,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
     - margins (5, M, 5): margins at the points of a step, and those at the last evaluation
-    - probes (6, 5 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
+    - probes (8, 5 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
     - grip (M, M): force that holds an interface per unit of relative acceleration [kg]
     """
 

@@ -5,7 +5,18 @@ import re
 import numpy as np
 import pytest
 from scene_runs import find_sentences
-from scene_texts import COULOMB, FORCED, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SWEEP
+from scene_texts import (
+    COATED,
+    COULOMB,
+    FORCED,
+    MODE,
+    NONLOCAL,
+    PAIR,
+    PLASTIC,
+    POINT,
+    SHEAR,
+    SWEEP,
+)
 
 import patchfem as pf
 from patchfem.core import NotConverged
@@ -40,6 +51,13 @@ def test_exact_point_of_curve_agrees_with_sine_run(law):
                 k,
                 column,
             )
+
+
+@pytest.mark.usefixtures("reduced_point_count")
+def test_always_multipliers_of_patch_with_partial_slip_are_missing():
+    """Of the motion of many elements only some periods are followed, so that no multipliers are known; once they were 0."""
+    curve = pf.run(COATED + SHEAR + PLASTIC + MODE + STRONG_SWEEP, **STEADY).motion.steady.curve
+    assert np.isfinite(curve["amplitude"]).all() and np.isnan(curve["multiplier"]).all()
 
 
 @pytest.mark.parametrize("frequency", ["407.7 Hz", "408.125 Hz"])

@@ -43,7 +43,8 @@ class CurvePoint(NamedTuple):
     - drive: sinusoidal drive.
     - values, errors: measures and their errors by name; {} if no bounded motion exists.
     - regime: name of the motion, such as "stick-slip".
-    - multiplier: largest magnitude of the Floquet multipliers.
+    - multiplier: largest magnitude of the Floquet multipliers; NaN if only some periods of the motion were followed, under
+      laws of many elements.
     - stable: whether the motion is stable.
     - guess: initial guess for the motion at a neighbouring drive.
     """

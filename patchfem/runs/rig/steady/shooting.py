@@ -364,12 +364,13 @@ class ShootingFinder:
         is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.is_stable
+        sizes = np.abs(motion.multipliers)
         return CurvePoint(
             drive=drive,
             values={name: value for name, value in values.items() if np.isfinite(value)},
             errors=estimate_point_errors(values, find_relative_error(motion)),
             regime=regime if is_stable else f"{regime}, unstable",
-            multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
+            multiplier=float(sizes.max()) if sizes.size else np.nan,
             stable=is_stable,
             guess=motion,
         )
