@@ -162,6 +162,31 @@ def find_travel_end(rig, state, fraction):
 
 
 @njit(**NJIT_KERNEL)
+def pass_steep_speed(rig, state, i, length):
+    """Change the regime of an interface at a speed beside which its force changes steeply (`Margin.SPEED`).
+
+    The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface.
+    length : float
+        Length of the step to this event [s].
+    """
+    before = state.margins[0, i, Margin.MOTION]
+    change_regime(rig, state, i, Margin.SPEED)
+    after = state.margins[0, i, Margin.MOTION]
+    if MIN_PROGRESS < after < before:
+        stop = length * after / (before - after)
+        state.clock[Clock.STEP] = min(state.clock[Clock.STEP], stop)
+
+
+@njit(**NJIT_KERNEL)
 def advance(rig, state, record, t_end, cycle):
     """Advance a motion within a piece of the drive to a time; return its `Status`.
 
@@ -222,6 +247,7 @@ def advance(rig, state, record, t_end, cycle):
             and event.which == Margin.MOTION
             and rests(state.memory[face])
         ):
+            # The step is taken again while this interface rests.
             undecided = face
             n_empty += 1
             continue
@@ -264,14 +290,8 @@ def advance(rig, state, record, t_end, cycle):
         n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
         undecided = -1 if n_empty == 0 else undecided
         if event.which == Margin.SPEED:
-            # The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
             clock[Clock.IS_SMOOTH] = 0.0
-            speed_before = state.margins[0, face, Margin.MOTION]
-            change_regime(rig, state, face, event.which)
-            speed = state.margins[0, face, Margin.MOTION]
-            if MIN_PROGRESS < speed < speed_before:
-                stop = fraction * h * speed / (speed_before - speed)
-                clock[Clock.STEP] = min(clock[Clock.STEP], stop)
+            pass_steep_speed(rig, state, face, fraction * h)
         elif face >= 0:
             clock[Clock.IS_SMOOTH] = 0.0
             write_event(rig, state, record, face, event.which)

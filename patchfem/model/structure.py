@@ -24,7 +24,7 @@ _build_listed_modes = memoize(listed_modes.build_basis)
 
 
 def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
-    """Build the modes of a rig, including the linear spring of the bonded joint.
+    """Build the modes of a rig, including the linear spring and the damper of the bonded joint.
 
     The field `base` is the participation of the drive. Of a moving base it is the participation of
     each coordinate in the base motion. Of a force F it is minus the motion of the driven place per
@@ -58,8 +58,9 @@ def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
         # the output replaces the slide.
         modes = replace(modes, faces=None)
     bonded = scene.structure.bonded
-    # A bonded spring that interlocks is not linear, so the time integration applies it.
-    if bonded is None or bonded.wavelength is not None:
+    # A spring that interlocks is not linear, so the time integration applies it. Its damper is linear.
+    is_linear = bonded is not None and bonded.wavelength is None
+    if not is_linear and (bonded is None or not bonded.damping):
         return modes
     if len(modes.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(
@@ -67,7 +68,8 @@ def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
             "instead write a spring between the two places that an interface joins",
             "structure.bonded",
         )
-    return import_effect("structure.bonded").add_spring(modes, bonded.stiffness, bonded.damping)
+    stiffness = bonded.stiffness if is_linear else 0.0
+    return import_effect("structure.bonded").add_spring(modes, stiffness, bonded.damping)
 
 
 def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:

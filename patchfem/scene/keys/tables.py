@@ -260,7 +260,8 @@ class Bonded(Table):
         quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact"
     )
     damping: key(
-        quantity("damping", ge=0), "damping coefficient of a damper in parallel with this spring"
+        quantity("damping", ge=0),
+        "coefficient of a damper in parallel with this spring, linear or interlocking: force per rate of the slide",
     ) = 0.0
     wavelength: optional(
         Length,
