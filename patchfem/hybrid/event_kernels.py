@@ -354,7 +354,39 @@ def find_event(rig, state, undecided):
                         event = StepEvent(root, i, k)
         if event.face >= 0:
             break
-    return event
+    return find_event_before(rig, state, undecided, event) if event.face >= 0 else event
+
+
+@njit(**NJIT_KERNEL)
+def find_event_before(rig, state, undecided, event):
+    """Return the first of an event and those whose margins are negative at it.
+
+    A margin of the slide is smallest where the slide reverses, so that it may be negative there alone.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    undecided : int
+        Number of an interface that stays in its regime of motion for this step, or -1.
+    event : StepEvent
+        First event whose margin is negative at a point of the step.
+    """
+    first = event
+    left = int(event.fraction * N_CHECKS) / N_CHECKS
+    write_margins_inside(rig, state, event.fraction, N_CHECKS)
+    for i in range(rig.faces.shape[0]):
+        for k in range(N_MARGINS):
+            stays = i == undecided and k == Margin.MOTION
+            is_event = i == event.face and k == event.which
+            if stays or is_event or state.margins[N_CHECKS, i, k] >= -MARGIN_TOL:
+                continue
+            root = find_margin_root(rig, state, i, k, left, event.fraction)
+            if root < first.fraction:
+                first = StepEvent(root, i, k)
+    return first
 
 
 @njit(**NJIT_KERNEL)

@@ -161,6 +161,25 @@ def test_chatter_of_many_interfaces_on_many_modes():
     assert len(forces) > 100
 
 
+@pytest.mark.parametrize(
+    "start, limit",
+    [(1.0, 1.6413983860546313), (1.0, 1.6412282521103203), (1.1, 1.8404554397711463)],
+)
+def test_sliders_that_all_slip_just_before_the_reversal_are_seen(start, limit):
+    """The first swing of a release exceeds the slide at which all sliders slip by 1e-5 to 1e-4, within a third of a step.
+
+    The reversal in the same third hid this event, and the work was wrong by up to 2e-5.
+    """
+    numbers = (-0.3, 0.5, 0.3, limit, 1, 0.0, limit, 0.0, 0.3)
+    law = LawNumbers("masing", numbers, length=limit)
+    options = {"acceleration": 0.0, "z": start, "load": 1.0, "cycles": 3}
+    coarse, fine = (
+        runs.run_case(make_oscillator(law, rtol=rtol, **options)).values["friction_work"]
+        for rtol in (1e-8, 1e-12)
+    )
+    assert coarse == pytest.approx(fine, rel=1e-7)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
 def test_a_block_that_creeps_at_its_limit_is_not_refused(tolerance):
     """A regularised interface that creeps keeps a rigid one at its limit, where the error of a step hides rest or slip.
