@@ -488,12 +488,32 @@ class Shooting:
             scale = np.append(self.scales(), np.abs(start[self.n :]))[columns]
             slopes = np.empty((columns.size, columns.size))
             for k, column in enumerate(columns):
-                packed = start.copy()
-                packed[column] += self.difference * scale[k]
-                slopes[:, k] = self.find_change(self.unpack(before, packed), end)[columns]
-                slopes[:, k] /= self.difference * scale
+                # A state beyond the last reversal would return to it at once, which its neighbours do not.
+                for difference in (self.difference, -self.difference):
+                    packed = start.copy()
+                    packed[column] += difference * scale[k]
+                    state = self.unpack(before, packed)
+                    if self.follows_reversals(state):
+                        break
+                slopes[:, k] = self.find_change(state, end)[columns]
+                slopes[:, k] /= difference * scale
             self.map = _Map(columns, slopes, scale, before.memory[:, FOLLOWED_MEMORY])
         return self.map, (end - start)[columns] / self.map.scale
+
+    def follows_reversals(self, state: State) -> bool:
+        """Return whether all laws with reversal points are beyond their last one in the direction of their motion."""
+        faces = self.case.rig.faces
+        slides = self.case.rig.rows[0] @ state.y[: self.case.rig.modes.shape[1]]
+        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+            memory = state.memory[i]
+            count = int(memory[Memory.COUNT])
+            slide = slides[i] - memory[Memory.ORIGIN]
+            if (
+                count
+                and memory[Memory.DIRECTION] * (slide - memory[Memory.STACK + 2 * count - 2]) < 0
+            ):
+                return False
+        return True
 
     def find_change(self, state: State, end) -> np.ndarray:
         """Return the change of the packed state after a period from that of another motion, `end`."""

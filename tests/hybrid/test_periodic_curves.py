@@ -222,6 +222,23 @@ def test_exact_all_three_motions_near_fold_are_found():
 # ---- laws with memory
 
 
+def test_curve_passes_where_the_reversal_is_at_the_start_of_the_period():
+    """Below 5.167 g the stick of an elastic-plastic element with a cubic spring begins before the start of the period, and
+    above it after it. The curve of levels passes there, because no derivative refers to states beyond the reversal."""
+    limit = 0.3 * 26 * 4.4482216152605
+    laws = [masing.from_elements([limit / 1e-6], [1e-6]), LawNumbers("springs", (2e10, 0.0, 1.0))]
+
+    def make(level):
+        return make_case(RIG, laws, SineDrive(level, 2 * np.pi * 147.2))
+
+    level = 5.14 * G_N
+    start = CurveStart(find_periodic_motion(make(level)).run.final, level)
+    equations = PeriodEquations(make, start, has_kinks=False)
+    path = equations.follow((5.13 * G_N, 5.2 * G_N), PathSettings(0.003, 0.03))
+    speeds = np.array([point.w[1] for point in path.points])
+    assert path.ended == "end" and speeds[0] < 0 < speeds[-1]
+
+
 @pytest.mark.parametrize(
     "law", [IWAN, masing.from_elements([3.0, 4.0, 5.0], [0.05, 0.1, 0.02]), BONDS]
 )

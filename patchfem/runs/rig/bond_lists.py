@@ -132,7 +132,16 @@ def is_stuck_by_printed_law(model: Model) -> bool:
 def refuse_long_stick(model: Model, numerics: Numerics, n_lists: int) -> None:
     """Raise Missing if a block that the printed law holds at rest takes more than MAX_STUCK_LIST_SECONDS of CPU time.
 
-    Each of its `n_lists` lists gets a strip in every step and is summed in every step.
+    Each of its lists gets a strip in every step and is summed in every step.
+
+    Parameters
+    ----------
+    model : Model
+        Model with bonds.
+    numerics : Numerics
+        Cycles and steps per cycle of the run.
+    n_lists : int
+        Number of lists: 1, or that of the nodes if the pressure changes.
     """
     if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
         steps = numerics.cycles * numerics.steps
