@@ -79,7 +79,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "2.0.0"
+__version__ = "2.0.1"
 __all__ = [
     "FitOptions",
     "Measure",
