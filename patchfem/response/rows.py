@@ -303,8 +303,8 @@ MOTION_MEASURE_ROWS = (
         "m",
         1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
-        "first cycle of the window)/(number of cycles between these two cycles); null if the drive is not periodic at "
-        "the end of the run",
+        "first cycle of the window)/(number of cycles between these two cycles); null unless drive and load repeat in "
+        "every cycle at the end of the run",
         lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
