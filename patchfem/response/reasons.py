@@ -32,8 +32,8 @@ OUTPUT_AT_REST_REASON = (
 )
 APERIODIC_REASON = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
 BEATS_REASON = (
-    "under tones, or a load with another period than the drive, the mean slide over one cycle changes within the beat "
-    "without any drift; this measure exists only if drive and load repeat in every cycle"
+    "under tones, or a drive and a load with other periods, the mean slide over one cycle changes within their beat without "
+    "any drift; this measure exists only if drive and load repeat in every cycle"
 )
 COMMON_PERIOD_MESSAGE = "load and drive repeat together only after"
 STICKS_AT_REVERSAL_REASON = (
