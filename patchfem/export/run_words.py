@@ -18,7 +18,8 @@ from ..formatting import (
     format_value,
 )
 from ..response.outcome import OPEN_LOOP_MESSAGE
-from ..response.rows import remove_interface_number
+from ..response.reasons import COMMON_PERIOD_MESSAGE
+from ..response.rows import STEADY_AMPLITUDE, remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
 from ..structure import drive_sizes
@@ -186,6 +187,9 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
         return f"{outcome.sentence} Above {knee} friction alone does not limit it; the drive is {drive}."
     if outcome is Outcome.TRANSIENT and _is_release(result):
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
+    steady = result.measures.get(STEADY_AMPLITUDE)
+    if steady is not None and steady.reason.startswith(COMMON_PERIOD_MESSAGE):
+        return f"Whether the motion is steady is unknown: {steady.reason}."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
         return _describe_stuck_outcome(measures)
     return _describe_stability(result)

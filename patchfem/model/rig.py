@@ -12,6 +12,7 @@ from ..effects import Waveform, find_waveform
 from ..scene.rules.methods import find_load_change_key
 from ..structure.drive_sizes import (
     count_cycles_per_level,
+    count_repeat_cycles,
     estimate_peak_speed,
     find_decay_rate,
     find_drive_omega,
@@ -283,6 +284,14 @@ class Rig:
     def displacement_scale(self) -> float:
         """Expected displacement [m]: the expected speed over the angular frequency of the drive signal."""
         return self.speed_scale / find_drive_omega(self.drive.signal)
+
+    def count_repeat_cycles(self, load) -> float | None:
+        """Return the number of drive cycles after which drive and load repeat, or None if the drive never does.
+
+        `load` is the PointLoad of the model, or None.
+        """
+        frequency = load.frequency if load is not None and load.amplitude else None
+        return count_repeat_cycles(self.drive.signal, frequency)
 
     def with_signal(self, signal, **changes) -> "Rig":
         """Return a copy of the rig with another drive signal; `changes` replace other fields of the drive."""

@@ -17,6 +17,7 @@ from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
     MOTION_CLASSES,
     classify_motions,
+    join_cycles,
     judge_motions,
     measure_windows,
     remaining_ringing,
@@ -35,16 +36,18 @@ AMPLITUDE_ROUND_OFF = 1e-12
 def judge_outcome(
     solution,
     measures: Measures,
-    tolerance: float,
+    limits: tuple[float, float],
     drive,
     level_cycles: float = 0.0,
-    min_decay_rate: float = 0.0,
+    repeat: float | None = 1.0,
 ) -> tuple[Outcome, Measures]:
     """Classify the motion of a run, and estimate the amplitude at which it becomes steady.
 
     - Periodic drive, or last level of a drive in levels: the outcome follows from the amplitudes of
       successive windows, their steady estimate and the remaining free motion (`settling.judge_motions`). If a
-      steady motion will still change, the steady estimate is returned (`settling.select_reported`).
+      steady motion will still change, the steady estimate is returned (`settling.select_reported`). If the load has
+      another period than the drive, the cycles of their common period count as one; without a common period in
+      the window, no motion is steady.
     - Release or step: STEADY if the amplitude is below its floor, i.e. at rest; otherwise as above,
       but a release grows only if a mode gains energy.
     - Sweep or recorded signal: TRANSIENT without a steady estimate, unless the interface sticks.
@@ -59,14 +62,14 @@ def judge_outcome(
         Extremes and phasors of the cycles, and the window.
     measures : dict
         Measures by name; they are not changed.
-    tolerance : float
-        Relative tolerance of the scene.
+    limits : tuple
+        Relative tolerance of the scene, and smallest decay rate of a mode [1/s]; negative if a mode gains energy.
     drive
         Drive of the last cycles.
     level_cycles : float
         Number of cycles per level; 0 without levels.
-    min_decay_rate : float
-        Smallest decay rate of a mode [1/s]; negative if a mode gains energy.
+    repeat : float, optional
+        Number of cycles after which drive and load repeat (`Rig.count_repeat_cycles`).
 
     Returns
     -------
@@ -74,7 +77,7 @@ def judge_outcome(
     steady : dict
         The measure relative_displacement_amplitude_steady [m] by its name; {} if it is not reported.
     """
-    limits = (tolerance, min_decay_rate)
+    tolerance, min_decay_rate = limits
     is_random = hasattr(drive, "band")
     is_stuck = solution.outcome is Outcome.STUCK and not is_random
     if is_stuck and is_still_loading(solution.window, drive.period, tolerance):
@@ -95,7 +98,7 @@ def judge_outcome(
     # The levels before the last one have other amplitudes.
     cycles = slice(-int(level_cycles), None) if level_cycles else slice(None)
     extremes = np.asarray(solution.extremes, float)[cycles]
-    window = _count_window_cycles(solution, drive)
+    window = drive_sizes.count_cycles(solution.window.time, drive)
     windows = measure_windows(extremes, window)
     scale = drive_sizes.find_max_acceleration(drive) / drive_sizes.find_drive_omega(drive) ** 2
     floor = AMPLITUDE_ROUND_OFF * scale
@@ -103,22 +106,27 @@ def judge_outcome(
 
     # The criteria are vectorized over motions, of which there is one.
     is_periodic = drive_sizes.is_periodic(drive)
-    if is_periodic:
+    count = int(repeat or 1)
+    if is_periodic and not window % count:
         # A motion under another drive than a sine may have no first harmonic.
         phasors = np.ptp(extremes, axis=1) / 2
         if drive_sizes.is_sinusoidal(drive):
             phasors = solution.phasors[cycles]
         decay = max(min_decay_rate, 0.0) * window * drive.period
+        # Only the cycles of a common period of drive and load can be compared.
+        extremes, phasors = join_cycles(extremes, phasors, count)
         classes, steady = judge_motions(
-            extremes[None], phasors[None], window, tolerance, floor, decay
+            extremes[None], phasors[None], window // count, tolerance, floor, decay
         )
-        drift = np.inf
+        drift = np.inf if count == 1 else windows.find_drift(window)
     else:
         if drive.segments and not windows.amplitude[-1] > max(floor, amplitude.floor):
             return Outcome.STEADY, {}
         classes = classify_motions(windows.amplitude[None], tolerance, floor)
         drift = windows.find_drift(window)
     outcome = MOTION_CLASSES[classes[0]]
+    if is_periodic and window % count:
+        return Outcome.TRANSIENT if outcome is Outcome.STEADY else outcome, {}
 
     # For several tones, the drift from cycle to cycle is part of their beat.
     if (is_periodic or drive.segments) and _has_drift(measures, tolerance, drift):
@@ -138,12 +146,6 @@ def judge_outcome(
         return outcome, {}
     value, error = steady[:, 0].tolist()
     return outcome, {STEADY_AMPLITUDE: Measure(value, "m", error, amplitude.floor)}
-
-
-def _count_window_cycles(solution, drive) -> int:
-    """Return the number of drive cycles in the window of a run, the last part from which its measures follow."""
-    time = solution.window.time
-    return max(1, round((time[-1] - time[0]) / drive.period))
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
@@ -236,7 +238,7 @@ def find_ringing(solution, measures: Measures, limits: tuple[float, float], driv
         return 0.0
     if not drive_sizes.is_periodic(drive) or not amplitude.value:
         return 0.0
-    window = _count_window_cycles(solution, drive)
+    window = drive_sizes.count_cycles(solution.window.time, drive)
     decay = min_decay_rate * drive.period * window
     ringing = float(remaining_ringing(measure_windows(solution.extremes, window), decay))
     sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)

@@ -32,9 +32,10 @@ OUTPUT_AT_REST_REASON = (
 )
 APERIODIC_REASON = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
 BEATS_REASON = (
-    "under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
-    "only for a drive that repeats in every cycle"
+    "under tones, or a drive and a load with other periods, the mean slide over one cycle changes within their beat without "
+    "any drift; this measure exists only if drive and load repeat in every cycle"
 )
+COMMON_PERIOD_MESSAGE = "load and drive repeat together only after"
 STICKS_AT_REVERSAL_REASON = (
     "the interface sticks where its slide is largest: during this stick the friction force takes different values "
     "at the same slide"
@@ -87,36 +88,39 @@ def find_missing(
 
 
 def find_invalid(
-    measures: Measures, window, drive, outcome: Outcome, *, is_rigid: bool
+    measures: Measures, motion: tuple, outcome: Outcome, *, is_rigid: bool
 ) -> Measures:
     """Return the measures whose values have no meaning in a motion, without value and with the reason, by name.
 
     - The secant stiffness of rigid friction that sticks at the largest displacement, where its force is not unique.
-    - The drift under a drive that is not periodic: without a period, mean values differ even if there is no drift.
+    - The drift unless drive and load repeat in every cycle: otherwise mean values differ even if there is no drift.
     - The areas of friction loops that are not closed.
-    - The steady amplitude of a transient that cannot be extrapolated.
+    - The steady amplitude of a transient that cannot be extrapolated, or whose load has no common period with the
+      drive in the window.
 
     Parameters
     ----------
     measures : dict of str to Measure
         Measures of the run by name.
-    window : Response
-        Last cycles.
-    drive
-        Drive of the last cycles.
+    motion : tuple
+        Response of the last cycles, their drive, and the number of cycles after which drive and load repeat.
     outcome : Outcome
         Outcome of the run.
     is_rigid : bool
         Whether the interface sticks without displacement.
     """
+    window, drive, repeat = motion
+    repeat = repeat or 1.0
     reasons = {}
     stick = measures.get("stick_fraction")
     if is_rigid and stick is not None and stick.value is not None:
         if stick.value > MOTION_TABLE["stick_fraction"].floor + (stick.error or 0.0):
             reasons["secant_stiffness"] = STICKS_AT_REVERSAL_REASON
     is_periodic = drive_sizes.is_periodic(drive)
+    if not is_periodic or repeat != 1:
+        has_beat = is_periodic or hasattr(drive, "beat")
+        reasons["drift_per_cycle"] = BEATS_REASON if has_beat else APERIODIC_REASON
     if not is_periodic:
-        reasons["drift_per_cycle"] = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
         reasons |= dict.fromkeys(_list_open_loops(measures, window, drive), OPEN_LOOP_REASON)
 
     invalid = {}
@@ -124,9 +128,10 @@ def find_invalid(
         if name in measures:
             invalid[name] = replace(measures[name], value=None, error=None, reason=reason)
     if outcome is Outcome.TRANSIENT and is_periodic and STEADY_AMPLITUDE not in measures:
-        invalid[STEADY_AMPLITUDE] = _make_missing_measure(
-            STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON
-        )
+        reason = CHANGE_NOT_RESOLVED_REASON
+        if drive_sizes.count_cycles(window.time, drive) % repeat:
+            reason = f"{COMMON_PERIOD_MESSAGE} {repeat:.0f} cycles of the drive, more than the run has to compare"
+        invalid[STEADY_AMPLITUDE] = _make_missing_measure(STEADY_AMPLITUDE, reason)
     return invalid
 
 

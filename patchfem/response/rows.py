@@ -304,8 +304,8 @@ MOTION_MEASURE_ROWS = (
         "m",
         1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
-        "first cycle of the window)/(number of cycles between these two cycles); null if the drive is not periodic at "
-        "the end of the run",
+        "first cycle of the window)/(number of cycles between these two cycles); null unless drive and load repeat in "
+        "every cycle at the end of the run",
         lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
@@ -390,7 +390,8 @@ MOTION_MEASURE_ROWS = (
         1.0,
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
-        "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
+        "before and after the jump is used; a cycle whose largest or smallest slide lies at its end is left out; null if "
+        "rigid friction sticks there, where the force takes many values",
         "loop_measures",
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
@@ -402,7 +403,8 @@ MOTION_MEASURE_ROWS = (
         1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
-        "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
+        "cycle)/(value of the key `slide` of this mode); omega_1 is that without contact and bonded spring; null if other "
+        "modes contribute more than 5 % of the slide",
         "loop_measures",
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
@@ -480,7 +482,7 @@ MOTION_MEASURE_ROWS = (
         1e-10,
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
         "more than 0.02 tolerance × amplitude; absent if it has settled and cannot change by more; null if the motion "
-        "has not settled and its limit cannot be extrapolated",
+        "has not settled and its limit cannot be extrapolated, or if no common period of load and drive fits into the run",
         flags="displacement",
     ),
     MeasureDefinition(

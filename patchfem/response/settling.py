@@ -65,10 +65,12 @@ def judge_motions(extremes, phasors, window: int, tolerance, floor=0.0, decay=0.
     last = amplitude[:, -1]
     allowed = tolerance * last + floor
 
-    # The last cycles of the windows are extrapolated to infinite time.
+    # The last cycles of the windows are extrapolated to infinite time, if they lie in the second half of the run: the
+    # motion before them may decay in another way.
     steady = np.full((2, last.size), np.nan)
     first = (N_FINAL_WINDOWS - 1) * window
-    if phasors.shape[1] > first:
+    is_long = phasors.shape[1] > 2 * first
+    if is_long:
         ends = slice(-1 - first, None, window)
         steady = extrapolate_steady_amplitudes(
             np.ptp(extremes[:, ends], axis=2) / 2, phasors[:, ends]
@@ -84,7 +86,7 @@ def judge_motions(extremes, phasors, window: int, tolerance, floor=0.0, decay=0.
     steady = np.where(np.isnan(steady), beat_mean_amplitudes(windows), steady)
     mean = windows.cycle_amplitude[:, -1]
     means = np.stack([mean, free_motion + np.abs(last - mean)])
-    is_filled = np.isnan(steady) & (classes == STEADY_CLASS)
+    is_filled = np.isnan(steady) & (classes == STEADY_CLASS) & is_long
     return MotionEnds(classes, np.where(is_filled, means, steady))
 
 
@@ -317,6 +319,29 @@ def measure_windows(extremes, window: int) -> Windows:
     low, high = (extremes[..., first:, side] for side in (0, 1))
     low, high = (side.reshape(*side.shape[:-1], -1, size) for side in (low, high))
     return Windows(low.min(axis=-1), high.max(axis=-1), (high - low).mean(axis=-1) / 2)
+
+
+def join_cycles(extremes, phasors, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Join every `count` successive cycles of a motion into one, up to the last cycle.
+
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    phasors : (c,)
+        Fourier coefficient of the output in each cycle [m].
+    count : int
+        Number of cycles after which drive and load repeat.
+
+    Returns
+    -------
+    tuple of ndarray
+        Extremes (c // count, 2) and phasors (c // count,) of the joined cycles.
+    """
+    first = len(phasors) % count
+    low, high = extremes[first:].reshape(-1, count, 2).T
+    joined = np.stack([low.min(axis=0), high.max(axis=0)], axis=-1)
+    return joined, phasors[first + count - 1 :: count]
 
 
 def remaining_free_motion(windows: Windows, decay=0.0):

@@ -12,6 +12,7 @@ PUBLIC = {
     "drive_sizes": (
         "DriveKeys",
         "choose_samples_per_cycle",
+        "count_cycles",
         "count_cycles_per_level",
         "count_repeat_cycles",
         "estimate_peak_speed",

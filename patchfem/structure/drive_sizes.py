@@ -1,6 +1,8 @@
 """Amplitude, speed, frequency and cycle of a drive signal, for defaults and measures."""
 
 from collections.abc import Callable
+from fractions import Fraction
+from math import gcd, lcm
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +18,8 @@ MIN_SAMPLES_PER_CYCLE = 20
 MAX_STORED_SAMPLES = 20_000
 # Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
 PERIOD_TIME_TOL = 1e-6
+# Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
+MAX_FREQUENCY_DENOMINATOR = 10**6
 
 
 class DriveKeys(NamedTuple):
@@ -145,9 +149,33 @@ def is_periodic(drive) -> bool:
     return is_sinusoidal(drive) or getattr(drive, "is_periodic", False)
 
 
-def count_repeat_cycles(drive) -> float | None:
-    """Return the number of cycles after which a drive signal repeats, or None if it never does."""
-    return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
+def count_beat_cycles(frequencies) -> float:
+    """Return the number of cycles of the first of several sines after which all of them repeat.
+
+    It is f_1 over the greatest common divisor of the `frequencies` [Hz], which are taken as fractions with a limited
+    denominator.
+    """
+    exact = [Fraction(f) for f in frequencies]
+    fractions = [f.limit_denominator(MAX_FREQUENCY_DENOMINATOR) or f for f in exact]
+    denominator = lcm(*(fraction.denominator for fraction in fractions))
+    numerators = [int(fraction * denominator) for fraction in fractions]
+    return numerators[0] / gcd(*numerators)
+
+
+def count_repeat_cycles(drive, load_frequency: float | None = None) -> float | None:
+    """Return the number of cycles after which a drive signal and the load repeat, or None if the signal never does.
+
+    The load oscillates at `load_frequency` [Hz]; None: it is constant.
+    """
+    cycles = 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
+    if cycles is None or load_frequency is None:
+        return cycles
+    return cycles * count_beat_cycles((1 / (cycles * drive.period), load_frequency))
+
+
+def count_cycles(time, drive) -> int:
+    """Return the number of drive cycles, at least 1, in a window that ends with a cycle; `time` (k,) [s] are its samples."""
+    return max(1, round((time[-1] - time[0]) / drive.period))
 
 
 def has_full_cycle(span: float, drive) -> bool:

@@ -6,17 +6,13 @@ lower frequency responds to them by (f h)^4, which is 6e-8 at `TONE_ROWS_PER_PER
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
-from math import gcd, lcm
 
 import numpy as np
 
-from .drive_sizes import DriveKeys
+from .drive_sizes import DriveKeys, count_beat_cycles
 from .drives import RecordedDrive
 
 TONE_ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
-# Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
-MAX_FREQUENCY_DENOMINATOR = 10**6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,19 +68,6 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
         max_frequency=max_frequency,
         tones=tuple((a, 2 * np.pi * f, p) for f, a, p in zip(frequencies, accelerations, phases)),
     )
-
-
-def count_beat_cycles(frequencies) -> float:
-    """Return the number of cycles of the first tone after which all tones repeat.
-
-    It is f_1 over the greatest common divisor of the `frequencies` [Hz], which are taken as fractions with a limited
-    denominator.
-    """
-    exact = [Fraction(f) for f in frequencies]
-    fractions = [f.limit_denominator(MAX_FREQUENCY_DENOMINATOR) or f for f in exact]
-    denominator = lcm(*(fraction.denominator for fraction in fractions))
-    numerators = [int(fraction * denominator) for fraction in fractions]
-    return numerators[0] / gcd(*numerators)
 
 
 def _build_tones(drive: DriveKeys) -> TonesRecord:

@@ -52,7 +52,7 @@ def test_exact_loop_area_needs_dissipation_above_storage(stored, lost, open_):
     """A loop that stores more energy than it dissipates is not closed and has no area."""
     area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
     window = make_window(stored, lost)
-    found = find_invalid({"loop_area": area}, window, FREE, Outcome.STEADY, is_rigid=False)
+    found = find_invalid({"loop_area": area}, (window, FREE, None), Outcome.STEADY, is_rigid=False)
     assert set(found) == ({"loop_area"} if open_ else set())
     if open_:
         one = found["loop_area"]

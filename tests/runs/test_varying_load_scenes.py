@@ -3,15 +3,39 @@ load."""
 
 import numpy as np
 import pytest
-from scene_runs import run_scene
+from command_line import read_json
+from scene_runs import load_scene, run_scene
 from scene_texts import COATED, DRIVE, MODE, RIG, make_friction_table
 
+import patchfem as pf
 from patchfem.core import Outcome
 
 PITCH = RIG.replace("slide = 0.1", 'slide = 0.1\npitch = "40 rad/m"').replace(
     "cycles = 200", "cycles = 12"
 )
 COARSE_SETTINGS = "contact.element_size=400 um; accuracy.steps_per_cycle=200"
+
+AMPLITUDE, STEADY = "relative_displacement_amplitude", "relative_displacement_amplitude_steady"
+SHAKEN = """[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "a"
+frequency = "50 Hz"
+damping = 0.01
+slide = 1.0
+[normal]
+load = "2 N"
+amplitude = "1 N"
+frequency = "{frequency} Hz"
+[friction]
+static = 0.4
+law = {law}
+[drive]
+kind = "base"
+frequency = "40 Hz"
+acceleration = "3 m/s^2"
+cycles = 300
+"""
 
 
 # The Coulomb and tanh cases would each compile a time loop that no other test needs.
@@ -78,3 +102,45 @@ def test_exact_load_that_is_zero_at_the_start(law):
         first, second = marched.measures[name], exact.measures[name]
         assert abs(first.value - second.value) <= 1.5 * (first.error + second.error), name
         assert first.error <= 0.05 * second.value
+
+
+@pytest.mark.parametrize("frequency", [20, 80 / 3, 60, 80])
+@pytest.mark.parametrize(
+    "law",
+    [
+        '"coulomb"',
+        '"elastic-plastic"\nbond_length = "10 um"',
+        '"tanh"\nreference_speed = "10 mm/s"',
+    ],
+)
+def test_always_steady_amplitude_is_that_of_common_period(law, frequency):
+    """The steady amplitude of a short run covers the amplitude of a long run, whatever the period of the load."""
+    text = SHAKEN.format(law=law, frequency=frequency)
+    long = run_scene(text)
+    amplitude = long.measures[AMPLITUDE]
+    assert long.outcome is Outcome.STEADY
+    steady_values = []
+    for cycles in (19, 24, 28, 45):
+        found = run_scene(text, f"drive.cycles={cycles}")
+        steady = found.measures.get(STEADY)
+        if steady is not None and steady.value is not None:
+            steady_values.append(steady.value)
+            assert abs(steady.value - amplitude.value) <= steady.error + amplitude.error
+    assert steady_values
+    assert found.outcome is Outcome.STEADY
+    assert found.measures[AMPLITUDE].value == pytest.approx(amplitude.value, rel=1e-4)
+
+
+@pytest.mark.parametrize(("frequency", "cycles"), [(14.8, 100), (13.3333, 400000)])
+def test_exact_no_common_period_gives_no_steady_amplitude(frequency, cycles, tmp_path):
+    """A run that is shorter than the common period of load and drive is not steady, and says why."""
+    text = SHAKEN.format(law='"coulomb"', frequency=frequency)
+    result = pf.run(load_scene(text, "drive.cycles=60"))
+    reason = f"load and drive repeat together only after {cycles} cycles of the drive"
+    assert result.outcome is Outcome.TRANSIENT
+    assert result.measures[STEADY].value is None
+    assert result.measures[STEADY].reason.startswith(reason)
+    assert result.measures["drift_per_cycle"].value is None
+    result.save(tmp_path)
+    verdict = read_json(tmp_path / "summary.json")["verdict"]
+    assert f"Whether the motion is steady is unknown: {reason}" in str(verdict)

@@ -17,6 +17,10 @@ class ElasticPlastic:
     An increase of the pressure adds unstretched springs. A decrease only lowers the limit; the springs beyond it break
     within one length of slip. So a change of the pressure creates no energy, and a force below the limit stays.
 
+    Under a load N(t) the stiffness K rises to mu N/length wherever N exceeds K length/mu, and stays while N falls. In
+    stick F' = K q'. In slip |F| = mu N, and K' = -(K - mu N/length) v/length with the rate v >= 0 of irreversible slip.
+    The slip is q - F/K. A contact that opens loses all springs.
+
     - static: mu [1]
     - length: relative displacement [m] at which an unstretched spring slips
     """

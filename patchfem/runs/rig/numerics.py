@@ -11,7 +11,7 @@ import numpy as np
 from ...effects import law_has_trait
 from ...hybrid import cases
 from ...model.model import Model
-from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
+from ...structure.drive_sizes import find_min_decay_rate, is_sinusoidal
 from .costs import steps_per_cycle
 from .engines import HYBRID, MARCH, choose_engine
 
@@ -69,8 +69,8 @@ def choose_numerics(model: Model) -> Numerics:
     """Choose the engine and the numerical settings of a run of a rig.
 
     The measures are evaluated over a window of the last cycles: a tenth of all cycles, at least 1 and at
-    most 10. Under a drive with a beat the window contains whole beats, and under a random drive it is the
-    record without its initial transient.
+    most 10. Under a drive with a beat, or a load with another period than the drive, the window contains whole
+    beats; under a random drive it is the record without its initial transient.
 
     Parameters
     ----------
@@ -94,16 +94,18 @@ def choose_numerics(model: Model) -> Numerics:
         start = min(cycles / 4, N_TRANSIENT_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
 
-    beat_cycles = count_repeat_cycles(drive.signal) or 0.0
-    if 1 < beat_cycles <= cycles:  # The window contains complete periods of the beat.
-        window = int(beat_cycles * max(1, min(10, cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL)
+    # The window contains complete periods of a beat; the beat is within a level if the drive has levels.
+    beat_cycles = rig.count_repeat_cycles(model.point) or 0.0
     if drive.levels.amplitudes:
-        window = min(window, int(drive.levels.cycles + WHOLE_CYCLE_TOL))
+        cycles = drive.levels.cycles
+        window = min(window, int(cycles + WHOLE_CYCLE_TOL))
+    if 1 < beat_cycles <= cycles:
+        window = int(beat_cycles * max(1, min(10, cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL)
 
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / cycles)))
-    numerics = Numerics(engine.name, steps, cycles, window, accuracy.shear_modes)
+        steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
+    numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
 
     if engine is HYBRID:
         # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.

@@ -381,13 +381,14 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     measures = add_run_error_estimates(run.measures, solution.run_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
+    repeat = rig.count_repeat_cycles(model.point)
     outcome, steady = judge_outcome(
         solution,
         measures,
-        model.accuracy.tolerance,
+        (model.accuracy.tolerance, find_decay_rate(rig.modes)),
         run.drive,
         rig.drive.levels.cycles,
-        find_decay_rate(rig.modes),
+        repeat,
     )
 
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
@@ -403,7 +404,8 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
 
     window = solution.window
     is_rigid = run.has_friction and model.sticks_rigidly
-    measures |= reasons.find_invalid(measures, window, run.drive, outcome, is_rigid=is_rigid)
+    motion = (window, run.drive, repeat)
+    measures |= reasons.find_invalid(measures, motion, outcome, is_rigid=is_rigid)
     other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
     measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
     return replace(run, outcome=outcome, measures=measures)

@@ -248,7 +248,11 @@ def _follow_rig(model, patch, frames: int) -> _Motion:
     # A motion without bound has no slip path (the caller stops the wear).
     amplitude = Measure(solution.values[AMPLITUDE], "m", 0.0)
     outcome, _ = judge_outcome(
-        solution, {AMPLITUDE: amplitude}, model.accuracy.tolerance, model.rig.drive.signal
+        solution,
+        {AMPLITUDE: amplitude},
+        (model.accuracy.tolerance, 0.0),
+        model.rig.drive.signal,
+        repeat=model.rig.count_repeat_cycles(model.point),
     )
     nodes = None
     if frames:

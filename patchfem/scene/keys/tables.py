@@ -149,8 +149,8 @@ class Friction(Table):
     ) = 1.0
     rest_growth: optional(
         Acceleration,
-        "growth a_s of the bond length at rest (equation 2.10); without `rest_growth` and `slip_growth` the bond "
-        "length is constant",
+        "growth a_s of the bond length at rest (equation 2.10), also while the contact is open; without `rest_growth` and "
+        "`slip_growth` the bond length is constant",
     )
     slip_growth: optional(
         Length,
@@ -514,7 +514,7 @@ class Drive(Table):
     cycles: optional(
         Positive,
         "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
-        "cycles of the first mode that is not rigid",
+        "cycles of the first mode that is not rigid, with a linear bonded spring and without an interlocking one",
     )
     duration: optional(
         Duration, "length of the run, or of each level, as a time; replaces `cycles`"
