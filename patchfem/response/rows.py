@@ -403,8 +403,8 @@ MOTION_MEASURE_ROWS = (
         1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
-        "cycle)/(value of the key `slide` of this mode); omega_1 is that without contact and bonded spring; null if other "
-        "modes contribute more than 5 % of the slide",
+        "cycle)/(value of the key `slide` of this mode); the frequency is that without contact and bonded spring; "
+        "null if other modes contribute more than 5 % of the slide",
         "loop_measures",
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
