@@ -56,8 +56,8 @@ MIN_SEEN = 1e-6  # fraction of a cycle before which an end of motion belongs to 
 MIN_SPEED_FRACTION = 0.9  # part of a step before a `Margin.SPEED` below which the step is repeated
 SPEED_STEP_RATIO = 1.02  # length of the repeated step relative to that part
 MAX_EMPTY_STEPS = 100  # events in a row without progress
-# Events in a row without progress after which the error of a step hides whether an interface rests at its limit or slips.
-# It then rests for a step.
+# Events in a row without progress after which an interface at its friction limit rests for a step: the error of a step then
+# hides whether it rests or slips.
 MAX_UNDECIDED = 20
 MIN_PROGRESS = 1e-13  # fraction of a step that counts as progress
 MIN_STEP = 1e-15  # relative to the end of the run
@@ -162,7 +162,7 @@ def find_travel_end(rig, state, fraction):
 
 
 @njit(**NJIT_KERNEL)
-def pass_steep_speed(rig, state, i, length):
+def pass_steep_speed(rig, state, face, length):
     """Change the regime of an interface at a speed beside which its force changes steeply (`Margin.SPEED`).
 
     The next step is no longer than the interface needs to stop, so that it does not pass over the new regime.
@@ -173,14 +173,14 @@ def pass_steep_speed(rig, state, i, length):
         Arrays of the rig.
     state : State
         Motion, which is updated.
-    i : int
+    face : int
         Number of the interface.
     length : float
-        Length of the step to this event [s].
+        Duration of the part of the step before this event [s].
     """
-    before = state.margins[0, i, Margin.MOTION]
-    change_regime(rig, state, i, Margin.SPEED)
-    after = state.margins[0, i, Margin.MOTION]
+    before = state.margins[0, face, Margin.MOTION]
+    change_regime(rig, state, face, Margin.SPEED)
+    after = state.margins[0, face, Margin.MOTION]
     if MIN_PROGRESS < after < before:
         stop = length * after / (before - after)
         state.clock[Clock.STEP] = min(state.clock[Clock.STEP], stop)
@@ -247,7 +247,7 @@ def advance(rig, state, record, t_end, cycle):
             and event.which == Margin.MOTION
             and rests(state.memory[face])
         ):
-            # The step is taken again while this interface rests.
+            # The same step is computed again without the release of this interface.
             undecided = face
             n_empty += 1
             continue

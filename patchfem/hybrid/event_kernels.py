@@ -359,9 +359,9 @@ def find_event(rig, state, undecided):
 
 @njit(**NJIT_KERNEL)
 def find_event_before(rig, state, undecided, event):
-    """Return the first of an event and those whose margins are negative at it.
+    """Return the first event of a step: a given one, or another one whose margin is already negative there.
 
-    A margin of the slide is smallest where the slide reverses, so that it may be negative there alone.
+    A margin that follows the slide is smallest where the slide reverses, and may be positive at all points of the step.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def find_event_before(rig, state, undecided, event):
     undecided : int
         Number of an interface that stays in its regime of motion for this step, or -1.
     event : StepEvent
-        First event whose margin is negative at a point of the step.
+        First event of those whose margins are negative at a point of the step.
     """
     first = event
     left = int(event.fraction * N_CHECKS) / N_CHECKS

@@ -289,12 +289,12 @@ class FreeShooting(LoopShooting):
         state.clock[[Clock.OUTPUT_SIZE, Clock.OUTPUT_SPEED]] = 0.0
         self.state = state
 
-    def find_columns(self, before: State) -> np.ndarray:
+    def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state.
 
         The further ones are always among them. The forces at reversal points follow from the displacements beside them.
         """
-        columns = super().find_columns(before)
+        columns = super().find_unknowns(before)
         is_force = (columns >= self.n) & ((columns - self.n) % 2 == 1)
         return np.union1d(columns[~is_force], self.extra)
 

@@ -234,7 +234,7 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
     shooting.relax(1)
     before, change = shooting.approach(MAX_CHANGE * float(case.rig.settings[Setting.RTOL]))
 
-    # The period that is measured begins one more correction nearer to the motion, if that helps.
+    # One more correction, if it brings the start of the measured period nearer to the periodic motion
     run = None
     if shooting.serves(before):
         shooting.correct(before)
@@ -464,7 +464,7 @@ class Shooting:
         stack[:] = packed[self.n :].reshape(stack.shape)
         return state
 
-    def find_columns(self, before: State) -> np.ndarray:
+    def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: what a period changes."""
         is_unknown = self.pack(self.state) != self.pack(before)
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
@@ -481,14 +481,15 @@ class Shooting:
 
         The derivatives of the last correction are used again as long as `map` has them.
         """
-        columns = self.find_columns(before)
+        columns = self.find_unknowns(before)
         start = self.pack(before)
         end = self.pack(self.state)
         if self.map is None or not np.array_equal(self.map.columns, columns):
             scale = np.append(self.scales(), np.abs(start[self.n :]))[columns]
             slopes = np.empty((columns.size, columns.size))
             for k, column in enumerate(columns):
-                # A state beyond the last reversal would return to it at once, which its neighbours do not.
+                # A state beyond the last reversal point of a law begins with another regime, so that its difference is
+                # no derivative. The difference to the other side is taken then.
                 for difference in (self.difference, -self.difference):
                     packed = start.copy()
                     packed[column] += difference * scale[k]
@@ -557,7 +558,8 @@ class _FollowedShooting(Shooting):
         change : float
             Change over this period, relative to the scale of the state.
         """
-        # The derivatives of the similar motion are used if the first change is a small part of the motion.
+        # New derivatives are computed if a period changes the motion by more than MAX_FOLLOWED_REMAINDER of its size, or of
+        # the change before.
         last = 1.0
         for _ in range(MAX_CORRECTIONS + 1):
             before = self.state
@@ -576,11 +578,11 @@ class _FollowedShooting(Shooting):
         return before, change
 
     def serves(self, before: State) -> bool:
-        """Return whether there are derivatives of what a period changes from a state."""
+        """Return whether the known derivatives hold at a state: same reversal points, and all states that change."""
         return (
             self.map is not None
             and np.array_equal(self.map.regime, before.memory[:, FOLLOWED_MEMORY])
-            and bool(np.isin(super().find_columns(before), self.map.columns).all())
+            and bool(np.isin(super().find_unknowns(before), self.map.columns).all())
         )
 
     def has_same_regime(self, before: State) -> bool:
@@ -591,9 +593,9 @@ class _FollowedShooting(Shooting):
         columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG]
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
-    def find_columns(self, before: State) -> np.ndarray:
+    def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: those of the derivatives, as long as they serve."""
-        return self.map.columns if self.serves(before) else super().find_columns(before)
+        return self.map.columns if self.serves(before) else super().find_unknowns(before)
 
 
 class _Map(NamedTuple):

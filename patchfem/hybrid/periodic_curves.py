@@ -85,7 +85,7 @@ class LoopShooting(Shooting):
         state = super().unpack(aligned, packed)
         return state._replace(memory=_align(state.memory, -1))
 
-    def find_columns(self, before: State) -> np.ndarray:
+    def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop.
 
         A periodic motion leaves the reversal points of its loop as they were, but they move with it.

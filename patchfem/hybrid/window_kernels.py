@@ -38,15 +38,15 @@ from .records import (
 from .step_kernels import POINT, RATES, read_curve
 
 PRESSED_SPRINGS = LAWS.index("pressed_springs")  # number of the law
-# Gauss-Lobatto rule of N_NODES points on an interval of length 1. Steps are long where a motion is smooth between events, so
-# that with five points the third harmonic would have an error of 1e-7.
+# Gauss-Lobatto rule of seven points (N_NODES) on an interval of length 1. Between events, where the motion is smooth, steps
+# are long: with five points the third harmonic would have an error of 1e-7.
 INNER = np.sqrt(5 / 11 + 2 / 11 * np.sqrt(5 / 3) * np.array([1.0, -1.0])) / 2
 NODES = np.array([0.0, *(0.5 - INNER), 0.5, *(0.5 + INNER[::-1]), 1.0])
 INNER_WEIGHTS = (124 + 7 * np.sqrt(15) * np.array([-1.0, 1.0])) / 700
 WEIGHTS = np.array([1 / 42, *INNER_WEIGHTS, 128 / 525, *INNER_WEIGHTS[::-1], 1 / 42])
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
-# Smallest slope at the end of a step, relative to the mean slope near it, at which no extreme is searched near this end
+# Smallest ratio of the slope at an end of a step and the mean slope near this end at which no extreme lies inside
 MIN_END_SLOPE = 0.5
 MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
 EXTREME_REACH = (
@@ -57,7 +57,7 @@ EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an eve
 
 @njit(**NJIT_KERNEL)
 def rises_to_end(state, column, end):
-    """Return whether a probe has its extreme at an end of a step because its slope has the same sign up to there.
+    """Return whether a probe has its extreme at an end of a step, because its slope keeps its sign up to there.
 
     The slope is that of the parabola through the three points next to this end.
 
@@ -101,8 +101,8 @@ def raise_extreme(rig, state, fraction, column, sign, known):
     known : float
         Value that is known already.
     """
-    # The best of the known points. A smooth curve rises above it by less than the range of the points, so that nothing is
-    # searched if it lies further below the extreme so far.
+    # The best of the known points. A smooth curve exceeds it by less than the range of the points, so that no search is
+    # needed if the extreme so far is larger by more than this range.
     best = worst = 0
     for node in range(1, N_NODES):
         if sign * state.probes[node, column] > sign * state.probes[best, column]:

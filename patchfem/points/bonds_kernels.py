@@ -27,7 +27,10 @@ class PortState(NamedTuple):
 
 @njit(**NJIT_CALL)
 def are_paths_short(points):
-    """Return whether the series of the shape functions hold for the slides of all points in this step."""
+    """Return whether the slides of all points in this step are short enough for the series of the shape functions.
+
+    `points` are the `march_rows.Points`, with the slides of the step in row SLIDE.
+    """
     slides = points.values[Point.SLIDE]
     lengths = points.trial[4]
     n_long = 0
@@ -43,21 +46,16 @@ def write_means(points):
 
     `points` are the `march_rows.Points`, with the slides of the step in row SLIDE.
     """
-    static = points.numbers[1]
-    first_lengths = points.numbers[2]
-    m = points.trial[1]
-    z = points.trial[2]
-    lengths = points.trial[4]
-    slides = points.values[Point.SLIDE]
-    loads = points.values[Point.LOAD]
-    forces = points.values[Point.FORCE]
-    slopes = points.values[Point.BY_SLIDE]
-    for j in range(lengths.size):
-        shapes = shape_series(abs(slides[j]) / lengths[j])
-        bonds = bond_mean(m[j], z[j], slides[j], loads[j], lengths[j], shapes)
-        stiffness = static[j] / first_lengths[j]
-        forces[j] = stiffness * bonds.mean
-        slopes[j] = stiffness * bonds.slope
+    values = points.values
+    trial = points.trial
+    for j in range(points.port.size):
+        slide = values[Point.SLIDE, j]
+        shapes = shape_series(abs(slide) / trial[4, j])
+        load = values[Point.LOAD, j]
+        bonds = bond_mean(trial[1, j], trial[2, j], slide, load, trial[4, j], shapes)
+        stiffness = points.numbers[1, j] / points.numbers[2, j]
+        values[Point.FORCE, j] = stiffness * bonds.mean
+        values[Point.BY_SLIDE, j] = stiffness * bonds.slope
 
 
 @njit(**NJIT_CALL)
@@ -66,25 +64,22 @@ def advance_all(points):
 
     `points` are the `march_rows.Points`, with the slides of the step in row SLIDE.
     """
-    m = points.trial[1]
-    z = points.trial[2]
-    s2 = points.trial[3]
-    lengths = points.trial[4]
-    slides = points.values[Point.SLIDE]
-    loads = points.values[Point.LOAD]
-    totals = points.values[Point.TOTAL]
-    for j in range(lengths.size):
-        totals[j] += slides[j]
-        shapes = shape_series(abs(slides[j]) / lengths[j])
-        bonds = bond_step((m[j], z[j], s2[j]), slides[j], loads[j], lengths[j], shapes)
-        m[j] = bonds.m
-        z[j] = bonds.z
-        s2[j] = bonds.s2
+    values = points.values
+    trial = points.trial
+    for j in range(points.port.size):
+        slide = values[Point.SLIDE, j]
+        values[Point.TOTAL, j] += slide
+        shapes = shape_series(abs(slide) / trial[4, j])
+        before = trial[1, j], trial[2, j], trial[3, j]
+        bonds = bond_step(before, slide, values[Point.LOAD, j], trial[4, j], shapes)
+        trial[1, j] = bonds.m
+        trial[2, j] = bonds.z
+        trial[3, j] = bonds.s2
 
 
 @njit(**NJIT_CALL)
 def read_port(points, first, end):
-    """Return the `PortState` of the points from `first` to `end` - 1 after an accepted step.
+    """Return force, energy and slip of a port after an accepted step, as a `PortState`.
 
     The friction limits are those of the loads at the end of the step.
 
@@ -95,7 +90,7 @@ def read_port(points, first, end):
     first : int
         First point of the port.
     end : int
-        Number after that of its last point.
+        First point of the next port.
     """
     static = points.numbers[1, first:end]
     first_lengths = points.numbers[2, first:end]

@@ -71,7 +71,7 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
 STALLED = 1e3
 LISTS_STALLED = 1e5
-LIST_DAMPING = 0.0625  # weight of the change of a shear increment for lists, whose forces jump
+LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
 INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
@@ -114,15 +114,6 @@ def solve_linear(matrix, vector, n):
     for k in range(n):
         vector[k] /= matrix[k, k]
     return True
-
-
-@njit(**NJIT_CALL)
-def sum_entries(row):
-    """Return the sum of the entries of an array."""
-    total = 0.0
-    for j in range(row.size):
-        total += row[j]
-    return total
 
 
 @njit(**NJIT_CALL)
@@ -326,9 +317,9 @@ def write_forces(system, level, dt):
     for p in range(n_ports):
         first = points.first[p]
         end = points.first[p + 1]
-        moves[Port.SUM, p] = sum_entries(values[Point.FORCE, first:end])
-        moves[Port.BY_SLIDE, p] = sum_entries(values[Point.BY_SLIDE, first:end])
-        moves[Port.BY_VELOCITY, p] = sum_entries(values[Point.BY_VELOCITY, first:end])
+        moves[Port.SUM, p] = values[Point.FORCE, first:end].sum()
+        moves[Port.BY_SLIDE, p] = values[Point.BY_SLIDE, first:end].sum()
+        moves[Port.BY_VELOCITY, p] = values[Point.BY_VELOCITY, first:end].sum()
 
     # On a flank, F = V t + r f and dF/dq = K + r^2 df/ds with the ratio r of path to displacement.
     if flank.size:

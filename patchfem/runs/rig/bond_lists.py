@@ -132,7 +132,7 @@ def is_stuck_by_printed_law(model: Model) -> bool:
 def refuse_long_stick(model: Model, numerics: Numerics, n_lists: int) -> None:
     """Raise Missing if a block that the printed law holds at rest takes more than MAX_STUCK_LIST_SECONDS of CPU time.
 
-    Each of its lists gets a strip in every step and is summed in every step.
+    Every step adds a strip of bonds to each of its lists, and sums over all strips.
 
     Parameters
     ----------

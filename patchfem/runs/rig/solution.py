@@ -12,7 +12,6 @@ import numpy as np
 from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
 from ...motion_measures import find_extremes
-from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.events import Events
 from ...response.levels import Level
 from ...response.loops import CycleLoop, sample_loop
@@ -124,11 +123,6 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     window = _compute_gauge_histories(solution.window, gauge)
     low, high = find_extremes(window.time, window.output, window.output_rate)
     amplitude = (high - low) / 2
-    response = _compute_gauge_histories(solution.response, gauge)
-    if model.rig.drive.kind == "free":
-        motion = (response.time, response.output, response.output_rate)
-        period = model.rig.drive.signal.period
-        amplitude = measure_last_cycle_amplitude(*motion, period) or amplitude
     ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
     errors = solution.errors and solution.errors | {
         AMPLITUDE: ratio * solution.errors.get(AMPLITUDE, 0.0)
@@ -137,7 +131,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     return replace(
         solution,
         values=values | {AMPLITUDE: amplitude},
-        response=response,
+        response=_compute_gauge_histories(solution.response, gauge),
         window=window,
         errors=errors,
     )
