@@ -7,31 +7,32 @@ Read the package in this order. A module imports only from its own entry of the 
 3. `formatting`   numbers as text: readable units, digits that match the error
 4. `cost_model`   CPU times per unit of work
 5. `core`         exchanged records: interface, compliance, contact state, modal basis, response, measure, outcome
-6. `motion_measures`  measures that several engines have: loops, energy balance, reversals
-7. `effects`      physical effects and methods that a scene can request
-8. `disk`         atomic writes, locks and the user's cache
-9. `compiled`     machine code of the kernels and its cache
-10. `closed_forms` exact solutions of contact at rounded edges
-11. `scene`        parsing and validation of a TOML file, with values in SI units
-12. `inputs`       measured data files: columns, slide paths, signals, loops
-13. `mesh`         tagged meshes of two coated pieces
-14. `surface`      measured height profiles for roughness, wear and gaps
-15. `elasticity`   static condensation of the pieces to their interface, and stress recovery
-16. `contact`      gap shapes, unilateral contact, asperity layers, strips
-17. `friction`     friction laws and the sum over bonds along the path
-18. `slip`         partial slip of the pieces: elements, shear modes, tangents
-19. `structure`    modes and drive of the rig
-20. `hybrid`       motion from event to event by steps of order 8
-21. `points`       steps of order 2: many contact points, and sweeps over many cases
-22. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-23. `response`     measures of a run: outcome, events, levels and free vibration
-24. `wear`         wear depth over many cycles
-25. `runs`         patch, bench and rig: static contact, friction and dynamics combined
-26. `identify`     parameters from measurements, with confidence intervals
-27. `campaigns`    studies with many runs: fits, error against cost, sweeps
-28. `export`       summary, netCDF, VTK, report
-29. `api`          Python interface: load, build, plan and run
-30. `commands`     verbs of the command line
+6. `convergence`    error of a value from its changes between successive runs
+7. `motion_measures`  measures that several engines have: loops, energy balance, reversals
+8. `effects`      physical effects and methods that a scene can request
+9. `disk`         atomic writes, locks and the user's cache
+10. `compiled`     machine code of the kernels and its cache
+11. `closed_forms` exact solutions of contact at rounded edges
+12. `scene`        parsing and validation of a TOML file, with values in SI units
+13. `inputs`       measured data files: columns, slide paths, signals, loops
+14. `mesh`         tagged meshes of two coated pieces
+15. `surface`      measured height profiles for roughness, wear and gaps
+16. `elasticity`   static condensation of the pieces to their interface, and stress recovery
+17. `contact`      gap shapes, unilateral contact, asperity layers, strips
+18. `friction`     friction laws and the sum over bonds along the path
+19. `slip`         partial slip of the pieces: elements, shear modes, tangents
+20. `structure`    modes and drive of the rig
+21. `hybrid`       motion from event to event by steps of order 8
+22. `points`       steps of order 2: many contact points, and sweeps over many cases
+23. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
+24. `response`     measures of a run: outcome, events, levels and free vibration
+25. `wear`         wear depth over many cycles
+26. `runs`         patch, bench and rig: static contact, friction and dynamics combined
+27. `identify`     parameters from measurements, with confidence intervals
+28. `campaigns`    studies with many runs: fits, error against cost, sweeps
+29. `export`       summary, netCDF, VTK, report
+30. `api`          Python interface: load, build, plan and run
+31. `commands`     verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. All imports are lazy: a module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded on first use (`lazy_imports`).

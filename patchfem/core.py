@@ -39,8 +39,10 @@ __all__ = [
     "PatchfemError",
     "Response",
     "SineDrive",
+    "add_interface_number",
     "compute_allowed_error",
     "frozen_array",
+    "remove_interface_number",
 ]
 
 G_N = 9.80665  # standard gravity [m s-2]
@@ -504,3 +506,14 @@ class Response:
             if n_samples == self.time.size:
                 extra[name] = history[:, samples] if name == "ledger" else history[samples]
         return Response(**columns, extra=extra)
+
+
+def remove_interface_number(name: str) -> str:
+    """Return the name of a measure without the number of an interface, such as "_2"."""
+    head, _, number = name.rpartition("_")
+    return head if number.isdigit() else name
+
+
+def add_interface_number(name: str, number: int) -> str:
+    """Return the name of a measure with the number of an interface, except for the first one."""
+    return f"{name}_{number + 1}" if number else name

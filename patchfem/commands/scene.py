@@ -4,12 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from .. import core
 from ..campaigns.sweeps import parse_request
 from ..effects import law_has_trait, list_displayed_absent_effects
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
-from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import plan as patch_plan
 from ..runs.patch import result
@@ -140,7 +140,7 @@ def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> No
     is_upper_estimate = not is_solved and any(
         not isinstance(link, str)
         for name, link in plan_data["stiffness_chain"].items()
-        if rows.remove_interface_number(name) == "pieces_shear"
+        if core.remove_interface_number(name) == "pieces_shear"
     )
     if is_upper_estimate:
         print(

@@ -5,8 +5,8 @@ verbs. KEY_QUANTITY_NAMES lists the quantities that come first: in the tiles of 
 columns of a table.
 """
 
-from collections import ChainMap
-
+from .. import response
+from ..core import MeasureDefinition, remove_interface_number
 from ..formatting import (
     MAX_SIGNIFICANT_DIGITS,
     UNIT_LADDERS,
@@ -15,7 +15,6 @@ from ..formatting import (
     format_with_error,
     round_to_error,
 )
-from ..response import rows
 from ..runs.results import patch_rows
 from . import surface_definitions
 from .answer import Definition, Quantities, Quantity
@@ -167,13 +166,21 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     if kind in SURFACE_ANSWER_KINDS:
         return surface_definitions.find_surface_definition(
             name
-        ) or surface_definitions.find_surface_definition(rows.remove_interface_number(name))
+        ) or surface_definitions.find_surface_definition(remove_interface_number(name))
     # quantities of a sweep: limits of its key, and extremes of measures
     measure = name.removeprefix("largest_").removeprefix("smallest_")
-    base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(measure)
-    definitions = ChainMap(QUANTITIES, patch_rows.PATCH_TABLE, rows.MOTION_TABLE)
-    found = definitions.get(name) or definitions.get(measure) or definitions.get(base_name)
+    base_name = "limit" if name.startswith("limit_") else remove_interface_number(measure)
+    found = _find_row(name) or _find_row(measure) or _find_row(base_name)
     return found and Definition(found.unit, found.text)
+
+
+def _find_row(name: str) -> Definition | MeasureDefinition | None:
+    """Return the row of the first table that has a name; the measures of a motion are read last, for a motion alone."""
+    return (
+        QUANTITIES.get(name)
+        or patch_rows.PATCH_TABLE.get(name)
+        or response.rows.MOTION_TABLE.get(name)
+    )
 
 
 def describe_quantity(name: str, kind: str = "") -> str:
@@ -181,7 +188,7 @@ def describe_quantity(name: str, kind: str = "") -> str:
     definition = find_definition(name, kind)
     if definition is None:
         return ""
-    base_name = rows.remove_interface_number(name)
+    base_name = remove_interface_number(name)
     number = name.removeprefix(base_name).removeprefix("_")
     part = "group" if kind in SURFACE_ANSWER_KINDS else "interface"
     text = f"{definition.text}; of {part} {number}" if number else definition.text
@@ -200,7 +207,7 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
     size : float
         Magnitude of the number [SI].
     """
-    last_word = rows.remove_interface_number(name).rpartition("_")[2]
+    last_word = remove_interface_number(name).rpartition("_")[2]
     if unit == "1" and last_word in PERCENT_NAME_ENDINGS:
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
@@ -238,8 +245,8 @@ def _find_digits(name: str) -> int | None:
     """Return the number of digits to show of a quantity without an error; None for a measure of a run: all digits."""
     if name in QUANTITIES:
         return QUANTITIES[name].digits
-    base_name = rows.remove_interface_number(name)
-    if base_name in rows.MOTION_TABLE or base_name in patch_rows.PATCH_TABLE:
+    base_name = remove_interface_number(name)
+    if base_name in patch_rows.PATCH_TABLE or base_name in response.rows.MOTION_TABLE:
         return None
     return SURFACE_QUANTITY_DIGITS if surface_definitions.find_surface_definition(name) else None
 
@@ -289,8 +296,8 @@ def _zero_limit(name: str, quantity: Quantity) -> float:
 
     It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
     """
-    table = patch_rows.PATCH_TABLE if name in patch_rows.PATCH_TABLE else rows.MOTION_TABLE
-    row = table.get(rows.remove_interface_number(name))
+    base_name = remove_interface_number(name)
+    row = patch_rows.PATCH_TABLE.get(name) or response.rows.MOTION_TABLE.get(base_name)
     return quantity.floor if row is None else min(row.floor, quantity.floor)
 
 

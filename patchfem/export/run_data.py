@@ -12,21 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import inputs, response, structure
 from ..core import PatchfemError, SineDrive
-from ..inputs import loops, measured
-from ..model import structure
-from ..response import spectrum
-from ..response.events import EVENT_KIND_NAMES
-from ..response.levels import LEVEL_MEASURES
-from ..response.rows import MOTION_TABLE
+from ..model import structure as structure_model
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
-from ..structure import drive_sizes
 from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
 
 # Largest difference of the drive frequencies of a run and of a measured row that belongs to it
 MAX_FREQUENCY_DIFFERENCE_HZ = 0.5
-CODE_MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
+STATUS_NAMES = ("open", "stick", "slip")  # meanings of the codes of the status of a node
 STICK_STATE_TEXT = "state of the interface"
 # Quantities that the sensors of a rig measure, and their SI units
 SENSOR_UNITS = {"acceleration": "m s-2", "displacement": "m"}
@@ -249,12 +244,13 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
     values = next((one for one in found if one is not None), None)
     if values is None or not np.size(values):
         return {}
-    if name in CODE_MEANINGS:
+    meanings = _list_code_meanings(name)
+    if meanings:
         values = np.asarray(values, np.int8)
     elif row.unit == "":
         values = np.array([str(value) for value in values])
     variables = make_columns(row.dims, {name: (values, row.unit, row.text)})
-    return {name: replace(variables[name], meanings=CODE_MEANINGS.get(name, ()))}
+    return {name: replace(variables[name], meanings=meanings)}
 
 
 def _look_up(value, place: str):
@@ -286,7 +282,7 @@ def _collect_motion(result: Result) -> Variables:
     else:
         # the coordinates of a rig of masses are the motions of its masses
         rig = result.plan.model.rig
-        motions = structure.compute_named_motions(rig.modes, response.modal)
+        motions = structure_model.compute_named_motions(rig.modes, response.modal)
         columns = {"modal_coordinate": (motions, "m", "modal coordinate")}
         data = make_columns("time mode", columns)
         if result.plan.kind != "rig":
@@ -343,7 +339,7 @@ def _collect_measured_loop(result: Result) -> Variables:
     if result.plan.kind != "bench" or slide.get("kind") != "file":
         return {}
     try:
-        loop = loops.read_loop(source.path.parent / slide["file"])
+        loop = inputs.loops.read_loop(source.path.parent / slide["file"])
     except PatchfemError:  # a file of slides alone
         return {}
     if loop.time is None:
@@ -400,6 +396,13 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
     return data
 
 
+def _list_code_meanings(name: str) -> tuple[str, ...]:
+    """Return the meaning of each code of a variable of codes; () for other variables."""
+    if name == "status":
+        return STATUS_NAMES
+    return response.events.EVENT_KIND_NAMES if name == "event_kind" else ()
+
+
 def _make_field(name: str, values, frame: str) -> Variable:
     """Return a field along x over frames, and over strips if it has three dimensions.
 
@@ -408,7 +411,7 @@ def _make_field(name: str, values, frame: str) -> Variable:
     """
     unit, text = INTERFACE_FIELDS[name]
     dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
-    return Variable(dims, np.asarray(values), unit, text, CODE_MEANINGS.get(name, ()))
+    return Variable(dims, np.asarray(values), unit, text, _list_code_meanings(name))
 
 
 def _collect_face(face) -> Variables:
@@ -434,12 +437,13 @@ def _collect_levels(result: Result) -> Variables:
         "level_drive": ([level.drive for level in levels], unit, drive_text),
         "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STICK_STATE_TEXT),
     }
-    for name in LEVEL_MEASURES:
+    table = response.rows.MOTION_TABLE
+    for name in response.levels.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
-            unit = MOTION_TABLE[name].unit
+            unit = table[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, MOTION_TABLE[name].text)
+            columns[f"level_{name}"] = (values, unit, table[name].text)
             columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
     data = make_columns("level", columns)
     data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))
@@ -490,7 +494,7 @@ def _collect_readings(result: Result) -> Variables:
         return {}
     rows, computed = readings
     measured_columns = {"measured_input": ([row.input for row in rows], "m s-2", "input")}
-    level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
+    level = structure.drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
     text = "largest acceleration of the drive"
     columns = {"computed_input": ([float(level)], "m s-2", text)}
     for name, unit in SENSOR_UNITS.items():
@@ -505,7 +509,7 @@ def _collect_readings(result: Result) -> Variables:
     return make_columns("measured_row", measured_columns) | make_columns("computed", columns)
 
 
-def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantities] | None:
+def find_readings(result: Result) -> tuple[list[inputs.measured.MeasuredRow], Quantities] | None:
     """Return the measured rows at the drive frequency, and the computed readings of the sensors.
 
     Returns
@@ -519,7 +523,7 @@ def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantitie
         return None
     path, gains, kind, cutoff = model.measured
     frequency = model.rig.drive.frequency
-    table = measured.read_table(path)
+    table = inputs.measured.read_table(path)
     rows = [row for row in table if abs(row.frequency - frequency) <= MAX_FREQUENCY_DIFFERENCE_HZ]
     if not rows:
         return None
@@ -531,7 +535,7 @@ def find_readings(result: Result) -> tuple[list[measured.MeasuredRow], Quantitie
     peak = measures["acceleration"]
     signal = model.rig.drive.signal
     if kind != "peak" and isinstance(signal, SineDrive) and peak is not None and peak.value:
-        reading = spectrum.read_instrument(result.window, signal, peak.value, kind, cutoff)
+        reading = response.spectrum.read_instrument(result.window, signal, peak.value, kind, cutoff)
         factors["acceleration"] *= reading / peak.value
 
     computed = {}

@@ -8,7 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from ..core import Outcome
+from .. import response, structure
+from ..core import Outcome, remove_interface_number
 from ..formatting import (
     UNIT_LADDERS,
     choose_unit,
@@ -17,12 +18,8 @@ from ..formatting import (
     format_quantity,
     format_value,
 )
-from ..response.outcome import OPEN_LOOP_MESSAGE
-from ..response.reasons import COMMON_PERIOD_MESSAGE
-from ..response.rows import STEADY_AMPLITUDE, remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
-from ..structure import drive_sizes
 from . import quantities
 from .answer import JsonObject, Quantities, Quantity
 from .run_data import SENSOR_UNITS, find_readings
@@ -156,7 +153,8 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
         return []
     if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
         text += " (mean of the last cycles)"
-    if any(warning.startswith(OPEN_LOOP_MESSAGE) for warning in result.warnings):
+    message = response.outcome.OPEN_LOOP_MESSAGE
+    if any(warning.startswith(message) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
@@ -187,9 +185,11 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
         return f"{outcome.sentence} Above {knee} friction alone does not limit it; the drive is {drive}."
     if outcome is Outcome.TRANSIENT and _is_release(result):
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
-    steady = result.measures.get(STEADY_AMPLITUDE)
-    if steady is not None and steady.reason.startswith(COMMON_PERIOD_MESSAGE):
-        return f"Whether the motion is steady is unknown: {steady.reason}."
+    if outcome is Outcome.TRANSIENT:
+        steady = result.measures.get(response.rows.STEADY_AMPLITUDE)
+        message = response.reasons.COMMON_PERIOD_MESSAGE
+        if steady is not None and steady.reason.startswith(message):
+            return f"Whether the motion is steady is unknown: {steady.reason}."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
         return _describe_stuck_outcome(measures)
     return _describe_stability(result)
@@ -324,7 +324,7 @@ def list_readings(result: Result) -> list[JsonObject]:
     if readings is None:
         return []
     rows, computed = readings
-    level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
+    level = structure.drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
 
     # a row of another input belongs to another run
     rows = [row for row in rows if abs(row.input - level) <= MAX_INPUT_DIFFERENCE * row.input]

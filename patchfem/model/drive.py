@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import inputs
 from ..core import ModalBasis
 from ..effects import find_waveform, import_effect
-from ..inputs import signals
 from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, find_first_period
 from .file_cache import cache_by_file
@@ -38,7 +38,7 @@ def _read_recorded_drive(scene) -> tuple[np.ndarray, np.ndarray]:
     path = scene.resolve_path(scene.drive.file)
     with name_key("drive.file"):
         if find_waveform(scene.drive).is_random:
-            return signals.read_spectrum(path)
+            return inputs.signals.read_spectrum(path)
         return read_drive_file(path, scene.drive.kind)
 
 
@@ -58,4 +58,4 @@ def read_drive_file(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     tuple of numpy.ndarray
         Time (k,) [s] from 0 on, and acceleration (k,) [m s-2] or force (k,) [N].
     """
-    return signals.read_signal(path, "acceleration" if kind == "base" else "force")
+    return inputs.signals.read_signal(path, "acceleration" if kind == "base" else "force")

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contact import gaps
+from .. import contact
 from ..effects import GAP_SHAPES
 from ..scene.keys.contact import Contact
 from ..scene.keys.types import Table
@@ -103,7 +103,7 @@ class Gap:
         """
         pairs = []
         for name, keys in self.shapes:
-            evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)
+            evaluate = getattr(contact.gaps.SHAPE_PROPERTIES.get(name), quantity, None)
             if evaluate is not None:
                 pairs.append((keys, evaluate(keys)))
         return pairs
@@ -154,7 +154,7 @@ class Gap:
         for name, shape_keys in self.shapes:
             begin = perf_counter()
             keys = {key: value for key, value in shape_keys if key != "on"}
-            gap = gap + getattr(gaps, name)(x, **keys)
+            gap = gap + getattr(contact.gaps, name)(x, **keys)
             seconds[name] = perf_counter() - begin
 
         # The measured profile.

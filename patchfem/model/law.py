@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .. import friction
 from ..core import PatchfemError
 from ..effects import import_effect, law_takes_stiffness_or_length
-from ..friction.bonds import parameters, spread
 from . import patch as patch_models
 from .source import name_key
 
@@ -93,7 +93,7 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
         rest_growth, slip_growth = _scale_growth_rates(law)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
     if law.spread is not None:
-        factor = spread.carried_fraction(width, law.spread)
+        factor = friction.bonds.spread.carried_fraction(width, law.spread)
         changes["static"] = law.static * factor
         changes["kinetic"] = None if law.kinetic is None else law.kinetic * factor
     return complete_bond_length(law.model_copy(update=changes), load)
@@ -142,7 +142,7 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
     friction.bonds.parameters.Bonds
     """
     rest_speed = law.rest_speed or max(REST_SPEED_FRACTION * peak_speed, min_rest_speed)
-    return parameters.Bonds(
+    return friction.bonds.parameters.Bonds(
         law.static,
         law.bond_length,
         law.order,

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ..closed_forms import contact
+from .. import closed_forms
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
@@ -96,7 +96,7 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     flat = min(piece.length / 2 - piece.end.size for piece in pieces)
     modulus = patch.pieces.surface_modulus
     radius = 1 / sum(1 / radius for radius in radii)
-    half_width = contact.rounded_punch_half_width(load, flat, radius, modulus)
+    half_width = closed_forms.contact.rounded_punch_half_width(load, flat, radius, modulus)
     half_width = min(half_width, half_length)
     return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
 

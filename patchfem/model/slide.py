@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import inputs
 from ..core import Missing
-from ..inputs import slides
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -229,7 +229,7 @@ def _list_corners(keys) -> tuple[np.ndarray, np.ndarray]:
 @cache_by_file
 def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Read time (k,) [s] and displacement (k,) [m] of a path file (`inputs.slides.read_slide`)."""
-    return slides.read_slide(path)
+    return inputs.slides.read_slide(path)
 
 
 def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:

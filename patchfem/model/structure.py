@@ -9,9 +9,9 @@ from math import inf
 
 import numpy as np
 
+from .. import friction
 from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..effects import find_waveform, import_effect, law_has_trait
-from ..friction import record
 from ..scene.keys.memoize import memoize
 from ..scene.rules.methods import find_yaw_key
 from ..structure import masses, starts
@@ -159,7 +159,7 @@ def compute_sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
         If the law has no single finite stiffness.
     """
     law = interface.numbers
-    stiffness = record.stick_stiffness(law, load)
+    stiffness = friction.record.stick_stiffness(law, load)
     is_curved = law_has_trait(law.law, "bonds") and (law.order, law.reading) != (1, "stretch")
     if 0 < stiffness < inf and not is_curved:
         return stiffness

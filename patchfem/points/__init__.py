@@ -18,7 +18,7 @@ A law is a number in `law_rows.Law` with a branch in each of five functions. Rea
 PUBLIC = {
     "case_rows": ("SAME_CASE_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
-    "checkpoint": ("CheckpointFiles", "MAX_EARLY_SAMPLES", "store_checkpoints"),
+    "checkpoint": ("CheckpointFiles", "store_checkpoints"),
     "contacts": (
         "BondSum",
         "Contact",

@@ -24,8 +24,6 @@ from ..disk.atomic_write import write_atomically
 
 MIN_WRITE_INTERVAL = 20.0  # least time between two checkpoints [s]
 MAX_WRITE_FRACTION = 0.02  # largest fraction of the elapsed time that is spent on writing
-# Largest number of samples from before the last cycles, which limits memory and file size
-MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
 # What a march and its record change besides the arrays of the engine
 MARCH_STATE = ("done", "shift", "step", "first_energy", "first_sums")

@@ -18,6 +18,7 @@ from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
 from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
 from ..motion_measures import find_reversal_steps
+from ..structure import drive_sizes
 from ..structure.histories import INTERFACE_HISTORIES, find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
@@ -1118,7 +1119,7 @@ class Record:
             if self.keeps_samples:
                 self.early.append(rows[: -1 : self.stride])
         # Every second sample is kept if there are too many; a cycle then need not begin with one.
-        if sum(map(len, self.early)) > checkpoint.MAX_EARLY_SAMPLES:
+        if sum(map(len, self.early)) > drive_sizes.MAX_EARLY_SAMPLES:
             self.early = [np.concatenate(self.early)[::2]]
             self.stride *= 2
 

@@ -10,7 +10,8 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import NamedTuple
 
-from .errors import MAX_CONVERGENCE_ORDER, convergence_errors
+from ..convergence import MAX_CONVERGENCE_ORDER
+from .errors import convergence_errors
 from .measures import Values
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.

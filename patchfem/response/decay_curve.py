@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ..convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ..motion_measures import find_reversal_steps
-from .errors import MAX_CONVERGENCE_ORDER, convergence_error
 from .measures import ArrayPair
 
 # Candidate spans of a fit: number of half cycles on either side of a point.

@@ -6,8 +6,8 @@ definitions of the measures.
 
 import numpy as np
 
+from .. import friction
 from ..core import Measure, Response
-from ..friction import path_work
 from ..motion_measures import (
     MAX_RESTING_SLIDE_RANGE,
     MIN_ENERGY_DIFFERENCE,
@@ -199,7 +199,7 @@ def work_difference(work, loops, jumps: bool = False) -> float:
         after = (
             np.divide(works, steps, out=np.zeros_like(steps), where=steps != 0) if jumps else None
         )
-        total += float(path_work.sampled_work(slide, force, after).sum())
+        total += float(friction.path_work.sampled_work(slide, force, after).sum())
     return relative_gap(total, float(work[-1]), float(np.abs(works).sum()))
 
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import structure
 from ..core import Measure, Outcome, compute_allowed_error
-from ..structure import drive_sizes
 from . import stationary
 from .measures import Measures
 from .rows import AMPLITUDE, STEADY_AMPLITUDE
@@ -92,25 +92,28 @@ def judge_outcome(
     if is_random:
         is_stationary = stationary.is_stationary(solution.window, drive)
         return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
-    if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
+    if not drive.segments and structure.drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, {}
 
     # The levels before the last one have other amplitudes.
     cycles = slice(-int(level_cycles), None) if level_cycles else slice(None)
     extremes = np.asarray(solution.extremes, float)[cycles]
-    window = drive_sizes.count_cycles(solution.window.time, drive)
+    window = structure.drive_sizes.count_cycles(solution.window.time, drive)
     windows = measure_windows(extremes, window)
-    scale = drive_sizes.find_max_acceleration(drive) / drive_sizes.find_drive_omega(drive) ** 2
+    scale = (
+        structure.drive_sizes.find_max_acceleration(drive)
+        / structure.drive_sizes.find_drive_omega(drive) ** 2
+    )
     floor = AMPLITUDE_ROUND_OFF * scale
     amplitude = measures[AMPLITUDE]
 
     # The criteria are vectorized over motions, of which there is one.
-    is_periodic = drive_sizes.is_periodic(drive)
+    is_periodic = structure.drive_sizes.is_periodic(drive)
     count = int(repeat or 1)
     if is_periodic and not window % count:
         # A motion under another drive than a sine may have no first harmonic.
         phasors = np.ptp(extremes, axis=1) / 2
-        if drive_sizes.is_sinusoidal(drive):
+        if structure.drive_sizes.is_sinusoidal(drive):
             phasors = solution.phasors[cycles]
         decay = max(min_decay_rate, 0.0) * window * drive.period
         # Only the cycles of a common period of drive and load can be compared.
@@ -236,9 +239,9 @@ def find_ringing(solution, measures: Measures, limits: tuple[float, float], driv
     amplitude = measures[AMPLITUDE]
     if solution.outcome is not Outcome.STUCK or solution.extremes is None:
         return 0.0
-    if not drive_sizes.is_periodic(drive) or not amplitude.value:
+    if not structure.drive_sizes.is_periodic(drive) or not amplitude.value:
         return 0.0
-    window = drive_sizes.count_cycles(solution.window.time, drive)
+    window = structure.drive_sizes.count_cycles(solution.window.time, drive)
     decay = min_decay_rate * drive.period * window
     ringing = float(remaining_ringing(measure_windows(solution.extremes, window), decay))
     sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)
@@ -292,7 +295,7 @@ def note_on_changing_drive(outcome: Outcome, drive) -> list[str]:
     if (
         outcome is not Outcome.TRANSIENT
         or drive.segments
-        or drive_sizes.count_repeat_cycles(drive) is not None
+        or structure.drive_sizes.count_repeat_cycles(drive) is not None
     ):
         return []
     return [

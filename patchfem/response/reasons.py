@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import structure
 from ..core import Measure, Outcome
 from ..formatting import format_number
-from ..structure import drive_sizes
 from .measures import Measures
 from .rows import MOTION_TABLE, STEADY_AMPLITUDE
 
@@ -116,7 +116,7 @@ def find_invalid(
     if is_rigid and stick is not None and stick.value is not None:
         if stick.value > MOTION_TABLE["stick_fraction"].floor + (stick.error or 0.0):
             reasons["secant_stiffness"] = STICKS_AT_REVERSAL_REASON
-    is_periodic = drive_sizes.is_periodic(drive)
+    is_periodic = structure.drive_sizes.is_periodic(drive)
     if not is_periodic or repeat != 1:
         has_beat = is_periodic or hasattr(drive, "beat")
         reasons["drift_per_cycle"] = BEATS_REASON if has_beat else APERIODIC_REASON
@@ -129,7 +129,7 @@ def find_invalid(
             invalid[name] = replace(measures[name], value=None, error=None, reason=reason)
     if outcome is Outcome.TRANSIENT and is_periodic and STEADY_AMPLITUDE not in measures:
         reason = CHANGE_NOT_RESOLVED_REASON
-        if drive_sizes.count_cycles(window.time, drive) % repeat:
+        if structure.drive_sizes.count_cycles(window.time, drive) % repeat:
             reason = f"{COMMON_PERIOD_MESSAGE} {repeat:.0f} cycles of the drive, more than the run has to compare"
         invalid[STEADY_AMPLITUDE] = _make_missing_measure(STEADY_AMPLITUDE, reason)
     return invalid
@@ -176,7 +176,7 @@ def find_missing_unbounded(values) -> Measures:
 
 def _reason_for_missing_phase(values, drive) -> str:
     """Return the reason why the phase of slip onset has no value."""
-    if not drive_sizes.is_sinusoidal(drive):
+    if not structure.drive_sizes.is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stick_fraction = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stick_fraction == 1.0:
@@ -204,9 +204,9 @@ def _reason_for_missing_cycle_value(
     other_modes_fraction : float
         Contribution of other modes than the first one to the slide.
     """
-    if not drive_sizes.is_sinusoidal(drive):
+    if not structure.drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
+    if not structure.drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATION_MEASURES and ACCELERATION_MEASURES[0] in values:
         return OUTPUT_AT_REST_REASON

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import MeasureDefinition, Response
+from .. import structure
+from ..core import MeasureDefinition, Response, add_interface_number, remove_interface_number
 from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance
-from ..structure import drive_sizes
 from . import stationary
 from .loops import (
     Reversal,
@@ -117,7 +117,7 @@ class LastCycles:
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
         """
-        if not drive_sizes.has_full_cycle(self.span, self.drive):
+        if not structure.drive_sizes.has_full_cycle(self.span, self.drive):
             return {}
         return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
@@ -232,10 +232,10 @@ def _random_rows(
     return value_row, scatter_row
 
 
-AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
-STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
+AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
+STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
 UNIT_LARGER_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
 # Order of convergence of values that are interpolated by cubics between samples.
@@ -613,17 +613,6 @@ def compute_measures(last_cycles: LastCycles) -> Values:
         for name in INTERFACE_MEASURES:
             values[add_interface_number(name, number)] = interface.evaluate(MOTION_TABLE[name])
     return {name: value for name, value in (values | known).items() if value is not None}
-
-
-def remove_interface_number(name: str) -> str:
-    """Return the name of a measure without the number of an interface, such as "_2"."""
-    head, _, number = name.rpartition("_")
-    return head if number.isdigit() else name
-
-
-def add_interface_number(name: str, number: int) -> str:
-    """Return the name of a measure with the number of an interface, except for the first one."""
-    return f"{name}_{number + 1}" if number else name
 
 
 def error_floor(name: str, values: Values, displacement=np.inf):

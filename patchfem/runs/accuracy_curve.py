@@ -6,7 +6,7 @@ is needed. In contrast, `campaigns.cost` measures whole runs.
 
 from typing import NamedTuple
 
-from ..response.errors import ERROR_MEASURES, absolute_change
+from .. import response
 from .refine import is_main
 from .results.patch_rows import Measures, Values
 
@@ -45,8 +45,10 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
         [] if there is no run with fewer steps, if no error exceeds round-off, or if the steps do not limit the accuracy.
     """
     step_runs = result.motion.step_runs
+    if len(step_runs) < 2:
+        return []
     measures = _select_measures(result.measures, step_runs)
-    if len(step_runs) < 2 or not measures:
+    if not measures:
         return []
     present_run, *coarser_runs = step_runs
     tolerance = result.plan.model.accuracy.tolerance
@@ -67,7 +69,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     present = settings[0].error
     distances = errors
     for run in coarser_runs:
-        change = absolute_change(present_run.values, run.values)
+        change = response.errors.absolute_change(present_run.values, run.values)
         # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))
@@ -81,7 +83,7 @@ def _select_measures(measures: Measures, step_runs) -> Measures:
     for name, measure in measures.items():
         is_known = None not in (measure.value, measure.error)
         is_in_all_runs = all(name in run.values for run in step_runs)
-        if is_known and is_in_all_runs and name not in ERROR_MEASURES:
+        if is_known and is_in_all_runs and name not in response.errors.ERROR_MEASURES:
             common[name] = measure
     main = {name: measure for name, measure in common.items() if is_main(name)}
     return main or common

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
 
+from .. import response
 from ..core import Outcome
-from ..response import outcome
 from .results.result import Result
 
 # Largest relative residual of the load; the contact solver reaches 1e-9 or less.
@@ -33,7 +33,7 @@ def mark_unbalanced(result: Result) -> Result:
     return replace(
         result,
         outcome=Outcome.NOT_CONVERGED,
-        measures=outcome.remove_errors(result.measures),
+        measures=response.outcome.remove_errors(result.measures),
         warnings=[*warnings, *result.warnings],
     )
 

@@ -1,7 +1,7 @@
 """Findings of a run: measures that miss the tolerance, each with the advice that reduces its error.
 
 In: the measures of a run with their errors, and its pressed interfaces. Out: `Finding`s, whose sentences are warnings.
-The error of a measure is `safety * change / (ratio**order - 1)` (`response.errors`). An error that is `excess` times
+The error of a measure is `safety * change / (ratio**order - 1)` (`convergence`). An error that is `excess` times
 the allowed one therefore needs a resolution that is finer by the factor `excess ** (1 / order)`. Read
 `find_missed_measures` first, then ADVICE_BY_AXIS.
 """
@@ -10,11 +10,12 @@ from collections.abc import Callable, Mapping
 from math import ceil, floor, log2, log10
 from typing import NamedTuple
 
+from .. import response
+from ..convergence import MAX_CONVERGENCE_ORDER
 from ..core import Measure
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
-from ..response import errors, rows
 from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
@@ -186,7 +187,7 @@ def _advise_strips(patch_model, excess: Mapping) -> Advice:
     measure that misses the tolerance.
     """
     present = patch_model.interface.strips.count
-    ratio = max(2.0, max(excess.values()) ** (1 / errors.MAX_CONVERGENCE_ORDER))
+    ratio = max(2.0, max(excess.values()) ** (1 / MAX_CONVERGENCE_ORDER))
     count = min(ceil(present * ratio), MAX_PROPOSED_STRIPS)
     if count < 2 * present:
         return Advice(
@@ -260,7 +261,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     advice = None if advise is None else advise(missed)
     if advice is not None:
         return advice._replace(axis=axis)
-    if name == rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
+    if name == response.rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
     return Advice(USE_ERROR_ADVICE)
@@ -275,7 +276,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
         return None
-    halvings = ceil(log2(missed.excess[missed.worst]) / errors.MAX_CONVERGENCE_ORDER)
+    halvings = ceil(log2(missed.excess[missed.worst]) / MAX_CONVERGENCE_ORDER)
 
     # A rig doubles its steps while this reduces the errors, or needs none from event to event, unless the scene fixes them.
     model = missed.model

@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from ..convergence import convergence_error
 from ..core import frozen_array
 from ..effects import law_has_trait
 from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..model.structure import compute_sticking_stiffness
-from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
 from .patch import mesh_levels, store
 from .patch.press import Patch, Patches

@@ -8,8 +8,8 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import structure
 from ..core import Missing
-from ..points import checkpoint
 from .plan import Plan
 from .rig import engines, numerics
 
@@ -123,7 +123,7 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
-    turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
+    turns = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
 
     return [

@@ -8,14 +8,11 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
-from ..core import PatchfemError
+from .. import friction, inputs
+from ..core import PatchfemError, add_interface_number
 from ..effects import EFFECTS, law_has_trait
-from ..friction import record
-from ..friction.bonds import spread
-from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import locate_errors
-from ..response import rows
 from ..scene import refuse_attribute
 from . import joint
 from .bench import engine as of_bench
@@ -149,7 +146,7 @@ def _make_plan(model: Model) -> Plan:
     if model.measured is not None:
         try:
             # An invalid table of measured responses is reported before anything runs.
-            measured.read_table(model.measured.path)
+            inputs.measured.read_table(model.measured.path)
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
@@ -186,7 +183,7 @@ def _make_plan(model: Model) -> Plan:
         if interface.patch is not None:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
-                    chain[rows.add_interface_number(name, number)] = link
+                    chain[add_interface_number(name, number)] = link
             # The whole patch slips when its pieces are sheared by mu_s N/k.
             slip_force = interface.numbers.static * interface.load
             slip_length = slip_force / interface.patch.pieces.shear_stiffness
@@ -259,7 +256,7 @@ def _law_stiffness(law, load: float):
     """Return the stiffness [N/m] of a friction law in stick; a text if it is infinite or undefined."""
     if law_has_trait(law.law, "creeps"):
         return "none: it creeps"
-    stiffness = record.stick_stiffness(law, load)
+    stiffness = friction.record.stick_stiffness(law, load)
     return "rigid until it slips" if stiffness == inf else stiffness
 
 
@@ -271,7 +268,7 @@ def _compute_law_groups(model: Model) -> Values:
     if model.spread is None:
         return {}
 
-    return {"share_of_the_spread": spread.carried_fraction(model.pad, model.spread)}
+    return {"share_of_the_spread": friction.bonds.spread.carried_fraction(model.pad, model.spread)}
 
 
 def _describe_grooves(model: Model) -> list[str]:

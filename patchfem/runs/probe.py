@@ -5,7 +5,7 @@ In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each set
 
 from typing import Any, NamedTuple
 
-from ..response import rows
+from ..core import remove_interface_number
 from .plan import Plan
 from .results.patch_rows import PATCH_TABLE
 from .run import run
@@ -51,7 +51,7 @@ def run_probe(plan: Plan) -> Probe:
     sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
     static = {}
     for name, measure in result.measures.items():
-        row = PATCH_TABLE.get(rows.remove_interface_number(name))
+        row = PATCH_TABLE.get(remove_interface_number(name))
         if row is not None and row.group == "patch":
             static[name] = measure.value
     return Probe(seconds, static, tuple(sentences))

@@ -13,11 +13,11 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from .. import response
 from ..core import Measure, Outcome
 from ..cost_model import measure_cpu_time
 from ..formatting import format_number
 from ..model.model import Model
-from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import PATCH_TABLE, Measures, Values
 from .results.result import TimeShortage
@@ -291,7 +291,7 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
 
 def is_main(name: str) -> bool:
     """Return whether a measure is one of those for whose sake a run is refined; warnings are about all measures."""
-    row = PATCH_TABLE.get(name) or rows.MOTION_TABLE.get(name)
+    row = PATCH_TABLE.get(name) or response.rows.MOTION_TABLE.get(name)
     return row is not None and row.has("main")
 
 

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import points
 from ..core import Measure, Missing, NotConverged, Outcome
 from ..cost_model import measure_cpu_time
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..points import checkpoint
 from . import joint, memory, refine
 from .balances import mark_unbalanced
 from .bench import result as bench_result
@@ -302,8 +302,8 @@ class _Passes:
         is_missing = not self._count and model.wear is None and not march_state_path(1).is_file()
         if file.resume and is_missing:
             raise evolve.make_missing_state_error(file.path)
-        return checkpoint.store_checkpoints(
-            checkpoint.CheckpointFiles(
+        return points.checkpoint.store_checkpoints(
+            points.checkpoint.CheckpointFiles(
                 march_state_path, hash_run(model, patch, file.version), file.resume
             )
         )

@@ -16,6 +16,8 @@ SAMPLES_PER_CYCLE = 200
 MIN_SAMPLES_PER_CYCLE = 20
 # Largest number of samples of a whole run; more samples make results files large
 MAX_STORED_SAMPLES = 20_000
+# Largest number of samples from before the last cycles, which limits memory and file size
+MAX_EARLY_SAMPLES = 400_000
 # Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
 PERIOD_TIME_TOL = 1e-6
 # Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter

@@ -11,7 +11,6 @@ from patchfem.friction import Bonds
 from patchfem.friction.bonds.point_kernels import MAX_SERIES_PATH
 from patchfem.points import (
     March,
-    checkpoint,
     laws,
     make_bond_contact,
     make_contact,
@@ -21,6 +20,7 @@ from patchfem.points import (
 from patchfem.points import time_march as engine
 from patchfem.points.march_rows import Point
 from patchfem.slip.shear_modes import shear_modes
+from patchfem.structure import drive_sizes
 
 from .test_march_loads import reduce_to_shear_modes
 
@@ -192,7 +192,7 @@ def test_exact_long_march_keeps_thinned_samples_of_all_cycles(monkeypatch):
     Once the samples ended where the room was full, with a gap up to the last cycles.
     """
     whole = march(BASIS, DRIVE, make_tanh_contact(), 40, STEPS, repeats=False).response
-    monkeypatch.setattr(checkpoint, "MAX_EARLY_SAMPLES", 300)
+    monkeypatch.setattr(drive_sizes, "MAX_EARLY_SAMPLES", 300)
     thinned = march(BASIS, DRIVE, make_tanh_contact(), 40, STEPS, repeats=False).response
     assert len(thinned.time) <= 300 + 18 * STEPS < len(whole.time)
     assert np.diff(thinned.time).max() < 0.3 * DRIVE.period

@@ -5,8 +5,8 @@ import pytest
 from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
 import patchfem as pf
+from patchfem.convergence import ERROR_SAFETY_FACTOR
 from patchfem.response import convergence_errors
-from patchfem.response.errors import ERROR_SAFETY_FACTOR
 
 NAME = "relative_displacement_amplitude"
 

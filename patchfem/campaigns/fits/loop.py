@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...convergence import convergence_error
 from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
 from ...inputs.loops import Loop, read_loop
 from ...model.gap import find_shape_side
 from ...model.model import Model, build
 from ...model.source import locate_errors
-from ...response.errors import convergence_error
 from ...runs.batch.meshes import SharedMeshes
 from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation

@@ -11,7 +11,7 @@ from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
-from ...core import PatchfemError
+from ...core import PatchfemError, remove_interface_number
 from ...response import rows
 from ...runs.batch.case_results import FAILED_OUTCOME
 from ...runs.results.patch_rows import PATCH_TABLE as STATIC
@@ -185,7 +185,7 @@ def sort_measures(table: SweepTable) -> list[str]:
     return sorted(
         table.measures,
         key=lambda name: (
-            MEASURE_ORDER.get(rows.remove_interface_number(name), len(MEASURE_ORDER)),
+            MEASURE_ORDER.get(remove_interface_number(name), len(MEASURE_ORDER)),
             name,
         ),
     )

@@ -13,13 +13,14 @@ turn there without an event: the piece is left at its end, or at the reversal fr
 ALL_REVERSALS each turn is an event all the same.
 """
 
+from __future__ import annotations
+
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ...friction.laws.elastic_plastic import masing_loop
-from ...friction.protocol import SteadyLoop
+from ... import friction
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
@@ -367,14 +368,14 @@ def list_elements(law: LawNumbers) -> tuple[np.ndarray, np.ndarray]:
     return -np.diff(slopes), points[1:]
 
 
-def find_loop(law: LawNumbers, amplitude: float) -> SteadyLoop:
+def find_loop(law: LawNumbers, amplitude: float) -> friction.protocol.SteadyLoop:
     """Return the loop between two opposite slides of an amplitude > 0 [m].
 
     By Masing's rules the area is 8 times the work of first loading less 4 times force times slide.
     """
     p = np.array(law.numbers)
     if p[1] < 0:
-        return masing_loop(*list_elements(law), amplitude)
+        return friction.laws.elastic_plastic.masing_loop(*list_elements(law), amplitude)
 
     # Work of the power law up to phi_max, and of the constant force beyond it
     ratio = min(amplitude / p[3], 1.0)
@@ -382,7 +383,7 @@ def find_loop(law: LawNumbers, amplitude: float) -> SteadyLoop:
     part = ratio ** (p[0] + 1) / ((p[0] + 2) * (p[0] + 3))
     force = float(load_first(p, amplitude))
     work = scale * p[3] * ratio**2 * ((p[1] + 1) / 2 - part) + p[2] * max(amplitude - p[3], 0.0)
-    return SteadyLoop(force, 8 * work - 4 * force * amplitude)
+    return friction.protocol.SteadyLoop(force, 8 * work - 4 * force * amplitude)
 
 
 def with_all_reversals(law: LawNumbers) -> LawNumbers:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...convergence import MAX_CONVERGENCE_ORDER
 from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
@@ -25,7 +26,7 @@ from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
+from ...response.errors import convergence_errors, total_error
 from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
 from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
 from ...response.rows import (

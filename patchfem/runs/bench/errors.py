@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import slip
 from ...response.coarser import (
     CoarserRuns,
     StepRun,
@@ -18,7 +19,6 @@ from ...response.coarser import (
     second_order_errors,
 )
 from ...response.errors import convergence_errors, finer_errors, friction_errors
-from ...slip import shear_modes
 from ..results.patch_rows import Values
 from . import bench, shear
 from .engine import uses_parallel_elements
@@ -142,7 +142,7 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         coarser = quarter._replace(level=1, modes=count)
         out.append(CoarserRuns((coarser,), second_order_errors, quarter, "mesh"))
         if count:
-            coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
+            coarser = quarter._replace(modes=slip.shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
 
     # A merged bond list converges to the full list as its strips become narrower.

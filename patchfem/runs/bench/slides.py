@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import slip
 from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import contacts, slides
 from ...points.laws import make_elements, make_point_law
-from ...slip import fields
 from ..patch import jenkins_elements
 from . import averaged_law, shear
 from .engine import CLOSED_FORM, BenchEngine, BondListGuard, has_changing_pressure
@@ -321,30 +321,30 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
 
     # Shear stress and local slip of the frames, by what represents the shear of the pieces.
     load = task.compute_loads()
-    slip = motion.slip
+    local_slip = motion.slip
     frames = task.frames
     if jenkins_set is not None:
         states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
         length = make_law(model.friction).length
-        tau, local = fields.compute_element_fields(patch, jenkins_set, states, length)
+        tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
     elif model.partial_slip or model.side == "lower":
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
         ratio = np.divide(motion.force, load, out=np.zeros_like(load), where=load > 0)[frames]
         sigma = task.evaluate_pressure(frames)
         tau = ratio[:, None] * sigma
-        local = np.where(sigma > 0, slip[frames, None], task.slide[frames, None])
+        local = np.where(sigma > 0, local_slip[frames, None], task.slide[frames, None])
 
     # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
     has_bonds = law_has_trait(model.friction.law, "bonds") and model.grooves is None
     if not model.partial_slip and (has_bonds or model.load_varies):
         length = model.friction.bond_length or 0.0
-        slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
+        local_slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
         stretch = _find_stretch(task, tau, task.evaluate_pressure(frames))
         local = task.slide[frames, None] - stretch
     work = motion.mean * np.diff(task.slide)
     ledger = stack_energies(work, motion.stored, motion.losses)
-    return SlideHistories(motion.force, load, slip, ledger, tau, local)
+    return SlideHistories(motion.force, load, local_slip, ledger, tau, local)
 
 
 def _find_stretch(task: SlideTask, force, load) -> np.ndarray:

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
+from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
-from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results.patch_rows import (
     EXTRAPOLATED_SOURCE,
@@ -613,8 +613,8 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures
         measure = measures_by_name[name]
         if measure.value is not None:
             change = value - other_values[name]
-            error = measure.error + errors.convergence_error(
-                change, ratio=ratio, order=errors.MAX_CONVERGENCE_ORDER
+            error = measure.error + convergence_error(
+                change, ratio=ratio, order=MAX_CONVERGENCE_ORDER
             )
             out[name] = replace(measure, error=float(error))
     return out

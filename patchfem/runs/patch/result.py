@@ -7,13 +7,13 @@ clamping.
 
 from dataclasses import replace
 
+from ... import surface
 from ...contact.press import NEGLECTED_SHEAR_NOTE
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
-from ...surface import nodes
 from ..results.patch_rows import Measures
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
@@ -147,7 +147,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
         )
 
     # Warnings on the profile, and on a mesh without a coarser one for an error estimate.
-    warnings += [text for text in patch.notes if not nodes.is_note(text)]
+    warnings += [text for text in patch.notes if not surface.nodes.is_note(text)]
     if not has_error_mesh:
         warnings.append(
             f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
@@ -176,7 +176,7 @@ def notes_on_neglected_effects(face) -> list[str]:
     model = face.model
     patch_model = model.patch
     patch, *coarse = face.patches
-    out = [text for text in patch.notes if nodes.is_note(text)]
+    out = [text for text in patch.notes if surface.nodes.is_note(text)]
 
     # How the results treat the waves of a profile.
     if patch.points is not None:

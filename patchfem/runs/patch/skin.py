@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import surface
 from ...contact import asperity_laws
 from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
-from ...surface.roughness import peaks
 
 
 def make_skin_law(patch_model):
@@ -52,7 +52,7 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
         return []
 
     # Persson: stiffness = pressure / u_0, with u_0 = 0.4 to 0.5 of the rms height.
-    soft, stiff = peaks.persson_stiffness(pressure, skin.rms_height)
+    soft, stiff = surface.roughness.peaks.persson_stiffness(pressure, skin.rms_height)
 
     # Dust and heights that are not Gaussian make the peaks of a trace uncertain.
     remarks = []
@@ -73,6 +73,6 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
         f"a stiffness of {asperity_layer_stiffness(patch_model, pressure):.3g} Pa/m; Persson's theory, which includes "
         "waves of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
-        f'decay_length = "{sum(peaks.DECAY_LENGTH_OVER_RMS_HEIGHT) / 2 * skin.rms_height * 1e6:.3g} um"',
+        f'decay_length = "{sum(surface.roughness.peaks.DECAY_LENGTH_OVER_RMS_HEIGHT) / 2 * skin.rms_height * 1e6:.3g} um"',
         *remarks,
     ]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...closed_forms import contact
+from ... import closed_forms
 from ...contact import edges, stiffness
 from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
@@ -355,7 +355,9 @@ def unresolved_edge_rounding_pressure(patch: Patch) -> float:
         if abs(abs(x[node]) - half_flat_length) > 2 * cell:
             continue
         stress_intensity = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
-        peak_width, peak = contact.rounded_corner_contact(stress_intensity, radius, modulus)
+        peak_width, peak = closed_forms.contact.rounded_corner_contact(
+            stress_intensity, radius, modulus
+        )
         if MIN_CELLS_ON_ROUNDED_END * cell > peak_width:
             largest = max(largest, peak)
     return largest

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...response import rows
+from ...core import add_interface_number
 from .result import Finding, patch_surface
 
 
@@ -48,7 +48,7 @@ class Face(NamedTuple):
 
     def name_measure(self, name: str) -> str:
         """Return the name of a measure of this interface in the run, which has its number from the second one on."""
-        return rows.add_interface_number(name, self.number) if self.number else name
+        return add_interface_number(name, self.number) if self.number else name
 
     @property
     def partial_slip(self) -> str:

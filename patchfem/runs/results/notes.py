@@ -9,10 +9,10 @@ from itertools import chain
 from math import ceil, log2
 from typing import NamedTuple
 
+from ... import friction
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length
-from ...friction.bonds import parameters
 from .patch_rows import Measures
 from .result import Settings
 
@@ -82,7 +82,7 @@ def _warn_of_slow_forming(facts: LawFacts) -> Iterator[str]:
     law = find_bonds(facts.model)
     if law is None or law.reading != "report":
         return
-    ratio = parameters.growth_path_ratio(law, facts.speed)
+    ratio = friction.bonds.parameters.growth_path_ratio(law, facts.speed)
     if ratio > MAX_BOND_FORMING_SLIP_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_BOND_FORMING_SLIP_RATIO.
         max_growth_path = law.ratio / (

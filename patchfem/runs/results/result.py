@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome
+from ... import response
+from ...core import Outcome, add_interface_number, remove_interface_number
 from ...formatting import rewrite_powers_of_ten
-from ...response import rows
 from ...scene import refuse_attribute
 from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
@@ -275,8 +275,8 @@ def describe_measure(name: str, numbered_kind: str = "interface") -> str:
     if name in patch_rows.PATCH_TABLE:
         return patch_rows.PATCH_TABLE[name].text
 
-    first = rows.remove_interface_number(name)
-    row = patch_rows.PATCH_TABLE.get(first) or rows.find_definition(name)
+    first = remove_interface_number(name)
+    row = patch_rows.PATCH_TABLE.get(first) or response.rows.find_definition(name)
     return row.text + (
         "" if first == name else f"; of {numbered_kind} {name.removeprefix(first + '_')}"
     )
@@ -401,7 +401,7 @@ def collect_used_settings(result) -> dict[str, str | float]:
 
     # Resolution of the pressed interfaces.
     for face in result.faces:
-        settings[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
+        settings[add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
         settings["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:

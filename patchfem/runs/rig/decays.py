@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import NotConverged, PatchfemError
 from ...hybrid import quasi_static
 from ...hybrid.cases import UndrivenRig
@@ -24,7 +25,6 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
-from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_error
 from ...slip.mesh_correction import ERROR_TO_SPREAD_CHANGE, spread_elements
 from ..patch import faces
 from . import joints, numerics

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import slip
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
@@ -25,7 +26,6 @@ from ...response.errors import (
 from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
-from ...slip import shear_modes
 from ..patch import faces
 from .costs import prefers_time_steps
 from .solution import first_interface_load
@@ -162,7 +162,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
 
     has_node_bonds = coarse is not None and law_has_trait(model.friction.law, "bonds")
     if n_modes and (varies or model.grooves is not None or has_node_bonds):
-        coarser = replace(quarter, shear_modes=shear_modes.comparison_mode_count(n_modes))
+        coarser = replace(quarter, shear_modes=slip.shear_modes.comparison_mode_count(n_modes))
         coarser_runs.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]
 

@@ -4,10 +4,10 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
+from ... import friction
 from ...core import Outcome
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
-from ...friction import path_work
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.events import is_all_stuck
 from ...response.loops import reversal_force_rule
@@ -217,7 +217,7 @@ def compute_sampled_work(response) -> Values:
     Both follow from the samples of all interfaces by the trapezoidal rule.
     """
     pairs = zip(response.slides.T, response.forces.T)
-    parts = [path_work.sampled_work(slide, force) for slide, force in pairs]
+    parts = [friction.path_work.sampled_work(slide, force) for slide, force in pairs]
     sampled = sum(float(part.sum()) for part in parts)
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
+from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
@@ -18,7 +19,7 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
-from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
+from ...response.errors import ERROR_MEASURES, absolute_change
 from ...response.events import (
     SEGMENT_BORDER,
     Events,

@@ -6,10 +6,8 @@ interface nodes by name.
 
 import numpy as np
 
+from ... import friction, points, slip
 from ...effects import law_has_trait, needs_bond_list
-from ...friction import record
-from ...points import time_march
-from ...slip import fields
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
 from ..results.patch_rows import Arrays
@@ -58,7 +56,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
 
     # The points of a march may have bonds of their own.
     has_shear = bool(snapshots) and model.partial_slip
-    is_march = bool(snapshots) and isinstance(snapshots[0], time_march.Snapshot)
+    is_march = bool(snapshots) and isinstance(snapshots[0], points.time_march.Snapshot)
     has_node_bonds = False
     if is_march and snapshots[0].forces.size > 1 and law_has_trait(f.law, "bonds"):
         is_below = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
@@ -69,9 +67,9 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         reduction = getattr(solution.contact, "reduction", None)
-        length = 0.0 if reduction is None else record.make_law(f).length
+        length = 0.0 if reduction is None else friction.record.make_law(f).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        tau, local = fields.compute_element_fields(patch, reduction, states, length)
+        tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
         force = list_frames("force")

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import friction, points, slip
 from ...core import PatchfemError
 from ...effects import law_has_trait
-from ...friction import record
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
@@ -22,9 +22,6 @@ from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_rev
 from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
-from ...points import contacts
-from ...points import laws as point_laws
-from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements
@@ -54,7 +51,7 @@ class Joint(NamedTuple):
     speed: float
     stiffness: np.ndarray | None = None
     yields: np.ndarray | None = None
-    reduction: shear_modes.JenkinsSet | None = None
+    reduction: slip.shear_modes.JenkinsSet | None = None
 
     def make_law(self):
         """Return the friction law of an interface that slips as a whole, as the record from which engines take its numbers.
@@ -63,7 +60,7 @@ class Joint(NamedTuple):
         """
         if law_has_trait(self.law.law, "bonds"):
             return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
-        return record.make_law(self.law, self.load.mean)
+        return friction.record.make_law(self.law, self.load.mean)
 
     @property
     def length(self) -> float:
@@ -73,11 +70,11 @@ class Joint(NamedTuple):
         total = self.stiffness.sum()
         return float(self.stiffness @ self.yields / total) if total > 0 else 0.0
 
-    def make_point_law(self) -> point_laws.PointLaw:
+    def make_point_law(self) -> points.laws.PointLaw:
         """Return the law under its mean load as a PointLaw, the form for the time integration with equal steps."""
         if self.stiffness is not None:
-            return point_laws.make_elements(self.stiffness, self.yields)
-        return point_laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
+            return points.laws.make_elements(self.stiffness, self.yields)
+        return points.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
@@ -186,7 +183,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
         return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
 
     static = model.friction.static
-    length = record.make_law(model.friction, load.mean).length
+    length = friction.record.make_law(model.friction, load.mean).length
     parts = jenkins_elements.list_elements(patch, static, length)
     if slide_apart:
         return [(load, part) for part in parts]
@@ -265,7 +262,7 @@ def _find_stick_tolerance(joints, laws) -> float:
 # ---- march, and motions without a drive
 
 
-def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
+def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Contact:
     """Return the contact points of a time integration, with all interfaces and nonlinear springs.
 
     Parameters
@@ -281,9 +278,9 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     rows = rig.modes.interfaces
     springs = []
     if rig.springs.interlock is not None:
-        springs.append(contacts.make_interlocking_spring(*rig.springs.interlock, rows[0]))
+        springs.append(points.contacts.make_interlocking_spring(*rig.springs.interlock, rows[0]))
     if rig.springs.cubic is not None:
-        springs.append(contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
+        springs.append(points.contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
 
     # The points of a single interface may have lists of bonds, grooves or a load that changes.
     if len(rows) == 1 and model.friction is not None:
@@ -297,7 +294,7 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     laws = [joint.make_point_law() for joint in joints]
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     length = joints[0].length if joints else 0.0
-    contact = contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
+    contact = points.contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 

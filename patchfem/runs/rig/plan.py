@@ -8,11 +8,11 @@ from math import inf, pi
 
 import numpy as np
 
+from ... import slip
+from ...core import add_interface_number, remove_interface_number
 from ...effects import law_has_trait
 from ...model.model import Model
 from ...response.measures import Values
-from ...response.rows import add_interface_number, remove_interface_number
-from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from . import bond_lists
 from .costs import find_interface_load
@@ -110,7 +110,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
         return counts
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if model.partial_slip and is_changed:
-        counts["shear_modes"] = numerics.shear_modes or shear_modes.N_SHEAR_MODES
+        counts["shear_modes"] = numerics.shear_modes or slip.shear_modes.N_SHEAR_MODES
     return counts
 
 

@@ -186,7 +186,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     automatic steps is repeated with twice the steps (`_judge`).
 
     The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
-    `response.errors.convergence_error`, plus MIN_MOTION_RELATIVE_ERROR of the value (`add_errors`).
+    `convergence.convergence_error`, plus MIN_MOTION_RELATIVE_ERROR of the value (`add_errors`).
     Afterwards `complete_measures` adds the errors that the run itself shows.
 
     Parameters

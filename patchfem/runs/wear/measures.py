@@ -9,9 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
-from ...response.errors import convergence_error, convergence_errors
+from ...response.errors import convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values

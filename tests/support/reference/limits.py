@@ -55,7 +55,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "100 in each cycle",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
-    "points.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
+    "structure.drive_sizes.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
     "thinned out",
 }
 LEFT_OUT = f"""\
