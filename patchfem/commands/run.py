@@ -69,9 +69,7 @@ def run(
         _report_missing_page(written.page_fault, target)
     if output.verbose:
         seconds = written.answer.details["seconds"]
-        print_message(
-            "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in seconds.items())
-        )
+        print_message("CPU seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in seconds.items()))
     _end_run(written.answer, output.quiet)
 
 

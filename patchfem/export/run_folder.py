@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 from .. import __version__
@@ -153,14 +153,14 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     case : dict of str to str, optional
         Swept keys with their values as written, if the run is a case of a sweep.
     """
-    start_time = perf_counter()
+    start_time = process_time()
     notes = result.notes
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS_FILE)
     for face in result.faces[:MAX_WRITTEN_INTERFACES]:
         face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
         notes += [f"interface {face.name}: {note}" for note in face_notes]
-    result.seconds["files"] = perf_counter() - start_time
+    result.seconds["files"] = process_time() - start_time
     answer = make_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})

@@ -72,6 +72,12 @@ HEADLINE_PARTS = {
     ),
 }
 MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
+# Event that is the onset in a run with drive levels, by drive.onset
+ONSET_EVENTS = {
+    "slip": "slip begins",
+    "distortion": "the third harmonic of the acceleration exceeds 3 % of the first one",
+    "gauge": "the motion at the output exceeds drive.onset_length",
+}
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
@@ -119,7 +125,20 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
     cycles = details.get("cycles")
     if cycles is not None and cycles < 1 - CYCLE_ROUND_OFF:
         text = f"in {cycles:.2g} of a cycle: {text}"
+    if onset := _describe_onset(result, measures):
+        text = f"{onset}; at the last level: {text}"
     return f"{text[0].upper()}{text[1:]}."
+
+
+def _describe_onset(result: Result, measures: Quantities) -> str:
+    """Return the clause on the onset in a run with drive levels, or "" for other runs."""
+    onset = measures.get("onset_level")
+    if onset is None:
+        return ""
+    if onset.value is None:
+        return onset.reason
+    kind, _ = result.plan.model.rig.drive.levels.onset
+    return f"{ONSET_EVENTS[kind]} at {_format_measure('onset_level', measures)}"
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:

@@ -7,7 +7,7 @@ the coordinate x and the keys of the table; `effects.GAP_SHAPES` lists them.
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,14 +152,14 @@ class Gap:
 
         # Shapes in closed form, each with its computing time.
         for name, shape_keys in self.shapes:
-            begin = perf_counter()
+            begin = process_time()
             keys = {key: value for key, value in shape_keys if key != "on"}
             gap = gap + getattr(contact.gaps, name)(x, **keys)
-            seconds[name] = perf_counter() - begin
+            seconds[name] = process_time() - begin
 
         # The measured profile.
         if self.profile is not None:
-            begin = perf_counter()
+            begin = process_time()
             heights, notes = profiles.compute_profile_gap(
                 self.profile,
                 x,
@@ -169,7 +169,7 @@ class Gap:
                 is_material=self.material,
             )
             gap = gap + heights
-            seconds["profile"] = perf_counter() - begin
+            seconds["profile"] = process_time() - begin
         return ShapedGap(gap, notes, seconds)
 
 

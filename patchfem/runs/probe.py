@@ -17,7 +17,7 @@ HALF_ELEMENT_SIZE_TIME_RATIO = 5
 class Probe(NamedTuple):
     """Measured time of a run without error estimates.
 
-    - seconds: elapsed seconds by stage, and "total".
+    - seconds: CPU seconds by stage, and "total".
     - static: static measures of the patches by name; {} without a patch.
     - sentences: the time, and what each setting multiplies.
     """
@@ -46,7 +46,7 @@ def run_probe(plan: Plan) -> Probe:
     if contact := seconds.get("contact"):
         stages.append(f"{contact:.2g} s for the contact")
     sentences = [
-        ", ".join([f"a run without error estimates took {seconds['total']:.2g} s", *stages])
+        ", ".join([f"a run without error estimates took {seconds['total']:.2g} CPU s", *stages])
     ]
     sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
     static = {}

@@ -1,9 +1,10 @@
 """Refinement of a run until its measures meet the tolerance.
 
-In: a function that solves a problem with a resolution, and one that judges the solution. `refine` is the only loop: each
-pass has twice the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the
-patches or the steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its
-tolerance within accuracy.max_seconds is not repeated; its result names the axis and the time that would be needed.
+In: a function that solves a problem with a resolution, and one that judges the solution. Each pass of `refine` has twice
+the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
+steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
+accuracy.max_seconds is not repeated; its result names the axis and the time that would be needed. The meshes of a single
+patch (`patch.mesh_levels`), curves, backbones and fits have loops of their own.
 """
 
 from collections.abc import Callable, Hashable, Iterable

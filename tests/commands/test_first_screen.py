@@ -51,7 +51,7 @@ def test_exact_verbose_run_prints_all_measures(tmp_path):
     assert find_wrong_numbers(shown, measures) == []
     missing = {name for name, measure in measures.items() if measure["value"] is None}
     assert all(shown[name] == f"- ({measures[name]['reason']})" for name in missing)
-    assert "wall-clock seconds" in answer.err
+    assert "CPU seconds: " in answer.err
 
 
 def test_always_missed_tolerance_gives_warning(tmp_path):

@@ -127,3 +127,25 @@ def test_exact_spectra_agree_with_transfer_function():
     assert np.median(ratio) == pytest.approx(1, rel=0.05)
     assert "rms, H1 peaks at " in verdict[0]
     assert float(data.gain_peak) == pytest.approx(100, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    "levels, sentence",
+    [
+        (
+            ["5 g", "7 g"],
+            r"The third harmonic of the acceleration exceeds 3 % of the first one at (\S+) ",
+        ),
+        (["1 g", "2 g"], r"No level of the increasing sequence has an acceleration"),
+    ],
+)
+def test_always_first_sentence_of_levels_states_the_onset(levels, sentence):
+    """The headline of a drive in levels has the onset and its criterion, or says that no level reaches it."""
+    drive = DRIVE.replace('acceleration = "5 g"', f'waveform = "levels"\nlevels = {levels}')
+    law = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+    verdict, result = get_verdict(POINT + law + MODE + drive)
+    match = re.match(sentence, verdict[0])
+    assert match, verdict[0]
+    if match.groups():
+        onset = result.measures["onset_level"]
+        assert float(match[1]) == pytest.approx(onset.value / 9.80665, abs=1e-3)

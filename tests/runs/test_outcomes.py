@@ -227,6 +227,13 @@ RUNS = [
         "",
     ),
     (BOUNDED_SWEEP, "drive.from=120 Hz; drive.to=160 Hz", None, "", "the largest response lies at"),
+    (
+        BOUNDED_SWEEP + POINT + COULOMB,
+        "normal.load=10 kN",
+        "stuck",
+        "sticks at all frequencies, and law 'coulomb' is rigid.*law 'elastic-plastic'",
+        "the largest response lies at",
+    ),
 ]  # fmt: skip
 
 

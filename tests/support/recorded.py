@@ -316,7 +316,7 @@ def hide_times(line: str) -> str:
     # The first evenly spaced row depends on the round-off of the times.
     line = re.sub(r"before [\d.]+ ms the rows", "before # ms the rows", line)
     line = re.sub(r" \(and [\d.]+ s once for compiling\)", "", line)
-    return re.sub(r"computed in [\d.]+ m?s\b", "computed in # s", line)
+    return re.sub(r"computed in [\d.]+ (CPU )?s\b", "computed in # s", line)
 
 
 def find_differences(recorded: dict, found: dict) -> list:

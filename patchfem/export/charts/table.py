@@ -266,7 +266,8 @@ RUN_CHARTS = (
         "status",
         "map",
         span="contact",
-        caption="State of each node in the frames of the last cycle.",
+        caption="State of each node in the frames of the last cycle. A node slips in a frame where its own shear stress is "
+        "at the friction limit; stick_fraction is that of the contact as a whole (mean slip weighted by the pressure).",
     ),
     Chart("Gap", "x", "gap", caption="Gap between the loaded surfaces at the end of the run."),
     Chart(
@@ -724,7 +725,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
             "measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width = half_power_width",
         ),
         Table(
-            "Variance of a measure: share of each key, alone and with its interactions (Sobol indices)",
+            "Variance of a measure: first-order and total Sobol index of each key",
             "ranking",
             "measure = name, key, alone = first:rounded, with interactions = total:rounded, at least = low:rounded, "
             "at most = high:rounded",

@@ -13,7 +13,9 @@ from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value
 
 MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
-MAX_NAMED_KEYS = 3  # largest number of keys whose shares of the variance a sentence names
+MAX_NAMED_KEYS = 3  # largest number of keys whose Sobol indices a sentence names
+# Value relative to the largest one of a sweep below which it is round-off, and shown as 0.
+VALUE_ROUND_OFF = 1e-12
 
 
 def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
@@ -48,7 +50,9 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
 
     name, *cases, _ = analysis.ranges[0]
     column = table.measures[name]
-    low, high = (_format_measure(name, column.unit, column.values[case]) for case in cases)
+    round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values))
+    ends = [0.0 if abs(column.values[case]) <= round_off else column.values[case] for case in cases]
+    low, high = (_format_measure(name, column.unit, end) for end in ends)
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
         places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
@@ -60,7 +64,7 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     # With several keys the largest total index of Sobol names the main one.
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
-        share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
+        share = f", mainly with {index.key} (total index {index.total:.2f})"
     return f"{_name_in_words(name).capitalize()} changes most: from {low} to {high}{share}."
 
 
@@ -80,7 +84,8 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
     open_ended = [limit for limit in small if not limit.is_never_reached]
     if not open_ended:
         names = " and ".join(_name_in_words(limit.measure) for limit in small)
-        return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
+        verb = "changes" if len(small) == 1 else "change"
+        return f"{names.capitalize()} {verb} by less than 5 % over all cases." if names else ""
     # limits of a motion come before those of its patch, which change before the motion does
     moving = [limit for limit in open_ended if limit.measure in rows.MOTION_TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
@@ -133,13 +138,17 @@ def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
 
 
 def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
-    """Return the shares of the keys in the variance of a measure, with their intervals."""
+    """Return the total Sobol indices of the keys for a measure, with their intervals.
+
+    The total index of a key is the fraction of the variance in which the key has a part, so that their sum exceeds 1 where
+    keys act together.
+    """
     parts = [
-        f"{index.key} {100 * index.total:.0f} % ({100 * index.low:.0f} to {100 * index.high:.0f} %)"
+        f"{index.key} {index.total:.2f} ({index.low:.2f} to {index.high:.2f})"
         for index in indices[:MAX_NAMED_KEYS]
         if index.total >= MIN_NAMED_VARIANCE_FRACTION
     ]
-    return f"Shares of the variance of {_name_in_words(name)}: {', '.join(parts)}."
+    return f"Total Sobol indices of {_name_in_words(name)}: {', '.join(parts)}."
 
 
 def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
@@ -158,7 +167,9 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
-        others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
+        others = ""
+        if len(missed) > 1:
+            others = f" ({len(missed) - 1} other measure{'s' * (len(missed) > 2)} also above it in some cases)"
         counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
 
     # One clause for each count that is not 0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from time import perf_counter
+from time import process_time
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -187,7 +187,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
 
     A single run computes each case that `needs_single_run` names. `report` takes a line of text on its progress.
     """
-    begin = perf_counter()
+    begin = process_time()
     cases, scales = collect_cases(models)
     results = CaseResults.blank(len(models))
     is_alone = np.zeros(len(models), bool)
@@ -197,7 +197,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
         is_alone[indices] = needs_single_run(*part, part_results)
         results.insert(indices, part_results)
     _insert_texts(models, results)
-    results.seconds[:] = (perf_counter() - begin) / len(models)
+    results.seconds[:] = (process_time() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
     return results
 

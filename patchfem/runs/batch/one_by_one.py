@@ -6,7 +6,7 @@ In: models. Out: `CaseResults`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def solve(
     """
     results = CaseResults.blank(len(models))
     for case, model in enumerate(models):
-        begin = perf_counter()
+        begin = process_time()
         try:
             result = run(plan(model), report, estimate=estimate)
             if on_result is not None:
@@ -63,7 +63,7 @@ def solve(
                 results.warnings[case] = list(result.warnings)
             if result.notes:
                 results.notes[case] = list(result.notes)
-        results.seconds[case] = perf_counter() - begin
+        results.seconds[case] = process_time() - begin
     return results
 
 

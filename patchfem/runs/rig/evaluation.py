@@ -172,10 +172,10 @@ class RunEvaluator:
     def make_solution(self, run, seconds: float, drive=None, **other_fields) -> Solution:
         """Evaluate a run and return its Solution.
 
-        Measures follow from the last `numerics.window` cycles; the amplitude is half the difference of
-        the largest and the smallest output of these cycles. `run_errors` are the errors that the run
-        itself shows: of sampling, and those of its engine. Errors due to steps and mesh
-        need coarse runs and are not part of it.
+        Measures follow from the last `numerics.window` cycles. The amplitude is half the difference of the largest and the
+        smallest output of these cycles, except for a release: that of its last whole cycle. `run_errors` are the errors
+        that the run itself shows: of sampling, and those of its engine. Errors due to steps and mesh need coarse runs and
+        are not part of it.
 
         Parameters
         ----------

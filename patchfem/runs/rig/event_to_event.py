@@ -5,7 +5,7 @@ the histories are those of the last cycles, of equal distances before them, and 
 """
 
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -147,9 +147,9 @@ def run_from_event_to_event(
     NotConverged
         If a law or a mode is too fast for the engine.
     """
-    begin = perf_counter()
+    begin = process_time()
     joints = make_joints(model, numerics, patch)
-    prepare = {"reduce": perf_counter() - begin}
+    prepare = {"reduce": process_time() - begin}
     compiled.load_compiled_module("hybrid.engine_kernels", say)
     return LumpedEvaluator(model, numerics, patch, joints).solve(frames, progress, prepare)
 

@@ -5,7 +5,7 @@ work of the energy balance and the harmonics of the loop.
 """
 
 from dataclasses import replace
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -39,13 +39,13 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    begin = perf_counter()
+    begin = process_time()
     contact = make_contact(model, numerics, patch)
-    reduced = perf_counter() - begin
+    reduced = process_time() - begin
     n_lists = sum(point_set.law.numbers[0].size for point_set in contact.point_sets)
     refuse_long_stick(model, numerics, n_lists)
     engine.load_kernels(contact, say)
-    prepare = {"reduce": reduced, "compiled_code": perf_counter() - begin - reduced}
+    prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
     return MarchEvaluator(model, numerics, patch, contact).solve(frames, progress, prepare)
 

@@ -13,6 +13,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number
+from ...motion_measures import MAX_RESTING_SLIDE_RANGE
 from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
 from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_min_decay_rate
@@ -131,7 +132,7 @@ def _warn_of_ringing(run) -> Iterator[str]:
 def _warn_of_peak_at_end_frequency(run) -> Iterator[str]:
     """Warn if the largest response of a sweep lies at its lowest or highest frequency."""
     peak = run.measures.get("peak_frequency")
-    if peak is None or not peak.value or not run.measures[AMPLITUDE].value > 0:
+    if peak is None or not peak.value or run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE:
         return
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
@@ -143,6 +144,20 @@ def _warn_of_peak_at_end_frequency(run) -> Iterator[str]:
                 f"frequencies, so that it may be no resonance; {move} {key}"
             )
             return
+
+
+def _warn_of_curve_at_rest(run) -> Iterator[str]:
+    """Warn if a rigid law holds the output at rest at all frequencies of a sweep."""
+    friction = run.model.friction
+    if friction is None or "peak_frequency" not in run.measures:
+        return
+    is_at_rest = run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE
+    if is_at_rest and law_has_trait(friction.law, "set-valued"):
+        yield (
+            f"the interface sticks at all frequencies, and law '{friction.law}' is rigid while it sticks, so that the "
+            "output does not move; law 'elastic-plastic' has the stiffness of the contact (Jenkins element: a spring and a "
+            "slider)"
+        )
 
 
 def _warn_of_sparse_record(run) -> Iterator[str]:
@@ -229,6 +244,7 @@ MOTION_WARNINGS = (
     _warn_of_single_points,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
+    _warn_of_curve_at_rest,
     _warn_of_sparse_record,
     _warn_of_large_slides,
 )

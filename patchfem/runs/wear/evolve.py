@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -194,7 +194,7 @@ def compute_wear(
     -------
     WornPatch
     """
-    clock = perf_counter()
+    clock = process_time()
     patch_model = model.patch
     n_cycles = model.wear.cycles
 
@@ -259,7 +259,7 @@ def compute_wear(
         moments,
         tuple(depth for _, depth in replayed),
         stripped,
-        perf_counter() - clock,
+        process_time() - clock,
         stop_reason,
     )
 

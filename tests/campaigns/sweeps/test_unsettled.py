@@ -1,5 +1,7 @@
 """Cases of sweeps that stick but still vibrate freely, and cases with large errors."""
 
+from dataclasses import replace
+
 import numpy as np
 from scene_texts import ELASTIC_JOINT
 from sweep_tables import make_table
@@ -37,6 +39,24 @@ def test_sticking_cases_that_still_vibrate_are_transient():
         true = np.array([find_steady_amplitude(force, 220.0) for force in forces])
         assert (np.abs(values - true) <= errors + 1e-6 * true).all()
     assert pf.run(JOINT, **{"drive.cycles": 2000}).outcome == "stuck"
+
+
+def test_always_round_off_is_shown_as_zero_and_missed_measures_are_counted():
+    """A value of round-off beside large ones is 0, and a sentence says of which measures the tolerance is missed."""
+    columns = {
+        "slip_amplitude": np.array([3.6e-27, 1e-6, 2e-6]),
+        "loop_area": np.array([1.0, 2.0, 3.0]),
+    }
+    table = make_table({"normal.load": np.arange(1.0, 4.0)}, columns)
+    analysis = analyse(table)
+    ranges = [row for row in analysis.ranges if row[0] == "slip_amplitude"]
+    verdict = make_verdict(table, replace(analysis, ranges=ranges))
+    assert "slip amplitude changes most: from 0 at 1 to" in verdict[0]
+
+    missed = {"slip_amplitude": {"count": 2, "worst": 1.0}, "loop_area": {"count": 1, "worst": 1.0}}
+    over = replace(analysis, cases=analysis.cases | {"over_tolerance": missed})
+    text = "2 over the tolerance in slip amplitude (1 other measure also above it in some cases)"
+    assert text in make_verdict(table, over)[-1]
 
 
 def test_exact_single_settled_case_has_no_range():

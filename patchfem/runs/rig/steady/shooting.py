@@ -6,7 +6,7 @@ frequency, by continuation through its folds where it may have some (`hybrid.per
 
 from dataclasses import replace
 from functools import cached_property
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -138,11 +138,11 @@ class ShootingFinder:
         If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that of the motion that
         leaves them.
         """
-        begin = perf_counter()
+        begin = process_time()
         # A run from rest shows whether the lifted mass leaves its grooves; then no motion is steady.
         run = self._leave_grooves(drive)
         if run is not None:
-            solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
+            solution = self.evaluator.make_solution(run, process_time() - begin, drive)
             errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
             periodic_data = SteadyData("leaves its grooves", np.zeros(0))
             return replace(solution, errors=errors, periodic=periodic_data)
@@ -153,7 +153,7 @@ class ShootingFinder:
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
         run = self.evaluator.resume(drive, cycles, state, self.frames)
         is_stuck = self.evaluator.is_stuck(run)
-        solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
+        solution = self.evaluator.make_solution(run, process_time() - begin, drive)
 
         # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
         values = solution.values
