@@ -50,7 +50,7 @@ FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run`
     "static patch": (PATCH, PIECES),
     "bench of a point": (BENCH, BENCH_FOLDERS),
     "bench of a patch": (COATED + COULOMB + TRIANGLE, PIECES + BENCH_FOLDERS),
-    "linear rig": (STRUCTURE, MOTION),
+    "linear rig": (STRUCTURE, "response structure"),
     "rig of a point": (COULOMB_RIG, MOTION + "friction"),
     "rig of elements": (PLASTIC_RIG, MOTION + "friction"),
     "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION + "friction"),

@@ -13,9 +13,9 @@ from ..motion_measures import (
     measure_interface,
     ratio_or_zero,
 )
+from ..structure.exponentials import exponential
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Loop, Now, Number, Seen
-from .exponentials import exponential
 
 
 class CaseMarch(NamedTuple):

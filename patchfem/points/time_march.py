@@ -19,10 +19,10 @@ from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
 from ..motion_measures import find_reversal_steps
 from ..structure import drive_sizes
+from ..structure.exponentials import exponential
 from ..structure.histories import INTERFACE_HISTORIES, find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
-from .exponentials import exponential
 from .law_rows import Law
 from .laws import N_MEMORY, N_NUMBERS
 from .march_rows import (

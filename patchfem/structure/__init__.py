@@ -27,10 +27,17 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
+    "exponentials": ("exponential",),
     "histories": (
         "INTERFACE_HISTORIES",
         "find_accelerations",
         "make_response",
+    ),
+    "linear_motion": (
+        "LinearRig",
+        "POINTS",
+        "WEIGHTS",
+        "interpolate",
     ),
     "places": (
         "DIRECTION_NAMES",

@@ -4,17 +4,24 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from ... import friction
+from ...convergence import convergence_error
 from ...core import Outcome
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...response.decay_curve import measure_last_cycle_amplitude
+from ...response.errors import ERROR_MEASURES, absolute_change
 from ...response.events import is_all_stuck
 from ...response.loops import reversal_force_rule
 from ...response.measures import Values, relative_gap
-from ...response.rows import AMPLITUDE, LastCycles, compute_measures
+from ...response.rows import AMPLITUDE, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import is_sinusoidal
 from .levels import run_levels
+from .sample_times import LATE_SAMPLES_PER_CYCLE
 from .solution import Fields, Solution, first_interface_load, first_mode_stiffness
 
 
@@ -164,6 +171,34 @@ class RunEvaluator:
             Measures by name.
         """
         return {}
+
+    def estimate_errors_of_samples(self, run, drive, values: Values) -> Values:
+        """Estimate the errors of measures that follow from the samples of a random motion; {} for other drives.
+
+        They follow from the changes when every second sample of the window is removed, except for the last one.
+
+        Parameters
+        ----------
+        run
+            Run of the engine, with LATE_SAMPLES_PER_CYCLE samples in the cycles of its window.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
+        """
+        if not hasattr(drive, "band"):
+            return {}
+        count = run.window.time.size
+        samples = np.append(np.arange(0, count - 1, 2), count - 1)
+        thinned = replace(run, window=run.window.select(samples))
+        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
+        errors = {}
+        for name, change in absolute_change(values, coarse_values).items():
+            if change > 0 and name not in ERROR_MEASURES:
+                row = find_definition(name)
+                error = convergence_error(change, order=row.order)
+                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
+        return errors
 
     def collect_solution_fields(self, run, drive) -> Fields:
         """Return keyword arguments of `Solution` that only this engine provides; the base class has none."""

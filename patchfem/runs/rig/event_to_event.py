@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
-from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
@@ -19,7 +18,6 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
-from ...response.errors import ERROR_MEASURES, absolute_change
 from ...response.events import (
     SEGMENT_BORDER,
     Events,
@@ -29,12 +27,17 @@ from ...response.events import (
 )
 from ...response.measures import Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
-from ...response.rows import find_definition, select_names
-from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
+from ...response.rows import select_names
+from ...structure.drive_sizes import is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import engines, strips
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
+from .sample_times import (
+    SampleTimes,
+    choose_sample_times,
+    remove_incomplete_cycle,
+)
 from .solution import (
     Fields,
     Solution,
@@ -44,12 +47,7 @@ from .solution import (
     first_mode_stiffness,
 )
 
-LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
-MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
-N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
-EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 # Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
 STRIP_MEASURE_GROUPS = ("curve", "run", "error")
 # Outcomes of motions that the engine ends early, by its status
@@ -78,19 +76,6 @@ class ElementSnapshot(NamedTuple):
     def stretch(self) -> np.ndarray:
         """Stretches (e,) of the elements of the first interface [m]."""
         return self.faces[0][1]
-
-
-class SampleTimes(NamedTuple):
-    """Times of the samples of a run [s].
-
-    - samples (k,): all of them.
-    - snapshots (f,): those at which the elements are stored, in the last cycle.
-    - window_start: start of the window.
-    """
-
-    samples: np.ndarray
-    snapshots: np.ndarray
-    window_start: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,7 +168,7 @@ class LumpedEvaluator(RunEvaluator):
         """
         run = self.resume(drive, cycles, None if before is None else before.end, frames)
         if not self.model.rig.drive.levels.amplitudes:
-            run = _remove_incomplete_cycle(run)
+            run = remove_incomplete_cycle(run)
         # Measures of the whole run add up from level to level.
         for name in select_names("run"):
             if before is not None and name in before.values:
@@ -207,7 +192,7 @@ class LumpedEvaluator(RunEvaluator):
             Number of snapshots of the elements in the last cycle.
         """
         travel = find_travel(self.model.rig)
-        times = self._choose_times(drive, cycles, frames)
+        times = choose_sample_times(self.numerics, drive, cycles, frames)
         motion = self._run(drive, cycles, times.samples, travel, state)
 
         # Why the motion ended early, as an outcome or as an error.
@@ -228,7 +213,7 @@ class LumpedEvaluator(RunEvaluator):
         if outcome is not None:
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period
-            times = self._choose_times(drive, cycles, 0)
+            times = choose_sample_times(self.numerics, drive, cycles, 0)
             motion = self._run(drive, cycles, times.samples, np.inf, state)
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
@@ -260,34 +245,6 @@ class LumpedEvaluator(RunEvaluator):
             n_steps=numerics.steps,
         )
         return engine.run_case(case, start=state)
-
-    def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
-        """Choose the times of the samples and of `frames` snapshots.
-
-        `cycles` is the number of cycles of the drive in the run.
-        """
-        period = drive.period
-        end = cycles * period
-        window_start = max(0.0, end - self.numerics.window * period)
-        first = window_start
-        early = np.zeros(0)
-        if self.numerics.whole:
-            # Before the last cycles the distances are larger, and equal.
-            first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
-            count = max(1, min(EARLY_SAMPLES_PER_CYCLE, N_EARLY_SAMPLES // max(cycles, 1)))
-            count = choose_samples_per_cycle(drive, cycles) or count
-            early = np.arange(0.0, first - 1e-9 * period, period / count)
-
-        # Each of the last cycles has LATE_SAMPLES_PER_CYCLE samples.
-        late = _divide(window_start, end, period, MIN_WINDOW_SAMPLES)
-        if first < window_start:
-            late = np.union1d(_divide(first, window_start, period, 2), late)
-
-        # A snapshot is taken at a sample, where all histories have a value.
-        begin = max(0.0, end - period)
-        at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
-        nearest = np.abs(late[:, None] - at).argmin(axis=0)
-        return SampleTimes(np.append(early, late), late[nearest], window_start)
 
     def _make_run(
         self, motion, drive, cycles: float, times: SampleTimes, start: State | None
@@ -464,49 +421,9 @@ class LumpedEvaluator(RunEvaluator):
             vibration = compute_stuck_vibration(rig.modes, springs, motion)
         return {"tail": select_strongest(vibration)} if vibration else {}
 
-    def estimate_run_errors(self, run, drive, values: Values) -> Values:
-        """Estimate the errors of the samples of a random motion.
-
-        Parameters
-        ----------
-        run : LumpedRun
-            Run of the engine `hybrid`.
-        drive
-            Drive of the run.
-        values : dict of float
-            Measures by name.
-        """
-        if not hasattr(drive, "band"):
-            return {}
-        # They follow from the changes when every second sample of the window is removed, except for the last one.
-        count = run.window.time.size
-        samples = np.append(np.arange(0, count - 1, 2), count - 1)
-        thinned = replace(run, window=run.window.select(samples))
-        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
-        errors = {}
-        for name, change in absolute_change(values, coarse_values).items():
-            if change > 0 and name not in ERROR_MEASURES:
-                row = find_definition(name)
-                error = convergence_error(change, order=row.order)
-                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
-        return errors
-
-
-def _remove_incomplete_cycle(run: LumpedRun) -> LumpedRun:
-    """Remove the extremes and the complex amplitude of a last cycle that the run did not complete."""
-    count = int(run.cycles_done + 1e-9)
-    if not count:
-        return run
-    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
-
-
-def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
-    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period.
-
-    The times and the period are in [s], and `minimum` is the smallest number of times.
-    """
-    count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
-    return np.linspace(begin, end, max(minimum, count))
+    def estimate_run_errors(self, run: LumpedRun, drive, values: Values) -> Values:
+        """Estimate the errors of the samples of a random motion; {} for other drives."""
+        return self.estimate_errors_of_samples(run, drive, values)
 
 
 def _find_even_samples(window: Response) -> np.ndarray:

@@ -21,8 +21,8 @@ from ..results.interfaces import Face, merge_sentences
 from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import Settings
 from ..results.travel import warn_of_large_slide
+from . import joints
 from .engines import ENGINES, find_obstacle_of_map
-from .joints import list_joints
 from .solution import first_interface_load
 
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
@@ -197,7 +197,7 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.window.slides.T
-    for joint, slide in zip(list_joints(run.model, run.patch, run.numerics.meshed), slides):
+    for joint, slide in zip(joints.list_joints(run.model, run.patch, run.numerics.meshed), slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2

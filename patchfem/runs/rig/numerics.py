@@ -8,12 +8,13 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from ... import hybrid
 from ...effects import law_has_trait
-from ...hybrid import cases
 from ...model.model import Model
 from ...structure.drive_sizes import find_min_decay_rate, is_sinusoidal
+from . import linear
 from .costs import steps_per_cycle
-from .engines import HYBRID, MARCH, choose_engine
+from .engines import HYBRID, LINEAR, MARCH, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
 # record of 30 periods has 30 cycles.
@@ -107,13 +108,15 @@ def choose_numerics(model: Model) -> Numerics:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
     numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
 
+    if engine is LINEAR:
+        return replace(numerics, steps=linear.N_STEPS)
     if engine is HYBRID:
-        # A linear rig needs few steps. Otherwise the error per step is a small part of the tolerance.
+        # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
         is_exact = accuracy.method == "exact" or model.friction is None
         local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
         if is_exact:
-            local = cases.EXACT_RTOL
-        return replace(numerics, local=local, steps=cases.MIN_STEPS)
+            local = hybrid.cases.EXACT_RTOL
+        return replace(numerics, local=local, steps=hybrid.cases.MIN_STEPS)
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
         return replace(numerics, steps=4 * ceil(max(steps, min_unique_steps(model)) / 4))

@@ -24,11 +24,10 @@ from .. import refine
 from ..patch import faces
 from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
-from . import bond_lists, decays, flutter, levels
+from . import bond_lists, decays, event_to_event, flutter, levels
+from . import fields as interface_fields
 from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS
 from .engines import ENGINES, list_runs_with_other_modes
-from .event_to_event import ElementSnapshot
-from .fields import collect_interface_fields
 from .motion_warnings import collect_remarks
 from .numerics import MIN_RELATIVE_STEP_ERROR, Numerics, choose_numerics
 from .solution import Solution, compute_peak_frequency
@@ -154,10 +153,16 @@ def _make_result(run: CoupledRun) -> Result:
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
     if inputs.patch is not None:
-        fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
+        fields = interface_fields.collect_interface_fields(
+            model, run.numerics, inputs.patch, solution
+        )
     moved = ()
     if model.has_interface_patches:
-        snapshots = [frame for frame in solution.snapshots if isinstance(frame, ElementSnapshot)]
+        snapshots = [
+            frame
+            for frame in solution.snapshots
+            if isinstance(frame, event_to_event.ElementSnapshot)
+        ]
         moved = faces.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(
