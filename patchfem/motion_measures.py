@@ -118,7 +118,7 @@ def measure_loop(half_range, slide, force, work, stiffness) -> Values:
     moves = (half_range > MAX_RESTING_SLIDE_RANGE / 2) & (np.abs(slide) > 0)
     with np.errstate(all="ignore"):
         ratio = np.where(moves, force, np.nan) / slide
-        damping = work / (2 * np.pi * stiffness * half_range**2)
+        damping = np.divide(work, 2 * np.pi * stiffness * half_range**2)
     return {
         "loop_area": work,
         "equivalent_stiffness": ratio.real,

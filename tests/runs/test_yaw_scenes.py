@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, MODE, PIECE
+from scene_texts import BLOCK, DRIVE, MODE, PIECE, make_friction_table
 from yielding_points import solve_all_points
 
-from patchfem import load
+from patchfem import load, plan
 from patchfem.export.run_data import collect_data
 from patchfem.runs.run import run
 
@@ -71,3 +71,37 @@ def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law):
     np.testing.assert_array_equal(collect_data(result)["yaw_moment"].values, extra["yaw_moment"])
     assert result.measures["energy_balance"].value < 1e-10
     assert "shear_stress" not in result.fields and any("no common" in note for note in result.notes)
+
+
+STRIPS = "[contact.strips]\ncount = 4\n"
+DAMPED_LUGRE = 'micro_damping = "100 N s/m"\nviscous = "3 N s/m"\n'
+
+
+def _shake_strips(law: str, yaw: str):
+    """Return the text of a rig with strips under a friction law, whose only mode yaws the patch by `yaw`."""
+    friction = make_friction_table(law) + (DAMPED_LUGRE if law == "lugre" else "")
+    mode = MODE + f'yaw = "{yaw}"\n'
+    return BLOCK + STRIPS + friction + mode + DRIVE.replace("cycles = 30", "cycles = 10")
+
+
+@pytest.mark.parametrize("law", ["iwan", "bouc-wen", "lugre"])
+def test_exact_strips_that_hardly_yaw_share_stiffness_and_damping_of_the_contact(law):
+    """Keys that refer to the whole contact are divided among the strips, as the load is."""
+    whole = run(load(_shake_strips(law, "0 rad/m")), estimate=False)
+    apart = run(load(_shake_strips(law, "1e-6 rad/m")), estimate=False)
+    assert apart.response.slides.shape[1] == 4
+    for name in ("relative_displacement_amplitude", "loop_area", "slip_amplitude"):
+        assert apart.measures[name].value == pytest.approx(whole.measures[name].value, rel=1e-4)
+    plans = [plan(load(_shake_strips(law, yaw))) for yaw in ("0 rad/m", "1e-6 rad/m")]
+    stuck = [planned.modes(planned.chain)[0]["stuck_frequency"] for planned in plans]
+    assert stuck[1] == pytest.approx(stuck[0], rel=1e-9)
+
+
+def test_exact_strips_move_in_two_modes_with_yaw():
+    """A second mode that yaws the patch moves the contact too, so that there is no damping of the first mode alone."""
+    second = '[[structure.mode]]\nname = "second"\nfrequency = "129 Hz"\ndamping = 0.01\nslide = 0.2\nyaw = "60 rad/m"\n'
+    drive = DRIVE.replace("cycles = 30", "cycles = 10")
+    text = BLOCK + STRIPS + make_friction_table("elastic-plastic") + MODE + second + drive
+    measures = run(load(text), estimate=False).measures
+    assert measures["loop_area"].value > 0
+    assert measures["equivalent_damping"].value is None

@@ -41,6 +41,8 @@ class Joint(NamedTuple):
     - law: effective keys of the friction law.
     - load: normal load, which may oscillate (`hybrid.cases.Load`).
     - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
+    - contact_load: mean load [N] on the whole contact, of which a strip is a part; the stiffness and the damping in the
+      keys of the law refer to it.
     - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips
       part by part, or None for an interface that slips as a whole.
     - reduction: JenkinsSet of such a patch, or None.
@@ -49,6 +51,7 @@ class Joint(NamedTuple):
     law: object
     load: Load
     speed: float
+    contact_load: float
     stiffness: np.ndarray | None = None
     yields: np.ndarray | None = None
     reduction: slip.shear_modes.JenkinsSet | None = None
@@ -60,7 +63,7 @@ class Joint(NamedTuple):
         """
         if law_has_trait(self.law.law, "bonds"):
             return make_bond_parameters(self.law, self.speed, MIN_RIG_REST_SPEED)
-        return friction.record.make_law(self.law, self.load.mean)
+        return friction.record.make_law(self.law, self.contact_load)
 
     @property
     def length(self) -> float:
@@ -138,7 +141,9 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         return []
     if patch is not None:
         law = _replace_averaged_law(model.friction, model, patch)
-        return [Joint(law, load, speed, *parts) for load, parts in _list_patch_parts(model, patch)]
+        contact_load = float(patch.pressure.load)
+        parts = _list_patch_parts(model, patch)
+        return [Joint(law, load, speed, contact_load, *elements) for load, elements in parts]
 
     joints = []
     for k, interface in enumerate(friction.interfaces):
@@ -148,7 +153,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         if interface.partial_slip:
             parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
         law = _replace_averaged_law(interface.numbers, model, patch)
-        joints.append(Joint(law, load, speed, *parts))
+        joints.append(Joint(law, load, speed, load.mean, *parts))
     return joints
 
 
@@ -255,7 +260,7 @@ def _find_stick_tolerance(joints, laws) -> float:
         elif keys.bond_length and not law_has_trait(keys.law, "set-valued"):
             lengths.append(keys.bond_length)
         elif keys.stiffness:
-            lengths.append(keys.static * joint.load.mean / keys.stiffness)
+            lengths.append(keys.static * joint.contact_load / keys.stiffness)
     return MAX_STUCK_SLIP_RATIO * min(lengths, default=0.0)
 
 

@@ -61,8 +61,8 @@ def stuck_interface_stiffness(chain: Chain, index: int = 0) -> float:
 def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
-    Strips have the stiffness of their patch. Without friction the stiffness is inf. A patch that was
-    solved to subtract a bolted joint has its own stiffness instead of that of the chain.
+    Strips that slide apart have equal parts of the stiffness of their patch. Without friction the stiffness is inf. A
+    patch that was solved to subtract a bolted joint has its own stiffness instead of that of the chain.
     """
     bolted = rig.structure.bolted
     if bolted is not None and bolted.stuck_stiffness is not None:
@@ -72,6 +72,8 @@ def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     if n_interfaces:
         for k in range(stiffness.size):
             stiffness[k] = stuck_interface_stiffness(chain, k if k < n_interfaces else 0)
+    if rig.friction.strips_slide_apart:
+        stiffness /= stiffness.size
     return stiffness
 
 
