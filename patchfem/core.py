@@ -352,7 +352,7 @@ class Measure:
     - error: numerical error (half-width); None without an estimate.
     - floor: absolute error that is allowed at any tolerance.
     - text: definition of the measure.
-    - reason: reason why the value is None.
+    - reason: reason why the value or its error is None.
     - engine: method that computed the value; "" for the engine of the run.
     - parts: contribution to the error of each discretisation, such as "steps" or "mesh", from coarser runs
       (`response.coarser`); None if they are unknown.

@@ -386,12 +386,15 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
         for name, ratio in ratios.items()
         if name not in RUN_CHECK_MEASURES and "±" in _format_measure(name, measures)
     }
+    # Some measures, as of strips, have a value without an error.
+    errors = [one.error for one in result.measures.values() if one.value is not None]
+    within = f"All{' stated' * (None in errors)} errors are within the tolerance {tolerance:g}"
     if not visible:
-        return f"All errors are within the tolerance {tolerance:g}."
+        return f"{within}."
     name = max(visible, key=lambda one: (visible[one], one))
     largest = format_number(100 * visible[name], 2)
     return (
-        f"All errors are within the tolerance {tolerance:g}; the largest is {largest} % of what it allows "
+        f"{within}; the largest is {largest} % of what it allows "
         f"({name}: {_format_measure(name, measures)})."
     )
 

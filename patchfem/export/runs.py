@@ -55,7 +55,7 @@ def make_quantities(measures: dict[str, Measure]) -> Quantities:
     quantities = {}
     for name, measure in measures.items():
         is_unknown = measure.value is not None and measure.error is None
-        reason = "error unknown" if is_unknown else measure.reason
+        reason = measure.reason or ("error unknown" if is_unknown else "")
         quantities[name] = Quantity(
             measure.value, measure.unit, measure.error, floor=float(measure.floor), reason=reason
         )

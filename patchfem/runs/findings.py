@@ -27,9 +27,6 @@ from .rig import engines
 PROPOSED_TOLERANCE_RATIO = 0.1
 # Largest number of halvings of a time step that the scene fixes; with more of them, the key is to be left out.
 MAX_FIXED_STEP_HALVINGS = 4
-# Largest number of strips that is proposed; four times as many strips take about twenty times as
-# long.
-MAX_PROPOSED_STRIPS = 64
 USE_ERROR_ADVICE = "use the value with its stated error"
 ELEMENT_SIZE_KEY = "contact.element_size"
 STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
@@ -159,17 +156,14 @@ def _find_static(missed: Missed) -> list[Finding]:
 
 
 def _advise_on_statics(missed: Missed, face: Face) -> Advice:
-    """Return the advice for inaccurate static measures: more strips or a finer mesh."""
+    """Return the advice for inaccurate static measures: a finer mesh, if it helps."""
     patch_model = face.model.patch
-    strips = patch_model.interface.strips
     peak = missed.measures.get("pressure_peak")
     if missed.worst == "worn_depth_max" and peak is not None and peak.value is None:
         return Advice(f"the depth at a sharp edge grows on finer meshes; {USE_ERROR_ADVICE}")
     # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
     if max(missed.excess.values()) >= refine.MAX_ERROR_EXCESS and patch_model.mesh.is_automatic:
         return Advice(USE_ERROR_ADVICE)
-    if patch_model.mesh.file is None and strips is not None and strips.count > 1:
-        return _advise_strips(patch_model, missed.excess)
 
     # The refinement of the meshes ends when all measures that control it meet the tolerance, or at
     # its limit.
@@ -178,23 +172,6 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     solved = [(patch_model, face.unworn or face.patches)]
     advice = _advise_mesh(missed, solved, name, is_at_limit=is_at_limit)
     return advice._replace(axis="mesh")
-
-
-def _advise_strips(patch_model, excess: Mapping) -> Advice:
-    """Return the advice to divide the width of a patch into more strips, at least twice as many, but not too many.
-
-    The error falls with the square of the number of strips. `excess` has the ratio of error to allowed error [1] of each
-    measure that misses the tolerance.
-    """
-    present = patch_model.interface.strips.count
-    ratio = max(2.0, max(excess.values()) ** (1 / MAX_CONVERGENCE_ORDER))
-    count = min(ceil(present * ratio), MAX_PROPOSED_STRIPS)
-    if count < 2 * present:
-        return Advice(
-            f"more than {MAX_PROPOSED_STRIPS} strips may reduce it but take long; {USE_ERROR_ADVICE}"
-        )
-    also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE_KEY}"
-    return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
 
 
 def _advise_mesh(

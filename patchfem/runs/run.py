@@ -330,8 +330,7 @@ def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     """Return a Result that begins with the static measures of all pressed interfaces, such as their peak pressures."""
     static: Measures = {}
     for face in pressed:
-        patch, *coarse = face.patches
-        for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
+        for name, measure in patch_result.static_measures(face.model, face.patch).items():
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
     return replace(result, measures=static | motion)

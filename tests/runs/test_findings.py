@@ -9,7 +9,6 @@ from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHEAR, SHORT, SLIDE
 
 from patchfem import run
 
-STRIPS = {"contact.strips.count": 2, "contact.strips.roll": "1 urad"}
 LOOSE = "[accuracy]\ntolerance = 0.01\n"
 BONDS = POINT + '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\norder = 2\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "1 Hz"\ncycles = 2\n'
@@ -18,7 +17,6 @@ MARCH = {"accuracy.method": "march", "accuracy.steps_per_cycle": 40}
 # Scene, keys that cause the finding, and key and axis of its advice. Without these keys nothing misses the tolerance.
 SCENES = {
     "elements": (BLOCK, {"contact.element_size": "0.5 mm"}, "contact.element_size", "mesh"),
-    "strips": (BLOCK, STRIPS, "contact.strips.count", "strips"),
     "steps of a bench": (
         BENCH,
         {"accuracy.steps_per_cycle": 16},

@@ -7,7 +7,8 @@ import contact_forms as exact
 import numpy as np
 import pytest
 from command_line import read_json, run_successfully
-from scene_texts import PIECE
+from scene_runs import find_sentences, run_scene
+from scene_texts import COATED, PIECE
 
 from patchfem import build
 from patchfem.core import PatchfemError
@@ -142,6 +143,34 @@ def test_exact_rolled_rigid_strips_agree_with_closed_form():
     assert patch_values["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
     weight = patch.pieces.interface.weight
     assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    "key, prescribed",
+    [
+        ('roll = "0.02 mrad"', {"normal_load", "rotation", "roll"}),
+        (
+            'offset = "1 mm"',
+            {"normal_load", "rotation", "roll_moment", "pressure_centre_lateral"},
+        ),
+        ('roll = "0 rad"', None),
+    ],
+)
+def test_strips_of_different_pressures_state_no_errors(key, prescribed):
+    """Without the coupling between strips only prescribed measures have errors; a warning says how large the effect is.
+    Level strips state all errors."""
+    result = run_scene(
+        COATED + f"[contact.strips]\ncount = 4\n{key}\n[accuracy]\ntolerance = 0.01\n"
+    )
+    known = {name for name, measure in result.measures.items() if measure.error is not None}
+    warnings = find_sentences(result.warnings, "strips neglect the elastic coupling")
+    if prescribed is None:
+        assert known == set(result.measures) and not warnings
+        return
+    assert known == prescribed
+    assert "coupling" in result.measures["tangential_stiffness"].reason
+    assert len(warnings) == 1 and "38 % too large" in warnings[0]
+    assert "33 % too small" in warnings[0]
 
 
 # ---- profiles

@@ -172,6 +172,13 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
             others = f" ({len(missed) - 1} other measure{'s' * (len(missed) > 2)} also above it in some cases)"
         counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
 
+    # Settled cases whose main measures have no error, as of strips
+    unknown = np.zeros(len(table), bool)
+    for name in table.measures.keys() & set(MAIN_MEASURES):
+        column = table.measures[name]
+        unknown |= np.isfinite(column.values) & np.isnan(column.errors)
+    counts["with an unknown error"] = np.count_nonzero(unknown & table.has_settled)
+
     # One clause for each count that is not 0
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses and len(table) == 1:

@@ -3,7 +3,7 @@
 In: a `Patch` and the same patch on coarser meshes. Out: measures by name. A value is that of the
 finest mesh, or its limit by extrapolation (`limits`). Its error contains the change that further
 refinement would cause and the errors that refinement does not show (`estimate_hidden_errors`). The
-module also estimates the model errors due to the plane state and to the number of strips.
+module also estimates the model error due to the plane state.
 """
 
 from dataclasses import replace
@@ -13,12 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
-from ...model.patch import PatchModel
-from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results.patch_rows import (
     EXTRAPOLATED_SOURCE,
     FINEST_MESH_SOURCE,
@@ -582,59 +579,3 @@ def _format_changes(patch_model, values: Values, other_values: Values) -> list[s
         if abs(change) > 1e-3:
             changes.append(f"{name} by {100 * change:+.2g} %")
     return changes
-
-
-def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures) -> Measures:
-    """Add the errors due to the finite number of strips to the measures of a patch.
-
-    The error follows from the change with another number of strips on the same mesh, assuming
-    second-order convergence. Measures without a value are left unchanged.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch with its number of strips.
-    patch : Patch
-        The patch on its finest mesh, on which the other number of strips is solved too.
-    measures_by_name : dict
-        Measures by name.
-
-    Returns
-    -------
-    dict
-        Measure by name.
-    """
-    other_model, ratio = with_other_strip_count(patch_model)
-    if other_model is patch_model:
-        return measures_by_name
-    other_values = compute_static_values(solve_patch_contact(other_model, patch.pair))
-    out = dict(measures_by_name)
-    for name, value in compute_static_values(patch).items():
-        measure = measures_by_name[name]
-        if measure.value is not None:
-            change = value - other_values[name]
-            error = measure.error + convergence_error(
-                change, ratio=ratio, order=MAX_CONVERGENCE_ORDER
-            )
-            out[name] = replace(measure, error=float(error))
-    return out
-
-
-def with_other_strip_count(patch_model) -> tuple[PatchModel, float]:
-    """Return the model with another number of strips, and the ratio of the strip widths.
-
-    The number of strips is halved, or doubled if half as many strips would not extend to the load
-    line. A model with fewer than two strips is returned unchanged.
-    """
-    strips = patch_model.interface.strips
-    if strips is None or strips.count < 2:
-        return patch_model, 2.0
-    count = strips.count // 2
-    ratio = 2.0
-    if strips.offset is not None and abs(strips.offset) >= compute_outermost_strip_distance(
-        patch_model.pieces.width, count
-    ):
-        count = 2 * strips.count
-        ratio = 0.5
-    interface = replace(patch_model.interface, strips=strips._replace(count=count))
-    return replace(patch_model, interface=interface), ratio

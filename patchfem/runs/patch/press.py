@@ -28,6 +28,9 @@ from ..results.patch_rows import Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
+# Largest difference of the loads of strips, relative to their mean, that counts as round-off
+EQUAL_STRIP_LOAD_TOL = 1e-9
+
 
 class Surface(NamedTuple):
     """Pressure and gap at the nodes or points of an interface.
@@ -168,6 +171,14 @@ class Patch:
     def strips(self) -> StripsState | None:
         """Contact state of a patch that is divided into strips, else None."""
         return None if self.model.interface.strips is None else self.state
+
+    @property
+    def has_unequal_strips(self) -> bool:
+        """Whether the pressure varies across the width, so that the neglected coupling of the strips has an effect."""
+        if self.strips is None:
+            return False
+        loads = self.strips.force.sum(axis=1)
+        return bool(np.ptp(loads) > EQUAL_STRIP_LOAD_TOL * loads.mean())
 
     @property
     def layer_compliance(self) -> np.ndarray | None:

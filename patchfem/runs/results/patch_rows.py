@@ -204,6 +204,17 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
     return Measure(float(value), row.unit, error, row.floor, engine=engine)
 
 
+def list_prescribed_measures(patch_model) -> set[str]:
+    """Return the names of the static measures that a PatchModel with strips prescribes: load or approach, and rotations."""
+    loading = patch_model.loading
+    names = {"normal_load" if loading.approach is None else "approach"}
+    is_roll_free = patch_model.interface.strips.offset is not None
+    names |= {"roll_moment", "pressure_centre_lateral"} if is_roll_free else {"roll"}
+    if not loading.rotational_stiffness:
+        names |= {"moment", "pressure_centre"} if loading.can_rotate else {"rotation"}
+    return names
+
+
 def find_unknown_measures(measures: Measures) -> list[str]:
     """Return the names of the measures whose error exceeds their value, so that they are hardly known.
 

@@ -20,7 +20,7 @@ from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
-from ..patch.measures import with_other_strip_count, with_static_measures
+from ..patch.measures import with_static_measures
 from ..patch.press import (
     Patch,
     Patches,
@@ -74,8 +74,6 @@ class WornPatch:
     - state: final state; None if nothing was worn.
     - moments: WearMoment before any wear and after each jump.
     - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
-    - stripped: (patch, depth (t, m) [m]) after the same jumps with another number of strips
-      (`measures.with_other_strip_count`); None without strips.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
     """
@@ -85,7 +83,6 @@ class WornPatch:
     state: WearState
     moments: tuple[WearMoment, ...]
     depths: tuple[np.ndarray, ...]
-    stripped: tuple[Patch, np.ndarray] | None
     seconds: float
     stopped: str
 
@@ -239,16 +236,11 @@ def compute_wear(
         if progress is not None:
             progress(state.cycle / n_cycles)
 
-    # The jumps are repeated on coarser meshes and with other strips for the errors. Without any jump, this adds the wear
-    # of an earlier run.
+    # The jumps are repeated on coarser meshes for the errors. Without any jump, this adds the wear of an earlier run.
     replayed = []
     for mesh in coarse:
         if mesh is not None:
             replayed.append(_replay_wear(patch_model, model, patch, mesh, moments))
-    strips_model, _ = with_other_strip_count(patch_model)
-    stripped = None
-    if replayed and strips_model is not patch_model:
-        stripped = _replay_wear(strips_model, model, patch, patch, moments)
 
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
     patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
@@ -258,7 +250,6 @@ def compute_wear(
         state,
         moments,
         tuple(depth for _, depth in replayed),
-        stripped,
         process_time() - clock,
         stop_reason,
     )

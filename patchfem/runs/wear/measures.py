@@ -13,8 +13,8 @@ from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors
-from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
+from ..patch.result import UNCOUPLED_STRIPS_WARNING
 from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
@@ -58,6 +58,9 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         return replace(result, measures=result.measures | volume)
 
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
+    # Wear may make the pressures of level strips different.
+    if evolved.patch.has_unequal_strips and UNCOUPLED_STRIPS_WARNING not in warnings:
+        warnings.append(UNCOUPLED_STRIPS_WARNING)
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
     if evolved.state is None:
         return result
@@ -130,8 +133,7 @@ def _widen_errors_by_jumps(result, evolved):
     """Increase the errors of a Result by those of the jumps over cycles.
 
     A contact edge that moves during a jump leaves the nodes that just came into contact too high.
-    The errors follow, at first order, from the change if the same jumps are not subdivided, and
-    from the change to another number of strips.
+    The errors follow, at first order, from the change if the same jumps are not subdivided.
 
     Parameters
     ----------
@@ -146,15 +148,12 @@ def _widen_errors_by_jumps(result, evolved):
         solve_patch_contact(patch_model, evolved.patch.pair, coarse_depth)
     )
     fine_values = compute_static_values(evolved.patch)
-    other_values = compute_static_values(evolved.stripped[0]) if evolved.stripped else fine_values
-    ratio = with_other_strip_count(patch_model)[1]
     measures = dict(result.measures)
     for name, value in fine_values.items():
         measure = measures.get(name)
         if measure is not None and measure.error is not None:
-            error = convergence_error(value - coarse[name])
-            error = error + convergence_error(value - other_values[name], ratio=ratio)
-            measures[name] = replace(measure, error=float(measure.error + error))
+            error = float(convergence_error(value - coarse[name]))
+            measures[name] = replace(measure, error=measure.error + error)
     return replace(result, measures=measures)
 
 
@@ -186,7 +185,7 @@ def _relative_slip_error(measures: Measures) -> float:
 def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool = True) -> Measures:
     """Return the measures of worn volume, worn depth and groove amplitude.
 
-    Their errors include those of the earlier run.
+    Their errors include those of the earlier run. Strips with different pressures have no errors.
 
     Parameters
     ----------
@@ -210,32 +209,28 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
         "worn_depth_max": state.error,
     }
 
-    # Values on the coarser meshes and with another number of strips, for the errors.
+    # Values on the coarser meshes, for the errors.
     values = {name: last.values[name] for name in jump_errors}
     coarse = []
     for patch, depth in zip(evolved.coarse, evolved.depths):
         coarse.append(compute_worn_volume_and_depth(model.patch, patch, depth))
     mesh_errors = convergence_errors(values, *coarse) if coarse else {}
-    other_model, ratio = with_other_strip_count(model.patch)
-    strips = values
-    if evolved.stripped:
-        strips = compute_worn_volume_and_depth(other_model, *evolved.stripped)
 
-    # The errors of jumps, slip path, mesh, round-off, earlier run and strips add up.
+    # The errors of jumps, slip path, mesh, round-off and earlier run add up.
     start = model.wear.start
     measures = {}
     for name, value in values.items():
         error = None
         worn_before = first.values[name]
         start_error = 0.0 if start is None else start.measure_error(name, worn_before)
-        if coarse and with_errors and start_error is not None:
+        has_error = coarse and with_errors and not evolved.patch.has_unequal_strips
+        if has_error and start_error is not None:
             error = (
                 jump_errors[name]
                 + slip_error * max(value - worn_before, 0.0)
                 + float(mesh_errors[name])
                 + WORN_ROUND_OFF * value
                 + start_error
-                + float(convergence_error(strips[name] - value, ratio=ratio))
             )
         measures[name] = make_measure(name, value, error, WORN_SOURCE)
 

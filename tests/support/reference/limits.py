@@ -62,6 +62,7 @@ LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
 patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
 Each strip of `[contact.strips]` is such a section; the strips lie side by side, without elastic coupling between them.
+Where the pressure varies over the width, as with `roll`, the static measures and those of wear have no stated error.
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {MAX_SMALL_STRAIN:g}.
