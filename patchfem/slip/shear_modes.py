@@ -86,8 +86,8 @@ class ShearModes:
 
     - points (a,): nodes of the contact set
     - limit (a,): friction limits D [N]
-    - shape (a, r): relative displacement of a node per unit of a modal coordinate
-    - stiffness (r,): stiffness [N/m] of the coordinates
+    - shape (a, r): relative displacement of a node per unit of a modal coordinate [N^-1/2]; shape^T diag(D) shape = 1
+    - stiffness (r,): stiffness [1/m] of the coordinates, the inverse of the eigenvalues
     """
 
     points: np.ndarray
@@ -303,9 +303,8 @@ def _find_order_by_elimination(compliance: np.ndarray, force: np.ndarray) -> np.
 def shear_modes(
     tangential: np.ndarray,
     friction_limit: np.ndarray,
-    bond_length: float,
     count: int,
-    weakening: float = 1.0,
+    steepest_fall: float = 0.0,
 ) -> ShearModes:
     """Return the `count` most compliant modes of D^1/2 C D^1/2 for nodes with bonds.
 
@@ -314,28 +313,25 @@ def shear_modes(
     tangential : (m, m) ndarray
         Compliance C [m/N].
     friction_limit : (m,) ndarray
-        Friction limits D [N]; the bonds of a node have the stiffness friction_limit/bond_length.
-    bond_length : float
-        Bond length [m].
+        Friction limits D [N].
     count : int
         Number of modes.
-    weakening : float
-        Static / kinetic friction coefficient.
+    steepest_fall : float
+        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
 
     Raises
     ------
     PatchfemError
-        If a weakening contact could jump without a change of the displacement: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
+        If a weakening contact could jump without a change of the displacement: steepest_fall lambda_max(D C) >= 1.
     """
-    return _compute_all_modes(tangential, friction_limit, bond_length, weakening).select(count)
+    return _compute_all_modes(tangential, friction_limit, steepest_fall).select(count)
 
 
-def _compute_all_modes(
-    tangential, friction_limit, bond_length: float, weakening: float
-) -> ShearModes:
+def _compute_all_modes(tangential, friction_limit, steepest_fall: float) -> ShearModes:
     """Return all modes of the nodes that carry load.
 
-    `shear_modes` selects from them.
+    `shear_modes` selects from them. A contact is stable if the stiffness of the pieces and the holder in shear exceeds
+    the steepest fall of the friction forces.
 
     Parameters
     ----------
@@ -343,10 +339,8 @@ def _compute_all_modes(
         Shear compliance [m/N] of the interface nodes.
     friction_limit : (m,) ndarray
         Friction limits [N], 0 outside the contact.
-    bond_length : float
-        Bond length [m].
-    weakening : float
-        Static / kinetic friction coefficient [1].
+    steepest_fall : float
+        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
 
     Raises
     ------
@@ -355,10 +349,11 @@ def _compute_all_modes(
     """
     points = frozen_array(np.flatnonzero(friction_limit > 0), np.int64)
     friction_limit = friction_limit[points]
-    # Rigid pieces in series with one spring have only one mode.
+    # Rigid pieces in series with one spring have only one mode: D^1/2 C D^1/2 has the eigenvector D^1/2.
     if np.ptp(tangential) == 0:
-        shape = np.ones((points.size, 1))
-        compliance = tangential[:1, 0]
+        total = friction_limit.sum()
+        shape = np.full((points.size, 1), total**-0.5)
+        compliance = tangential[:1, 0] * total
     else:
         root = np.sqrt(friction_limit)[:, None]
         with use_one_blas_thread():
@@ -366,12 +361,12 @@ def _compute_all_modes(
         shape = vectors[:, ::-1] / root
         compliance = values[::-1]
 
-    stability = compliance[0] / bond_length * (weakening - 1)
+    stability = compliance[0] * steepest_fall
     if stability >= 1:
         raise PatchfemError(
-            "contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
-            f"change of the force on it (the stability number is {stability:.3g}, but must be below 1); "
-            "raise friction.bond_length or friction.kinetic"
+            "friction.kinetic below static: the patch may slip suddenly without a change of the force on it, because the "
+            f"friction force falls over the slip {stability:.3g} times as steeply as the pieces and the holder relax (the "
+            "limit is 1); raise friction.bond_length or friction.kinetic, or make the holder stiffer"
         )
     return ShearModes(points, friction_limit, shape, 1 / compliance)
 
@@ -417,7 +412,7 @@ def find_sufficient_modes(
     bond_length: float,
     count: int,
     tolerance: float,
-    weakening: float = 1.0,
+    steepest_fall: float = 0.0,
     max_modes: int = 64,
 ) -> ShearModes:
     """Return as many of the most compliant modes as the friction force needs to meet a tolerance.
@@ -434,8 +429,8 @@ def find_sufficient_modes(
         Friction limits D [N]; the bonds of a node have the stiffness friction_limit/bond_length.
     bond_length : float
         Bond length [m].
-    weakening : float
-        Static / kinetic friction coefficient.
+    steepest_fall : float
+        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
     count, max_modes : int
         First and largest number of modes.
     tolerance : float
@@ -445,7 +440,7 @@ def find_sufficient_modes(
     -------
     ShearModes
     """
-    modes = _compute_all_modes(tangential, friction_limit, bond_length, weakening)
+    modes = _compute_all_modes(tangential, friction_limit, steepest_fall)
     errors = estimate_force_errors(modes, bond_length)
     while count < min(max_modes, modes.stiffness.size) and errors[count] > tolerance:
         count = min(2 * count, max_modes)

@@ -73,7 +73,7 @@ def follow_slide(contact, slide):
 
 def make_compliant_contact(law, grooves, compliance):
     """Return points on flanks with all shear modes of a compliance [m/N]."""
-    modes = shear_modes(compliance, MU * LOAD * LOAD_FRACTION, LENGTH, COUNT)
+    modes = shear_modes(compliance, MU * LOAD * LOAD_FRACTION, COUNT)
     law = LAWS[law](LENGTH)
     return make_flank_contact(law, grooves, LOAD, BASIS.slide, modes, LOAD_FRACTION)
 

@@ -167,7 +167,7 @@ def reduce_to_shear_modes(sets, count=None, depth: float = 3e-8):
     limit = 0.3 * (force + force.sum() / x.size)
     if count == 0:
         return find_sufficient_modes(compliance, limit, 1e-6, 4, 1e-4)
-    return shear_modes(compliance, limit, 1e-6, count or x.size)
+    return shear_modes(compliance, limit, count or x.size)
 
 
 def test_exact_separated_pieces_have_no_force():

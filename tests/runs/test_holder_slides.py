@@ -3,8 +3,10 @@ rig."""
 
 import numpy as np
 import pytest
+from scene_runs import find_sentences
 from scene_texts import BENCH, PATCH, RIG
 
+from patchfem.core import PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -76,3 +78,51 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
     )
     assert z == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
     assert result.measures["energy_balance"].value <= 1e-10
+
+
+# ---- sudden slip of bonds whose length falls with the slip
+
+GROWING = """\
+[friction]
+law = "nonlocal"
+static = 0.3
+kinetic = 0.15
+bond_length = "0.615 um"
+rest_growth = "2e-5 m/s^2"
+slip_growth = "1 um"
+rest_speed = "1 um/s"
+"""
+DWELL = (
+    '[slide]\nkind = "dwell"\ndistance = "30 um"\nspeed = "0.1 mm/s"\nhold = "1 s"\ndistance_after = "30 um"\n'
+    "[accuracy]\ntolerance = 1e-2\n"
+)
+GROWING_BENCH = PATCH.replace('"26 lbf"', '"8 kN"') + GROWING + DWELL
+
+
+def _run_behind_holder(stiffness: float, *sets):
+    """Return the result of the bench of growing bonds behind a holder spring [N/m]."""
+    holder = f"contact.holder.tangential_stiffness={stiffness!r} N/m"
+    return run(loads(GROWING_BENCH, "a.toml", [holder, *sets]), estimate=False)
+
+
+def test_exact_holder_softer_than_measured_fall_of_friction_is_refused():
+    """The refusal of a sudden slip has the steepest fall of the force that a bench with a rigid holder shows."""
+    sets = ["slide.hold=0 s", "accuracy.steps_per_cycle=20000"]
+    rigid = run(loads(GROWING_BENCH, "a.toml", sets), estimate=False).response
+    steepest = -float((np.diff(rigid.force) / np.diff(rigid.slide)).min())
+    with pytest.raises(PatchfemError, match="slip suddenly"):
+        _run_behind_holder(0.99 * steepest)
+    assert not find_sentences(_run_behind_holder(1.01 * steepest, *sets).warnings, "jumps")
+
+
+def test_patch_with_gentle_fall_of_friction_runs_with_shear():
+    """Pieces in shear that are stiffer than the steepest fall of friction are not refused."""
+    result = run(loads(GROWING_BENCH, "a.toml", ["contact.shear={}"]), estimate=False)
+    assert result.response.force.max() > 0.15 * 8e3
+
+
+def test_jump_of_contact_after_rest_is_reported():
+    """After a rest friction falls more steeply than in the first slip, so that the contact jumps behind a soft holder."""
+    soft = find_sentences(_run_behind_holder(2.3e8).warnings, "jumps")
+    assert len(soft) == 1 and "limit 10 times" in soft[0] and "holder stiffer" in soft[0]
+    assert not find_sentences(_run_behind_holder(4e8).warnings, "jumps")

@@ -66,6 +66,9 @@ def run_prescribed(inputs: RunInputs) -> Result:
         created=fine.values["energy_created"],
         exchanged=float(np.abs(np.diff(fine.ledger[0])).sum()),
         settings=settings,
+        time=fine.time,
+        slide=fine.slide,
+        slip=fine.slip,
     )
     warnings = [
         *inputs.warnings,

@@ -9,10 +9,12 @@ from itertools import chain
 from math import ceil, log2
 from typing import NamedTuple
 
+import numpy as np
+
 from ... import friction
 from ...core import Outcome
 from ...effects import law_has_trait
-from ...formatting import format_length
+from ...formatting import format_length, format_quantity
 from .patch_rows import Measures
 from .result import Settings
 
@@ -25,6 +27,8 @@ MAX_CREATED_ENERGY_FRACTION = 1e-6
 MAX_BOND_FORMING_SLIP_RATIO = 0.3
 # Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
 MIN_REPORTED_FORCE_EXCESS_RATIO = 1e-3
+# Largest ratio of the slip in one time step to the slide of the holders in it without a warning of a sudden slip.
+MAX_SLIP_PER_SLIDE = 10.0
 MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
 
 
@@ -38,6 +42,7 @@ class LawFacts(NamedTuple):
     - force_ratio: largest ratio of friction force to mu_s N; None if the load varies.
     - created, exchanged: energy that the law created, and integral of the absolute friction power [J].
     - settings: Settings of the run.
+    - time, slide, slip (k,): times [s] of successive time steps, slide and slip [m] of the first interface.
     """
 
     model: object
@@ -49,6 +54,9 @@ class LawFacts(NamedTuple):
     created: float
     exchanged: float
     settings: Settings
+    time: np.ndarray
+    slide: np.ndarray
+    slip: np.ndarray
 
 
 def list_law_warnings(facts: LawFacts) -> list[str]:
@@ -123,6 +131,32 @@ def _warn_of_created_energy(facts: LawFacts) -> Iterator[str]:
             f"the law as printed in the report created {facts.created:.3g} J, which is {percent:.2g} % of the work "
             'exchanged; with friction.reading = "stretch" no energy is created'
         )
+
+
+def _warn_of_sudden_slip(facts: LawFacts) -> Iterator[str]:
+    """Warn of a contact that jumps within a time step, because its force falls more steeply than pieces and holder relax.
+
+    The slip then exceeds the bond length, while the holders hardly move. Without mass nothing else limits its speed.
+    """
+    law = find_bonds(facts.model)
+    if law is None or not law.has_growth or not facts.model.partial_slip:
+        return
+    slips = np.abs(np.diff(facts.slip))
+    slides = np.abs(np.diff(facts.slide))
+    is_sudden = slips > np.maximum(law.length, MAX_SLIP_PER_SLIDE * slides)
+    if not is_sudden.any():
+        return
+    step = int(np.argmax(slips * is_sudden))
+    end = format_quantity(float(facts.time[step + 1]), "s", 3)
+    slip = format_length(slips[step], 3)
+    slide = format_length(slides[step], 3)
+    length = format_length(law.length, 3)
+    yield (
+        f"the contact jumps within a time step: in the one that ends at {end} it slips by {slip}, more than the bond length "
+        f"of {length}, while its holders slide by {slide} (limit {MAX_SLIP_PER_SLIDE:g} times this slide), because the "
+        "friction force falls more steeply than the pieces and the holder relax; no mass limits the speed of such a slip; "
+        "raise friction.bond_length or friction.kinetic, or make the holder stiffer"
+    )
 
 
 def _warn_of_kept_pressure(facts: LawFacts) -> Iterator[str]:
@@ -231,6 +265,7 @@ LAW_WARNINGS = (
     _warn_of_infinite_traction,
     _warn_of_slow_forming,
     _warn_of_creep,
+    _warn_of_sudden_slip,
     _warn_of_kept_pressure,
     _warn_of_created_energy,
     _warn_of_work_check,

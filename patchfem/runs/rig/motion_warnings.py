@@ -78,6 +78,9 @@ def collect_law_facts(run, settings: Settings) -> LawFacts:
         created=solution.book.get("created", 0.0),
         exchanged=solution.book.get("passed", 0.0),
         settings=settings,
+        time=solution.window.time,
+        slide=solution.window.slide,
+        slip=solution.window.slip,
     )
 
 
