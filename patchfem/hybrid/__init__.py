@@ -26,12 +26,13 @@ A module imports its own entry of this list and the entries before it:
 9. `drives`           pieces and tones of a drive
 10. `cases`           arrays of a case from the records of a rig or bench
 11. `measures`        measures of the window, energies
-12. `runs`            runs with errors and histories
-13. `periodic`        periodic motions by shooting
-14. `continuation`    curves of solutions through folds
-15. `periodic_curves` curves of periodic motions
-16. `quasi_static`    quasi-static motions of a mode
-17. `free_motions`    motions without a drive: backbones and limit cycles
+12. `stored_energy`   energy of stretched springs, bonds and a lifted load
+13. `runs`            runs with errors and histories
+14. `periodic`        periodic motions by shooting
+15. `continuation`    curves of solutions through folds
+16. `periodic_curves` curves of periodic motions
+17. `quasi_static`    quasi-static motions of a mode
+18. `free_motions`    motions without a drive: backbones and limit cycles
 
 Limits. The method is explicit: a law or mode that is 1e4 times faster than the drive takes as many more steps, and a
 run ends with a message after `cases.MAX_STEPS`. Margins are evaluated at three points of a step and at nearly

@@ -19,11 +19,13 @@ from .records import (
     Cycle,
     Face,
     Margin,
+    Memory,
     Record,
     Setting,
     State,
     Status,
 )
+from .stored_energy import compute_stored_energy
 
 COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the run
 COARSE_STEP = 2.0  # ratio of their longest steps
@@ -48,6 +50,7 @@ class Motion:
     """Motion of a case.
 
     - case: the case
+    - first_memory (M, l): memory of the interfaces at the start, see `records.State`
     - status, message: how the run ended, and in words if it ended early
     - values: measures of the window and of the whole run by name
     - extremes (c, 2), phasors (c,): smallest and largest output [m] and phasor of the output [m] of each cycle
@@ -61,6 +64,7 @@ class Motion:
     """
 
     case: Case
+    first_memory: np.ndarray
     status: Status
     message: str
     values: dict[str, float]
@@ -113,14 +117,12 @@ class Motion:
         slide_rates[rests] = 0.0
 
         # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
-        work = integrals[:, :m, 0]
-        loss = integrals[:, :m, 2]
+        work = integrals[:, :m, 0].sum(1)
+        loss = integrals[:, :m, 2].sum(1)
+        stored = compute_stored_energy(self.case, self.first_memory) + work - loss
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
-        extra = {
-            "ledger": np.stack(
-                [work.sum(1), (work - loss).sum(1), loss.sum(1), np.zeros(time.size)]
-            )
-        }
+        ledger = [work, np.maximum(stored, 0.0), loss, np.zeros(time.size)]
+        extra = {"ledger": np.stack(ledger)}
 
         if m and rig.faces[0, Face.SWING]:
             extra["normal_load"] = self._columns(rows, 1)[:, 0]
@@ -172,6 +174,11 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
         if start is not None:
             state = _restart(case, start)
             case = replace(case, y=state.y.copy())
+        first_memory = state.memory.copy()
+        if start is None:
+            # Without a motion before, no law has a stretch.
+            slides = case.rig.rows[0] @ case.y[: case.rig.modes.shape[1]]
+            first_memory[:, Memory.ORIGIN] = slides
         compiled.load_compiled_module("hybrid.engine_kernels").run_case(case.rig, state, record)
         clock = state.clock
         n_needed = min(N_EVENTS, int(clock[Clock.N_EVENTS]))
@@ -194,6 +201,7 @@ def run_case(case: Case, *, start: State | None = None) -> Motion:
     duration = np.diff(cycles[:, Cycle.END], prepend=0.0)
     return Motion(
         case=case,
+        first_memory=first_memory,
         status=status,
         message=describe_end(case, status),
         values={name: float(value) for name, value in values.items()},

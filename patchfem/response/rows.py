@@ -425,7 +425,7 @@ MOTION_MEASURE_ROWS = (
         "energy_stored",
         "J",
         1e-10,
-        "energy stored in all interfaces at the end of the run: elastic energy and, with "
+        "energy stored in the interface at the end of a run on a bench: elastic energy and, with "
         "grooves, the potential energy of the load",
         group="energy",
         friction_scale=lambda scale: scale.limit * scale.bond_length,

@@ -39,7 +39,6 @@ PUBLIC = {
         "Coating",
         "Contact",
         "Material",
-        "compute_outermost_strip_distance",
     ),
     "keys.lookup": ("find_key",),
     "keys.materials": ("MATERIALS",),

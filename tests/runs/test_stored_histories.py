@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 from scene_runs import run_scene
-from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT, SECOND, make_friction_table
+from scene_texts import (
+    BLOCK,
+    COULOMB,
+    DRIVE,
+    GROOVED,
+    MODE,
+    NONLOCAL,
+    PLASTIC,
+    POINT,
+    SECOND,
+    SHEAR,
+    make_friction_table,
+)
 
 HYBRID, MARCH = POINT + COULOMB + MODE, POINT + NONLOCAL.replace("1 um", "3 um") + MODE + SECOND
 BASE = '[drive]\nkind = "base"\nacceleration = "6 g"\n'
@@ -42,6 +54,58 @@ def test_exact_energies_continue_over_drive_levels(method):
     assert np.diff(dissipated).min() >= -1e-9 * scale
     first_level = dissipated[time <= time[-1] / 2][-1]
     assert 0 < first_level < 0.5 * scale
+
+
+SHAKEN = MODE.replace("0.003", "0.02") + DRIVE.replace("143", "150")
+LEVELS = (
+    'drive.waveform=levels; drive.levels=["1 g", "5 g"]; drive.cycles=10; accuracy.method=exact'
+)
+HARMONIC = "accuracy.method=harmonic"
+RELEASE = "accuracy.method=exact"
+
+
+@pytest.mark.parametrize("law", ["elastic-plastic", "bouc-wen", "lugre"])
+@pytest.mark.parametrize(
+    "changes", [HARMONIC, LEVELS, RELEASE], ids=["harmonic", "levels", "release"]
+)
+def test_exact_stored_energy_is_that_of_the_spring(law, changes):
+    """The stored energy is F^2/2k at every sample, also of a periodic motion and of a level that starts with a stretch.
+
+    A release begins without a stretch.
+    """
+    text = POINT + make_friction_table(law) + SHAKEN
+    if changes == LEVELS:
+        text = text.replace('acceleration = "5 g"\n', "")
+    elif changes == RELEASE:
+        text = text[: text.index("[drive]")] + FREE + "cycles = 20\n"
+    response = run_scene(text, changes, estimate=False).response
+    stiffness = 0.3 * 26 * 4.4482216152605 / 1e-6 if law == "elastic-plastic" else 1e7
+    stored = response.extra["ledger"][1]
+    assert stored == pytest.approx(response.force**2 / (2 * stiffness), abs=1e-5 * stored.max())
+    assert stored.min() >= 0
+
+
+@pytest.mark.parametrize(
+    "interface",
+    [
+        POINT + make_friction_table("iwan"),
+        POINT + NONLOCAL,
+        BLOCK + '[contact.crown]\nradius = "20 m"\n' + SHEAR + COULOMB,
+        GROOVED.replace("0.4", "0.05"),
+    ],
+    ids=["iwan", "bonds", "patch", "grooves"],
+)
+def test_exact_stored_energy_of_periodic_motion_agrees_with_run_from_rest(interface):
+    """Over a cycle the energy of a periodic motion has the extremes of a motion that starts at rest, without energy."""
+    periodic = run_scene(interface + SHAKEN, HARMONIC, estimate=False).window
+    marched = run_scene(
+        interface + SHAKEN, "accuracy.method=exact; drive.cycles=300", estimate=False
+    )
+    last = marched.window.time > marched.window.time[-1] - 1 / 150
+    expected = marched.window.extra["ledger"][1][last]
+    stored = periodic.extra["ledger"][1]
+    assert stored.max() == pytest.approx(expected.max(), rel=1e-5)
+    assert stored.min() == pytest.approx(expected.min(), abs=1e-5 * expected.max())
 
 
 @pytest.mark.parametrize("name", CASES)

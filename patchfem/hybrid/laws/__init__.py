@@ -13,8 +13,8 @@ They may call functions of their module that HELPERS lists. `p` are the numbers 
 its `records.LawNumbers` from the law of `friction.laws` and a mean load [N]. In a motion of the opposite sign the states
 have the opposite sign, or the factors that STATE_SIGNS lists, and `memory[FLAG]` has the factor FLAG_SIGN, 1 by default.
 
-LAWS lists the modules; the number of a law is its place. LAW_OF_NAME gives the module for each `friction.law`, and
-VARYING_LAW_OF_NAME that under a load that varies.
+A law that stores energy has an entry in `stored_energy.ENERGY_OF_LAW`. LAWS lists the modules; the number of a law is its
+place. LAW_OF_NAME gives the module for each `friction.law`, and VARYING_LAW_OF_NAME that under a load that varies.
 """
 
 from collections.abc import Sequence

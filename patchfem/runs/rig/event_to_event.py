@@ -382,10 +382,9 @@ class LumpedEvaluator(RunEvaluator):
             energies = run.ledger | compute_sampled_work(window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
         if not self.strips_slide_apart:
-            values.pop("energy_stored", None)
             return {"integrated": values}
 
-        names = ["slip_start_phase", "energy_stored"]
+        names = ["slip_start_phase"]
         for group in STRIP_MEASURE_GROUPS:
             names += select_names(group)
         # The yaw does work in addition to that of the mean displacement.
