@@ -149,7 +149,7 @@ def read_summary(folder: Path) -> Summary:
     Raises
     ------
     PatchfemError
-        If there is none, if it is damaged, or if a version before 1.2 wrote it.
+        If there is none, if it is damaged, or if patchfem 1.2 or later did not write it.
     Missing
         If there is no such folder.
     """
@@ -170,5 +170,5 @@ def read_summary(folder: Path) -> Summary:
         reason = str(error)
     # every summary since 1.2 has a verdict
     if content and b'"verdict"' not in content:
-        reason = "patchfem before 1.2 wrote it; run the scene again"
+        reason = "neither patchfem 1.2 nor a later version wrote it; run the scene again"
     raise PatchfemError(f"{path}: this summary cannot be read: {reason}")
