@@ -122,7 +122,8 @@ def read_answer(folder: Path) -> Answer:
             origin = origin | {"resolved": (folder / SCENE_FILE).read_text("utf-8")}
         # Arrays of the answer by name; the CPU times of a run are kept among the details.
         path = folder / name_data_file(summary.kind)
-        data = read_netcdf(path)[0] if path.is_file() else {}
+        has_arrays = path.is_file() or summary.kind == "sweep"  # the cases of a sweep are arrays
+        data = read_netcdf(path)[0] if has_arrays else {}
         if CPU_TIMES_VARIABLE in details:
             times = np.array(details[CPU_TIMES_VARIABLE], float)
             data[CPU_TIMES_VARIABLE] = Variable(
