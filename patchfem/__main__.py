@@ -79,7 +79,15 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import (
+    App,
+    CycloptsError,
+    MissingArgumentError,
+    Parameter,
+    UnknownCommandError,
+    UnknownOptionError,
+    UnusedCliTokensError,
+)
 
 from . import __version__
 from .commands import compare, import_, profile, run, scene, start, study, sweep, view_export
@@ -169,6 +177,19 @@ def _describe_unexpected_arguments(verb: str, unused: list) -> str:
     kind = "option" if verb.startswith("-") else "verb"
     advice = f"did you mean `{similar[0]}`? " if similar else ""
     return f"unknown {kind} '{verb}'; {advice}see `patchfem --help`"
+
+
+def _describe_usage_error(arguments: list, error: UsageError | CycloptsError) -> str:
+    """Return the message for arguments that a verb does not accept."""
+    if isinstance(error, UnknownCommandError | UnusedCliTokensError):
+        return _describe_unexpected_arguments(arguments[0], error.unused_tokens)
+    if isinstance(error, MissingArgumentError):
+        name = error.argument.name
+        need = "needs a value" if name.startswith("-") else "is missing"
+        return f"{name} {need}; see `patchfem {arguments[0]} --help`"
+    if isinstance(error, UnknownOptionError) and "--" in arguments:
+        return f"{error.token.keyword}: no option is possible after --; write it before --"
+    return " ".join(str(error).split())
 
 
 def _describe_removed_option(arguments: list) -> str:
@@ -302,11 +323,7 @@ def run_command(arguments: list[str], before=lambda: None) -> int:
 
     # Mistakes of the user, and what stops a command from outside.
     except (UsageError, CycloptsError) as error:
-        unused = getattr(error, "unused_tokens", None)
-        message = str(error)
-        if unused:
-            message = _describe_unexpected_arguments(arguments[0], unused)
-        print_message(f"patchfem: {' '.join(message.split())}")
+        print_message(f"patchfem: {_describe_usage_error(arguments, error)}")
         return 2
     except CommandExit as end:
         return end.code

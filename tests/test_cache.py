@@ -23,14 +23,18 @@ from patchfem.disk import user_cache
 # A prescribed slide has the smallest time loop that contains a friction law.
 SCENE = POINT + PLASTIC + TRIANGLE
 BENCH = """\
-import json, sys
+import gc, json, sys
 import patchfem.runs.run as simulate
+from patchfem.compiled import KernelFunction
 from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)
+kernels = [one for one in gc.get_objects() if isinstance(one, KernelFunction) and one.loaded_functions]
 print(json.dumps({"work": result.measures["loop_area"].value,
                   "peak": result.measures["friction_force_peak"].value, "home": simulate.__file__, "said": said,
-                  "numba": "numba" in sys.modules}))
+                  "numba": "numba" in sys.modules,
+                  "stored": [one.name for one in kernels if all(one.loaded_functions.values())],
+                  "not stored": [one.name for one in kernels if not all(one.loaded_functions.values())]}))
 """
 
 
@@ -92,6 +96,15 @@ def test_exact_only_first_of_two_processes_compiles(parallel_results):
     """Of two processes started at once on an empty cache, only one compiles, and both give the same loop."""
     assert [one["numba"] for one in parallel_results] == [True, False]
     assert len({(one["work"], one["peak"]) for one in parallel_results}) == 1
+
+
+def test_always_runs_use_stored_machine_code(parallel_results):
+    """The run that compiles and the next one call stored machine code only, not numba, which takes twice as long.
+
+    A version of numba or llvmlite whose code cannot be stored would otherwise go unnoticed.
+    """
+    for one in parallel_results:
+        assert one["stored"] and not one["not stored"]
 
 
 @pytest.mark.slow

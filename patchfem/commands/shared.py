@@ -18,6 +18,7 @@ from ..export.charts import axes
 from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
+from ..scene.lines import split_assignment, split_key
 from .streams import make_printable
 
 if TYPE_CHECKING:
@@ -78,9 +79,22 @@ def required_out_option(text: str) -> type:
     return Annotated[Path, Parameter(name=["-o", "--out"], help=text)]
 
 
-Sets = repeated_option(
-    'change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set"
-)
+def _require_different_keys(_, texts: tuple[str, ...] | None) -> None:
+    """Raise UsageError if two of the assignments ``table.key=value`` of --set have the same key."""
+    keys = set()
+    for text in texts or ():
+        key = ".".join(split_key(split_assignment(text)[0]))
+        if key in keys:
+            raise UsageError(f"--set {text}: {key} is given twice; remove one of them")
+        keys.add(key)
+
+
+Sets = Annotated[
+    repeated_option(
+        'change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set"
+    ),
+    Parameter(validator=_require_different_keys),
+]
 Json = flag_option("print the answer as one JSON object", "--json")
 Out = out_option("folder of the results, such as out/mine")
 Quiet = flag_option("print only errors", "-q", "--quiet")

@@ -3,6 +3,7 @@
 import io
 import os
 import re
+import shutil
 import sys
 import warnings
 
@@ -11,18 +12,33 @@ import warnings
 LONG_WORD_PATTERN = re.compile(r"\S{401,}")
 
 
-class _OutputPipe(io.FileIO):
-    """File that discards what is written after the reader of the pipe has gone.
+# Narrowest terminal [characters] for which help is laid out; the layout does not end for 1 and 2
+# characters, and no line is readable with fewer than this.
+MIN_TERMINAL_WIDTH = 20
 
-    A command that prints its answer before it has written all of its files (`patchfem run ... | head`) goes on.
+
+class _OutputPipe(io.FileIO):
+    """Standard output, which discards what is written after the first error.
+
+    A command that prints its answer before it has written all of its files (`patchfem run ... | head`) goes on after
+    the reader of the pipe has gone. Any other error, such as a full disk, is raised once: Python repeats a failed write
+    at the end of the process, with a traceback and an exit code of its own.
     """
 
+    has_failed = False
+
     def write(self, data) -> int:
-        """Write the bytes of `data` and return their number, also if nobody reads the pipe any more."""
+        """Write the bytes of `data` and return their number, also if they are discarded."""
+        if self.has_failed:
+            return len(data)
         try:
             return super().write(data)
-        except BrokenPipeError:
-            return len(data)
+        except OSError as error:
+            self.has_failed = True
+            if isinstance(error, BrokenPipeError):
+                return len(data)
+            error.filename = "standard output"
+            raise
 
 
 def prepare_streams() -> None:
@@ -31,7 +47,8 @@ def prepare_streams() -> None:
     A closed stream is connected to the null device, because a file that is opened while 0, 1 or 2
     is closed would get its number and then everything that is printed. Output to
     a pipe that nobody reads any more is discarded. A character that the
-    encoding of a stream does not have is written as a backslash with its code. Warnings of
+    encoding of a stream does not have is written as a backslash with its code. A terminal narrower
+    than `MIN_TERMINAL_WIDTH` counts as that wide. Warnings of
     libraries are suppressed, because a user cannot act on them: what matters shows in the numbers
     and is reported by the run. Python's option -W and PYTHONWARNINGS restore these warnings.
     """
@@ -52,6 +69,8 @@ def prepare_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+    if shutil.get_terminal_size().columns < MIN_TERMINAL_WIDTH:
+        os.environ["COLUMNS"] = str(MIN_TERMINAL_WIDTH)
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
         # The processes that a sweep starts inherit this setting.

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core import Missing
+from .deferred_signals import defer_signals
 
 COMPLETED_PATHS = deque(maxlen=100)  # last completed files; the message on an interrupt names them
 RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
@@ -182,8 +183,11 @@ def open_lossy(path) -> Iterator[LossyFile]:
     """Open a file at `path` to which h5py writes, and raise the first error of writing at its end.
 
     `h5py.File(file, "w")` inside the block accepts the LossyFile. OSError is raised at the end of the block.
+
+    Signals are deferred until then: an exception of their handler in a call from HDF5 would be lost, and the file damaged,
+    or HDF5 would crash when the process ends.
     """
-    with open(path, "w+b", buffering=0) as file:
+    with defer_signals(), open(path, "w+b", buffering=0) as file:
         lossy = LossyFile(file)
         yield lossy
         if lossy.error is not None:

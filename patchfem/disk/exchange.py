@@ -2,17 +2,10 @@
 
 import os
 import shutil
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from .atomic_write import COMPLETED_PATHS
-
-TERMINATION_SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-)
+from .deferred_signals import defer_signals
 
 
 def make_old_folder_path(target: Path) -> Path:
@@ -54,24 +47,3 @@ def restore_folder(target: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
         else:
             os.rename(old, target)
-
-
-@contextmanager
-def defer_signals() -> Iterator[None]:
-    """Defer signals that end this process until the block is done."""
-    # Signals reach only the main thread.
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    received = []
-    handlers = {}
-    try:
-        for number in TERMINATION_SIGNALS:
-            if signal.getsignal(number) not in (signal.SIG_IGN, None):
-                handlers[number] = signal.signal(number, lambda number, _: received.append(number))
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for number in received[:1]:
-            signal.raise_signal(number)

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import RESUMABLE_FOLDERS, explain_mkdir_error, is_partial_name
-from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder, restore_folder
+from ..disk.deferred_signals import defer_signals
+from ..disk.exchange import make_old_folder_path, replace_folder, restore_folder
 from ..disk.lock import FolderLock
 from . import store
 from .charts.table import CSV_FILES

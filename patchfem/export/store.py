@@ -122,7 +122,8 @@ def read_answer(folder: Path) -> Answer:
             origin = origin | {"resolved": (folder / SCENE_FILE).read_text("utf-8")}
         # Arrays of the answer by name; the CPU times of a run are kept among the details.
         path = folder / name_data_file(summary.kind)
-        data = read_netcdf(path)[0] if path.is_file() else {}
+        has_arrays = path.is_file() or summary.kind == "sweep"  # the cases of a sweep are arrays
+        data = read_netcdf(path)[0] if has_arrays else {}
         if CPU_TIMES_VARIABLE in details:
             times = np.array(details[CPU_TIMES_VARIABLE], float)
             data[CPU_TIMES_VARIABLE] = Variable(
@@ -149,7 +150,7 @@ def read_summary(folder: Path) -> Summary:
     Raises
     ------
     PatchfemError
-        If there is none, if it is damaged, or if a version before 1.2 wrote it.
+        If there is none, if it is damaged, or if patchfem 1.2 or later did not write it.
     Missing
         If there is no such folder.
     """
@@ -170,5 +171,5 @@ def read_summary(folder: Path) -> Summary:
         reason = str(error)
     # every summary since 1.2 has a verdict
     if content and b'"verdict"' not in content:
-        reason = "patchfem before 1.2 wrote it; run the scene again"
+        reason = "neither patchfem 1.2 nor a later version wrote it; run the scene again"
     raise PatchfemError(f"{path}: this summary cannot be read: {reason}")

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from math import prod
 from typing import NamedTuple, get_origin
 
 from ..core import PatchfemError
@@ -28,8 +29,8 @@ from .suggestions import require_key
 # keys of a length and of a force whose values `read_positive_values` reads, with an example
 LENGTH_KEY = "drive.displacement"
 POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
-# Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
-MAX_RANGE_VALUES = 10_000_000
+# Largest number of cases of a sweep; the hashes and columns of more cases take gigabytes.
+MAX_CASES = 3_000_000
 # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
 MIN_LOG_RATIO = 10
 # Number of significant digits of a value, so that a tenth of a range is
@@ -299,6 +300,21 @@ def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
     return make_axis(key, chain.from_iterable(map(reader.list_values, pieces)))
 
 
+def require_possible_count(n_cases: int) -> None:
+    """Raise ValueError if a sweep of so many cases is not possible."""
+    if n_cases > MAX_CASES:
+        raise ValueError(
+            f"the sweep has {n_cases} cases, more than the largest number possible ({MAX_CASES}); give fewer values "
+            "for each key, or draw N cases from the ranges with --sobol N"
+        )
+
+
+def _count_values(text: str) -> int:
+    """Return the number of values in a list of values and ranges."""
+    ranges = map(_RANGE_PATTERN.fullmatch, _split_at_commas(text))
+    return sum(int(match[3] or 1) if match else 1 for match in ranges)
+
+
 def _append_values(
     given: list[Axis | Range],
     mistakes: list[str],
@@ -312,6 +328,9 @@ def _append_values(
     which the text of a mistake begins with, or "".
     """
     try:
+        # Counted before the ranges are expanded, which takes a minute for ten million values.
+        n_cases = prod(len(item.texts) for item in given if isinstance(item, Axis))
+        require_possible_count(n_cases * _count_values(assignment[1]))
         given.append(read_values(*assignment, form))
     except ValueError as error:
         mistakes.append(f"{name}: {error}" if name else str(error))
@@ -364,9 +383,9 @@ class _ValueReader:
         spread = self.parse_range(piece)
         if spread is None:
             return [piece]
-        if not 2 <= spread.count <= MAX_RANGE_VALUES:
+        if not 2 <= spread.count <= MAX_CASES:
             raise ValueError(
-                f"{spread.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+                f"{spread.text}: give the number of values after a colon, from 2 to {MAX_CASES}, such as :9"
             )
         return spread.format_values(k / (spread.count - 1) for k in range(spread.count))
 

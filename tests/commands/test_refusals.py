@@ -38,6 +38,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"),
             ("16000000 cases, more than",),
         ),
+        (("--over",), ("patchfem: --over needs a value; see `patchfem sweep --help`",)),
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
@@ -66,6 +67,15 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
         for verb in ("check", "sweep")
     },
+    "check rig.toml": [
+        (("--set",), ("patchfem: --set needs a value; see `patchfem check --help`",)),
+        (("--", "--set", "normal.load=1 N"), ("--set: no option is possible after --",)),
+        (
+            ("--set", "normal.load=1 N", "--set", "normal.load=2 N"),
+            ("--set normal.load=2 N: normal.load is given twice; remove one of them",),
+        ),
+    ],
+    "check": [((), ("SCENE is missing; see `patchfem check --help`",))],
     "check shipped.toml": [
         (
             ("--set", "acceleration=20 g"),

@@ -54,6 +54,29 @@ def test_exact_closed_pipe_changes_neither_files_nor_exit_code(scene_file, tmp_p
     assert done.returncode == 3 and (tmp_path / "out/sweep.csv").is_file()
 
 
+@pytest.mark.parametrize(
+    "words",
+    [("check", "SCENE"), ("run", "SCENE", "--no-page"), ("run", "SCENE", "--json"), ("--help",)],
+)
+def test_exact_full_stdout_ends_with_message(scene_file, tmp_path, words):
+    """A command that cannot print its answer ends with code 4 and one sentence."""
+    words = [str(scene_file) if word == "SCENE" else word for word in words]
+    with open("/dev/full", "wb") as full:
+        done = run_patchfem(*words, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[-1] == b"standard output: No space left on device"
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("columns", ["1", "2"])
+def test_always_help_of_narrow_terminal_ends(columns):
+    """The help of a verb ends on a terminal of one or two characters, for which it is as wide as the narrowest layout."""
+    environment = os.environ | {"COLUMNS": columns, "TERM": "dumb"}
+    done = run_patchfem("check", "--help", env=environment, stdout=subprocess.PIPE)
+    assert done.returncode == 0
+    assert 10 < max(map(len, done.stdout.decode().splitlines())) <= 20
+
+
 def test_exact_full_stderr_keeps_exit_code(tmp_path):
     """A mistake in a scene gives exit code 2 although stderr is full."""
     path = tmp_path / "a.toml"

@@ -1,13 +1,17 @@
 """Files are complete or absent: file size limits, devices and interrupts."""
 
 import io
+import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from command_line import run_cli, run_successfully
+from command_line import list_names, run_cli, run_successfully
 from limits import limit_file_size
 from scene_texts import BENCH, COATED
 
@@ -16,6 +20,57 @@ from patchfem.disk import is_partial_name, open_lossy, write_atomically, write_t
 from patchfem.disk.atomic_write import COMPLETED_PATHS
 
 SIZES = [1 << 10, 1 << 16]
+N_SIGNALLED_WRITES = 40
+# Writes both HDF5 files of a results folder again and again, with a signal in another write of HDF5 each time, and prints
+# for each signal the file and whether the writer ended with an interrupt.
+SIGNALLED_WRITES = """\
+import json, os, signal, sys
+from pathlib import Path
+import patchfem.__main__
+from patchfem.disk.atomic_write import LossyFile
+from patchfem.export.fields.vtkhdf import read_frames, write_blocks
+from patchfem.export.netcdf import read_netcdf, write_arrays
+
+folder, target, n_signals = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+frames = read_frames(folder / "fields.vtkhdf")
+data, attributes = read_netcdf(folder / "result.nc")
+attributes.pop("_NCProperties", None)
+plain_write, n_left = LossyFile.write, 0
+
+def write(self, data):
+    global n_left
+    n_left -= 1
+    if n_left == 0:
+        os.kill(os.getpid(), number)
+    return plain_write(self, data)
+
+LossyFile.write = write
+for name, save in (
+    ("fields.vtkhdf", lambda: write_blocks(target / "fields.vtkhdf", frames.blocks, frames.times)),
+    ("result.nc", lambda: write_arrays(data, attributes, target / "result.nc")),
+):
+    save()
+    for k in range(1, n_signals + 1):
+        n_left = k
+        number = (signal.SIGINT, signal.SIGTERM)[k % 2]
+        try:
+            save()
+            print(json.dumps([name, k, "no interrupt"]), flush=True)
+        except KeyboardInterrupt:
+            print(json.dumps([name, k, "interrupt" if n_left <= 0 else "no write"]), flush=True)
+"""
+
+
+def read_datasets(path) -> dict[str, np.ndarray]:
+    """Return the arrays of an HDF5 file by their paths in it."""
+    arrays = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, item: (
+                arrays.update({name: item[...]}) if isinstance(item, h5py.Dataset) else None
+            )
+        )
+    return arrays
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +182,28 @@ def test_refuses_unwritable_path(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"] and not list(
         (tmp_path / "folder").iterdir()
     )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals cannot be sent to a process elsewhere")
+def test_always_signal_during_hdf5_write_preserves_older_file(results_folder, tmp_path):
+    """A signal at any of the first 40 writes of HDF5 ends the writer with an interrupt; the older file is complete."""
+    arguments = [results_folder[1], tmp_path, N_SIGNALLED_WRITES]
+    done = subprocess.run(
+        [sys.executable, "-c", SIGNALLED_WRITES, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    names = "fields.vtkhdf", "result.nc"
+    expected = [[name, k, "interrupt"] for name in names for k in range(1, N_SIGNALLED_WRITES + 1)]
+    assert [json.loads(line) for line in done.stdout.splitlines()] == expected
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list_names(tmp_path) == {*names}
+    for name in names:
+        written, original = (
+            read_datasets(folder / name) for folder in (tmp_path, results_folder[1])
+        )
+        np.testing.assert_equal(written, original)
 
 
 class InterruptedStream(io.StringIO):

@@ -150,9 +150,9 @@ DAMAGES = {  # damage, and part of the message on it
     "text as netCDF": (lambda folder: (folder / "result.nc").write_text("a", "utf-8"), "damaged"),
     "ring in netCDF": (remove_dataset, "damaged"),
     "no summary": (lambda folder: (folder / "summary.json").unlink(), "it has no summary.json"),
-    "summary of 1.1": (
+    "foreign summary": (
         lambda folder: (folder / "summary.json").write_text('{"kind": "rig"}', "utf-8"),
-        "patchfem before 1.2 wrote it",
+        "neither patchfem 1.2 nor a later version wrote it",
     ),
 }
 

@@ -135,6 +135,20 @@ def test_exact_velocity_under_changing_load_is_that_of_the_slide():
     assert run.rate[1:-1] == pytest.approx(exact[1:-1], abs=1e-4 * np.abs(exact).max())
 
 
+@pytest.mark.parametrize("load", ["1 N", "1e9 N", "1e50 N"])
+def test_always_round_off_is_in_error_of_equivalent_stiffness(load):
+    """The equivalent stiffness of rigid friction is 0 within its error, at any load.
+
+    The friction force lags the slide by a quarter cycle, so that the value is nothing but round-off.
+    """
+    slide = SLIDES["sine"].replace("4 um", "10 um").replace("50 Hz", "1 Hz")
+    scene = loads(
+        POINT + FRICTION + 'law = "coulomb"\n[slide]\n' + slide, sets=[f"normal.load={load}"]
+    )
+    stiffness = run(scene).measures["equivalent_stiffness"]
+    assert 0 < abs(stiffness.value) <= stiffness.error < 1e-6 * stiffness.floor
+
+
 # ---- progress
 
 

@@ -50,6 +50,7 @@ BAD_VALUES = [
     ("static = nan", "friction.static", "a plain number is needed, not nan"),
     ('kind = "bass"', "drive.kind", "did you mean 'base'? use one of base, force, free"),
     ("title = 5", "title", "a text in quotes is needed, not 5"),
+    (r'title = "a\nb"', "title", "has several lines; write one line of text"),
 ]
 
 

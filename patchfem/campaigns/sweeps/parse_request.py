@@ -10,7 +10,13 @@ from itertools import chain
 from math import prod
 from pathlib import Path
 
-from ...scene.assignments import LIST_FORM, RANDOM_FORM, Axis, read_assignments
+from ...scene.assignments import (
+    LIST_FORM,
+    RANDOM_FORM,
+    Axis,
+    read_assignments,
+    require_possible_count,
+)
 from ...scene.keys.quantities import NUMBER_PATTERN
 from ...scene.lines import split_assignment, split_key
 from ...scene.scene import SceneError
@@ -21,8 +27,6 @@ from .cases import Cases, combine_cases
 
 N_CHECKED_CASES = 32  # Largest number of cases that are validated before a sweep starts.
 MAX_PRINTED_MISTAKES = 12  # Largest number of validation errors that are printed.
-# Largest number of cases; the hashes and columns of more cases take gigabytes.
-MAX_SWEEP_CASES = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,13 +169,10 @@ def read_cases(sweep_scene: SweepScene, request: CaseRequest) -> Cases:
     # All combinations of the cases of a file and of the values of the axes, or random cases in place of the latter
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
-    if count > MAX_SWEEP_CASES:
-        raise SceneError(
-            [
-                f"{sweep_scene.path}: the sweep has {count} cases, more than the largest number possible "
-                f"({MAX_SWEEP_CASES}); give fewer values for each key, or draw N cases from the ranges with --sobol N"
-            ]
-        )
+    try:
+        require_possible_count(count)
+    except ValueError as error:
+        raise SceneError([f"{sweep_scene.path}: {error}"]) from None
 
     if request.count and axes:
         parts.append(samples.draw_cases(axes, request.count, request.seed, sobol=request.sobol))

@@ -326,7 +326,7 @@ def estimate_errors(
         for name, error in errors.items():
             least = typical * sizes[name] * (error > MEASURE_CHANGE_ROUND_OFF * sizes[name])
             error = np.fmax(error, least)
-            errors[name] = total_error(name, fine[name], [error], SAME_CASE_CYCLE, fine[AMPLITUDE])
+            errors[name] = total_error(name, fine, [error], SAME_CASE_CYCLE)
     return errors
 
 

@@ -192,6 +192,13 @@ def _require_printable(value: str) -> str:
     return value
 
 
+def _require_one_line(value: str) -> str:
+    """Return a text without line breaks; ValueError is raised for another one."""
+    if "\n" in value:
+        raise ValueError("has several lines; write one line of text")
+    return value
+
+
 @dataclass(frozen=True, slots=True)
 class KeyRecord:
     """Documentation of a key.
@@ -235,7 +242,7 @@ def optional(kind: KeyType, meaning: str, required: str = "") -> KeyType:
 # Types that many keys share.
 Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
 FileName = Annotated[Text, FILE_MARK]
-Title = Annotated[str, CheckAfter(_require_printable)]
+Title = Annotated[str, CheckAfter(_require_printable), CheckAfter(_require_one_line)]
 Number = number()
 Fraction = number(ge=0, le=1)
 Positive = number(gt=0)

@@ -18,7 +18,7 @@ from ..files.read import read_surface
 from ..profile import Profile, measure_step, robust_deviation
 from ..quantity import HALF_WIDTH_95, Quantity
 from . import waves
-from .alignment import SURE_SIGNIFICANCE, Aligned, align
+from .alignment import CALIBRATED_GAIN_DEVIATION, SURE_SIGNIFICANCE, Aligned, align
 from .changes import find_detection_limit
 from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .depths import make_depths, measure_largest
@@ -372,7 +372,12 @@ def _collect_findings(
             {"significance": float(np.floor(significance)), "sure": SURE_SIGNIFICANCE},
         ),
         (placement.mirrored, "mirrored", {}),
-        (gain not in (None, 1.0), "other_gain", {"gain": gain}),
+        # a smaller change lies within the calibration of the instruments
+        (
+            gain is not None and abs(gain - 1) > CALIBRATED_GAIN_DEVIATION,
+            "other_gain",
+            {"gain": gain},
+        ),
         (lengths, "other_length", lengths),
         (drift > short_noise, "drift", {"height": drift, "noise": short_noise}),
         (has_tops, "worn_tops", {}),

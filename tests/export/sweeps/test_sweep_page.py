@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import read_page, run_successfully
+from command_line import read_page, run_cli, run_successfully
 from page_data import read_figures
 from scene_texts import COULOMB, PATCH, POINT, SHORT
 from sweep_tables import read_rows
@@ -131,6 +131,15 @@ def test_exact_page_of_two_sweeps_shows_measures_of_each(folders, tmp_path):
         pytest.raises(pf.PatchfemError, match="no measure 'loop_area'"),
     ):
         pf.plot.sweep(data, "loop_area")
+
+
+def test_refuses_sweep_without_arrays(folders, tmp_path):
+    """A folder of a sweep whose sweep.nc is missing is refused; its page once ended in an internal fault."""
+    folder = shutil.copytree(folders["one key"], tmp_path / "sweep")
+    (folder / "sweep.nc").unlink()
+    answer = run_cli("report", folder)
+    assert answer.code == 2 and "a file of this folder is damaged" in answer.err
+    assert "sweep.nc" in answer.err and len(answer.err.splitlines()) == 1
 
 
 def test_exact_sweep_of_one_case_has_no_plural(folders, tmp_path):

@@ -106,6 +106,14 @@ def test_always_gain_and_transfer_of_scans_are_named():
         assert found.values[name].low <= true <= found.values[name].high < 1.05 * true
 
 
+def test_exact_gain_within_calibration_is_no_warning():
+    """A gain of 0.995, within the calibration of instruments, is corrected without advice to calibrate them."""
+    before, after = make_pair(make_crater(2 * UM, 60 * UM), 6, noise=0.1e-9)
+    found = compare_surfaces(before, Areal(after.x, after.y, 0.995 * after.z, "after"))
+    assert found.values["gain"].value == pytest.approx(0.995, abs=1e-4)
+    assert "other_gain" not in [finding.code for finding in found.findings]
+
+
 def test_refuses_mixed_and_small_surfaces():
     """A trace beside a scan, a shift of scans and scans of few rows are refused."""
     before, after = make_pair(np.zeros((40, 40)), 5)
