@@ -11,7 +11,6 @@ from ..campaigns.backbone import request as backbone_requests
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
 from ..model import model
-from ..scene.scene import remember_written
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED_EXIT_CODE,
@@ -102,8 +101,8 @@ def backbone(
 
     def build_model(tables, sets: tuple[str, ...] | None):
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        loaded_scene = load_scene(scene, () if sets is None else (*set_, *sets), prepare=tables)
-        return model.build(remember_written(loaded_scene, prepare=tables))
+        all_sets = () if sets is None else (*set_, *sets)
+        return model.build(load_scene(scene, all_sets, prepare=tables))
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
@@ -155,7 +154,7 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    loaded_scene = remember_written(load_scene(scene, set_))
+    loaded_scene = load_scene(scene, set_)
     output = output_options.into(f"{scene.stem}-fit")
     options = fit_requests.FitOptions(hold, leave_out, starts)
     # the fit to a loop is too short for a progress line
