@@ -24,6 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
+from .campaigns import numerical_settings
 from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
 from .campaigns.fits.options import FitOptions
@@ -450,7 +451,8 @@ def cost(
     ('200', True)
     """
     model = build(scene, **sets)
-    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE_SETTING
+    over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
+    setting = over or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)

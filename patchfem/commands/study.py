@@ -33,7 +33,8 @@ def cost(
     /,
     *,
     over: text_option(
-        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
+        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps; also with its "
+        "table, such as contact.element_size"
     ) = "",
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
@@ -45,6 +46,7 @@ def cost(
     """
     scene_model = load_model(scene, set_)
     settings = numerical_settings.NUMERICAL_SETTINGS
+    over = numerical_settings.SCENE_KEYS.get(over, over)
     if over and over not in settings:
         raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
     names = [over or cost_curves.TOLERANCE_SETTING]
@@ -122,7 +124,8 @@ def fit(
     *,
     to: text_option(
         'measurements; for a scene with [slide]: a loop with the header "time [s],displacement [um],force [N]", '
-        'or one written by export; for a rig: "amplitude [um],frequency [Hz],damping [%]" of a mode, optionally with '
+        'or one written by export; for a rig: a curve with the header "amplitude [um],frequency [Hz],damping [%]", '
+        "optionally with "
         "frequency_error [Hz] and damping_error [%], or what import --decay wrote, or responses "
         '"frequency [Hz],input [g],acceleration [g],displacement [um],flag"; for a scene with [wear]: compare.json of two '
         'runs, or a depth of both pieces such as "worn_depth_max=2.5 um..3.5 um"'

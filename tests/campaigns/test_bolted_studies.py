@@ -361,3 +361,13 @@ def test_fitted_scene_subtracts_the_joint_of_the_fit(tmp_path: Path, monkeypatch
         Path("fit/scene.fitted.toml"), amplitudes="20 um..400 um:4", method="balance"
     )
     assert fitted["balance_frequency"].values == pytest.approx(columns[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("joint", ["1.5 um", "0.01 um"])
+def test_always_default_amplitudes_resolve_the_onset_of_slip(joint: str):
+    """Frequency and damping ratio change by at most 8 % of their range between neighbouring default amplitudes."""
+    text = (POINT + MODE + DRIVE).replace("1.5 um", joint).replace('"stuck"', '"free"')
+    curves = pf.backbone(text, method="balance")
+    for name in ("frequency", "damping"):
+        values = curves[f"balance_{name}"].values
+        assert np.abs(np.diff(values)).max() <= 0.081 * np.ptp(values), name
