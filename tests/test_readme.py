@@ -140,7 +140,9 @@ def test_exact_readme_comparison_at_5_g_is_reproduced():
 def test_exact_readme_onset_of_the_shipped_rig_is_reproduced(index: int, frequency: int):
     """The level from which on the shipped rig distorts its acceleration is that in the README, within its error."""
     text = " ".join(read_page("README.md").split())
-    (stated,) = re.findall(r"third harmonic from ([\d., and]+) g on at 135, 143, 150 and 155 Hz", text)
+    (stated,) = re.findall(
+        r"third harmonic from ([\d., and]+) g on at 135, 143, 150 and 155 Hz", text
+    )
     onset = [float(level) for level in re.findall(r"[\d.]+", stated)][index]
     scene = (ROOT / "studies/rig/rig.toml").read_text("utf-8").partition("[measured]")[0]
     levels = ", ".join(f'"{level} g"' for level in (2.5, 2.75, 3, 3.25, 3.5))

@@ -27,7 +27,7 @@ MAX_CURVE_CHANGE = 0.08
 # Ratio of neighbouring amplitudes below which no point is added. A rigid contact begins to slip at once, so that its damping
 # jumps; this is the width within which the place of the jump is found.
 MIN_AMPLITUDE_SPACING_RATIO = 1.001
-MAX_CURVE_REFINEMENTS = 9  # each one may halve the spacing, from that of the default amplitudes to the smallest
+MAX_CURVE_REFINEMENTS = 9  # each may halve the spacing, from the default one to the smallest
 N_EXTENSION_DECADES = 8  # number of decades by which the default range is extended to reach a force
 MAX_FORCE_INTERPOLATIONS = 8  # largest number of interpolations towards the amplitude of a force
 
