@@ -24,6 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
+from .campaigns import numerical_settings
 from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
 from .campaigns.fits.options import FitOptions
@@ -66,7 +67,7 @@ from .scene.files import require_files
 from .scene.keys.quantities import parse_quantity
 from .scene.keys.removed import describe_removed, refuse_removed
 from .scene.overrides import BaseScene
-from .scene.scene import Scene, SceneError, loads, remember_written
+from .scene.scene import Scene, SceneError, loads
 from .scene.scene import load as load_file
 from .scene.sets import (
     find_oversized_lengths,
@@ -450,7 +451,8 @@ def cost(
     ('200', True)
     """
     model = build(scene, **sets)
-    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE_SETTING
+    over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
+    setting = over or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)
@@ -546,9 +548,11 @@ def backbone(
         """
         if isinstance(scene, Model):
             return build(scene, **changes)
-        values = {} if sets is None else changes | dict(text.split("=", 1) for text in sets)
-        loaded = _load_and_prepare(scene, tables, values)
-        return build_model(remember_written(loaded, _count_written(scene), tables))
+        if sets is None:
+            written = replace(scene, sets=()) if isinstance(scene, Scene) else scene
+            return build_model(_load_and_prepare(written, tables, {}))
+        values = changes | dict(text.split("=", 1) for text in sets)
+        return build_model(_load_and_prepare(scene, tables, values))
 
     # `build_with` has its own `sets`, those of a value of `over`
     changes = sets
@@ -842,7 +846,7 @@ def fit(
     names = {field.name for field in fields(FitOptions)}
     changes = {name: value for name, value in keywords.items() if name in names}
     sets = {key: value for key, value in keywords.items() if key not in names | {"to"}}
-    loaded = remember_written(load(scene, **sets), _count_written(scene))
+    loaded = load(scene, **sets)
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
@@ -1283,12 +1287,7 @@ def _read_sweep_scene(scene: str | Path | Scene) -> case_models.SweepScene:
     else:
         path = _require_path(scene, "a scene")
         text = read_text(scene)
-    return case_models.SweepScene(path, text, sets, len(sets))
-
-
-def _count_written(scene) -> int:
-    """Return the number of assignments that a scene contains before the keywords of a study."""
-    return len(scene.sets) if isinstance(scene, Scene) else 0
+    return case_models.SweepScene(path, text, sets)
 
 
 def _require_path(value: Any, name: str) -> Path:

@@ -15,6 +15,13 @@ from ..scene.rules.accuracy import has_effect
 COUNT_LIMITS = {"steps_per_cycle": (4, 12800), "shear_modes": (1, inf), "jumps": (1, inf)}
 # Names of all numerical settings that can be varied
 NUMERICAL_SETTINGS = ("element_size", *COUNT_LIMITS)
+# Keys of a scene that set what a curve varies
+SCENE_KEYS = {
+    "contact.element_size": "element_size",
+    "accuracy.steps_per_cycle": "steps_per_cycle",
+    "accuracy.shear_modes": "shear_modes",
+    "wear.jumps": "jumps",
+}
 # Factors by which a count of the scene is varied
 COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 # Factors by which the number of cells of a uniform mesh is varied

@@ -11,7 +11,6 @@ from ..campaigns.backbone import request as backbone_requests
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
 from ..model import model
-from ..scene.scene import remember_written
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED_EXIT_CODE,
@@ -34,7 +33,8 @@ def cost(
     /,
     *,
     over: text_option(
-        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
+        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps; also with its "
+        "table, such as contact.element_size"
     ) = "",
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
@@ -46,6 +46,7 @@ def cost(
     """
     scene_model = load_model(scene, set_)
     settings = numerical_settings.NUMERICAL_SETTINGS
+    over = numerical_settings.SCENE_KEYS.get(over, over)
     if over and over not in settings:
         raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
     names = [over or cost_curves.TOLERANCE_SETTING]
@@ -102,8 +103,8 @@ def backbone(
 
     def build_model(tables, sets: tuple[str, ...] | None):
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        loaded_scene = load_scene(scene, () if sets is None else (*set_, *sets), prepare=tables)
-        return model.build(remember_written(loaded_scene, prepare=tables))
+        all_sets = () if sets is None else (*set_, *sets)
+        return model.build(load_scene(scene, all_sets, prepare=tables))
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
@@ -123,7 +124,8 @@ def fit(
     *,
     to: text_option(
         'measurements; for a scene with [slide]: a loop with the header "time [s],displacement [um],force [N]", '
-        'or one written by export; for a rig: "amplitude [um],frequency [Hz],damping [%]" of a mode, optionally with '
+        'or one written by export; for a rig: a curve with the header "amplitude [um],frequency [Hz],damping [%]", '
+        "optionally with "
         "frequency_error [Hz] and damping_error [%], or what import --decay wrote, or responses "
         '"frequency [Hz],input [g],acceleration [g],displacement [um],flag"; for a scene with [wear]: compare.json of two '
         'runs, or a depth of both pieces such as "worn_depth_max=2.5 um..3.5 um"'
@@ -155,7 +157,7 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    loaded_scene = remember_written(load_scene(scene, set_))
+    loaded_scene = load_scene(scene, set_)
     output = output_options.into(f"{scene.stem}-fit")
     options = fit_requests.FitOptions(hold, leave_out, starts)
     # the fit to a loop is too short for a progress line

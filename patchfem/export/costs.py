@@ -15,6 +15,7 @@ from ..campaigns.cost import (
 )
 from ..formatting import format_number
 from ..model.model import Model
+from ..runs.joint import find_source
 from . import quantities
 from .answer import (
     Answer,
@@ -110,7 +111,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         data=_make_data(rows, main),
         remarks=Remarks(notes=tuple(notes)),
         details=details,
-        origin=make_origin(model.source, "cost"),
+        origin=make_origin(find_source(model), "cost"),
     )
 
 

@@ -21,6 +21,7 @@ from ..campaigns.rows.fit import FittedRows
 from ..disk.atomic_write import write_text
 from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved
+from ..runs.joint import find_source
 from ..scene.scene import Scene, add_sets, move_scene
 from .answer import (
     Answer,
@@ -151,7 +152,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         data=parts.data | pairs,
         remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
         details=details,
-        origin=make_origin(build(scene).source, "fit"),
+        origin=make_origin(find_source(build(scene)), "fit"),
     )
 
 
@@ -497,5 +498,6 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folde
         fitted = fit.keys.fitted_scene()
     # the model is built before the scene moves, because its file names are relative to its folder
     model = build(fitted)
-    text = write_resolved(move_scene(fitted, folder / FITTED_SCENE_FILE), model)
+    moved = move_scene(fitted, folder / FITTED_SCENE_FILE)
+    text = write_resolved(moved, model, find_source(model).writer.joint)
     return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

@@ -81,7 +81,7 @@ def make_origin(source, verb: str) -> JsonObject:
         "patchfem": __version__,
         "scene": source.text,
         "resolved": source.resolved,
-        "command": make_command(verb, source.path, source.sets),
+        "command": make_command(verb, source.path, source.repeating_sets),
         "versions": list_versions(),
     }
 

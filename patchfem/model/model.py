@@ -17,11 +17,12 @@ from ..effects import law_has_trait, list_absent_effects
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction
+from ..scene.overrides import replace_number
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, structure, wear
 from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
-from .source import Source, locate_errors
+from .source import SceneWriter, Source, locate_errors
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
@@ -133,20 +134,32 @@ class Model:
 
     @property
     def has_bolted_patch(self) -> bool:
-        """Whether the stiffness of a patch is still to be subtracted from modes that were measured with it."""
+        """Whether the patch of a joint is still to be solved, for modes that were measured with it."""
         bolted = None if self.rig is None else self.rig.structure.bolted
         return bolted is not None and bolted.build_rig is not None
 
     def describe_removed_joint(self) -> list[str]:
         """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
         bolted = None if self.rig is None else self.rig.structure.bolted
-        if bolted is None or not bolted.stiffness:
+        if bolted is None or bolted.subtracted is None:
             return []
-        stiffness = " and ".join(format_quantity(k, "N m-1", 4) for k in bolted.stiffness)
+        texts = [format_quantity(k, "N m-1", 4) for k in bolted.subtracted.stiffness]
         return [
-            f"the modes were measured with the joint bolted, so the stiffness of the joint of {bolted.scene}, "
-            f"{stiffness}, is subtracted from them"
+            f"the modes were measured with the joint bolted, so {structure.JOINT_WORDS[bolted.origin]}, "
+            f"{' and '.join(texts)}, is subtracted from them"
         ]
+
+    def state_subtracted_joint(self) -> Model:
+        """Return the model with a source that states the joint which was subtracted from its modes.
+
+        So the resolved scene and the command that repeats a run subtract the same joint again. If each case has its own
+        modal test, nothing is stated, because the scene then means its own joint.
+        """
+        bolted = None if self.rig is None else self.rig.structure.bolted
+        if bolted is None or bolted.origin == "case" or bolted.subtracted is None:
+            return self
+        writer = self.source.writer._replace(joint=bolted.subtracted.list_values())
+        return replace(self, source=replace(self.source, writer=writer))
 
     @property
     def load_varies(self) -> bool:
@@ -256,13 +269,14 @@ def _build(scene: Scene) -> Model:
         path=scene.path,
         title=scene.title,
         text=scene.text,
-        write=partial(write_resolved, scene, model),
+        writer=SceneWriter(partial(write_resolved, scene, model), {}),
         effects=effects,
         remarks=tuple(scene.remarks),
         sets=scene.sets,
         notes=scene.notes,
     )
-    return replace(model, source=source)
+    model = replace(model, source=source)
+    return model if model.has_bolted_patch else model.state_subtracted_joint()
 
 
 def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
@@ -273,18 +287,32 @@ def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
     """
     bolted = rig_model.structure.bolted
     bolted_scene = structure.find_bolted_scene(scene)
-    if bolted is None or bolted.build_rig is None or bolted_scene is scene:
+    if bolted is None or bolted.subtracted is not None or bolted_scene is scene:
         return rig_model
     bolted = bolted._replace(model=_build_bolted_model(bolted_scene))
     return replace(rig_model, structure=replace(rig_model.structure, bolted=bolted))
 
 
-def write_resolved(scene: Scene, model: Model) -> str:
-    """Write the scene as TOML in SI units with all defaults, including those from the model."""
+def write_resolved(scene: Scene, model: Model, joint: dict[str, float]) -> str:
+    """Write the scene as TOML in SI units with all defaults, including those from the model.
+
+    Parameters
+    ----------
+    scene : Scene
+        Checked scene.
+    model : Model
+        Its model.
+    joint : dict of str to float
+        Keys and values in SI that state the joint which was subtracted from bolted modes.
+    """
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
         friction = friction.model_copy(update={"rest_speed": float(model.bonds.rest_speed)})
-    return replace(scene, friction=friction).resolved()
+    tables = {"friction": friction, "structure": scene.structure}
+    for key, value in joint.items():
+        name, *pieces = key.split(".")
+        tables[name] = replace_number(tables[name], pieces, value)
+    return replace(scene, **tables).resolved()
 
 
 def _refuse_sweep(scene: Scene) -> None:

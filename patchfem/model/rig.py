@@ -22,12 +22,15 @@ from . import structure_reduced
 from .drive import build_signal
 from .law import InterfaceLaw, build_interface_laws, make_interface_names
 from .structure import (
+    SubtractedJoint,
     build_modes,
     build_modes_without_bond,
     build_start,
-    compute_joint_stiffnesses,
     find_bolted_scene,
+    find_bolted_spring,
+    find_known_joint,
     has_pressed_joint,
+    name_joint_source,
     needs_strip_displacements,
     read_file_notes,
 )
@@ -49,12 +52,6 @@ MIN_MODE_OUTPUT_FRACTION = 1e-12
 
 # Tables of the joint that was bolted when the modes were measured.
 JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
-# The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
-SCENES_OF_SUBTRACTED_JOINT = {
-    None: "the scene as written",
-    "written": "the scene as written",
-    "case": "each case",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,21 +190,22 @@ class JointModel(Protocol):
 class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
-    - scene: the scene with this joint, in words.
-    - stiffness: stiffness [N/m] of the joint, or of each joint, that was subtracted from the modes, or () as long as a
-      patch has to be solved for it.
-    - build_rig: function of the stiffness [N/m] of a joint with a patch that returns the rig without this joint, or None
-      if the stiffness follows from the friction laws alone.
+    - origin: where the joint comes from, "given", "written" or "case" as in `structure.JOINT_WORDS`.
+    - spring: linear spring and damper beside this joint.
+    - subtracted: what is subtracted from the modes, or None as long as a patch has to be solved for it.
+    - build_rig: function of what is subtracted that returns the rig without this joint, or None if the rig has no patch
+      whose stiffness in stick is computed.
     - build_stiffer_rig: the same for a joint that is stiffer by the error of its stiffness, if this stiffness determines
       the slide of the modes, or None.
     - model: Model of the scene with this joint, or None if it is the model of the rig itself.
     - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick, or None without one.
     """
 
-    scene: str
-    stiffness: tuple[float, ...] = ()
-    build_rig: "Callable[[float], Rig] | None" = None
-    build_stiffer_rig: "Callable[[float], Rig] | None" = None
+    origin: str
+    spring: SubtractedJoint
+    subtracted: SubtractedJoint | None = None
+    build_rig: "Callable[[SubtractedJoint], Rig] | None" = None
+    build_stiffer_rig: "Callable[[SubtractedJoint], Rig] | None" = None
     model: JointModel | None = None
     stuck_stiffness: float | None = None
 
@@ -298,7 +296,7 @@ class Rig:
         return replace(self, drive=replace(self.drive, signal=signal, **changes))
 
 
-def build_rig(scene, joint: float | None = None) -> Rig:
+def build_rig(scene, joint: SubtractedJoint | None = None) -> Rig:
     """Build the rig of a scene with [structure] and [drive].
 
     The modes have natural frequencies omega [rad/s] and damping ratios, and per unit modal coordinate
@@ -310,8 +308,8 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    joint : float, optional
-        Stiffness [N/m] of a pressed patch, which is subtracted from modes measured with it.
+    joint : SubtractedJoint, optional
+        Joint of a solved patch, which is subtracted from modes measured with it.
 
     Returns
     -------
@@ -337,7 +335,10 @@ def build_rig(scene, joint: float | None = None) -> Rig:
 
 
 def _build(
-    scene, unbonded: ModalBasis, interfaces: tuple[InterfaceLaw, ...], joint: float | None = None
+    scene,
+    unbonded: ModalBasis,
+    interfaces: tuple[InterfaceLaw, ...],
+    joint: SubtractedJoint | None = None,
 ) -> Rig:
     """Build the rig of a scene from its modes without the spring of the bonded joint.
 
@@ -349,8 +350,8 @@ def _build(
         Modes without the spring of the bonded joint.
     interfaces : tuple of InterfaceLaw
         Friction laws of the interfaces, or () without friction.
-    joint : float, optional
-        Stiffness [N/m] of a pressed patch that was subtracted from measured modes.
+    joint : SubtractedJoint, optional
+        Joint of a solved patch that was subtracted from measured modes.
 
     Returns
     -------
@@ -460,22 +461,21 @@ def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMo
     return FirstMode(frequency, mass, contact_mass, (slide[:, None] * unbonded_from_modes)[order])
 
 
-def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
+def _build_structure(scene, modes: ModalBasis, joint: SubtractedJoint | None) -> RigStructure:
     """Build the RigStructure of a scene from the modes of its rig.
 
-    `joint` is the stiffness [N/m] of a pressed patch that was bolted in the modal test, if it is known already.
+    `joint` is the joint of a solved patch that was bolted in the modal test, if it is known already.
     """
     structure = scene.structure
     bolted = None
     if structure.measured == "stuck":
-        bolted_scene = find_bolted_scene(scene)
-        bolted = BoltedJoint(SCENES_OF_SUBTRACTED_JOINT[structure.measured_joint])
-        if joint is not None:
-            bolted = bolted._replace(stiffness=(joint,))
-        elif has_pressed_joint(bolted_scene):
-            bolted = bolted._replace(build_rig=partial(build_rig, scene))
-        else:
-            bolted = bolted._replace(stiffness=tuple(compute_joint_stiffnesses(bolted_scene)))
+        is_pressed = has_pressed_joint(scene) or has_pressed_joint(find_bolted_scene(scene))
+        bolted = BoltedJoint(
+            name_joint_source(structure),
+            find_bolted_spring(scene),
+            find_known_joint(scene) if joint is None else joint,
+            partial(build_rig, scene) if joint is None and is_pressed else None,
+        )
     return RigStructure(
         frequencies=modes.omega / (2 * np.pi),
         lists_modes=bool(structure.mode),

@@ -19,7 +19,7 @@ from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_drive, build_rig
-from .source import locate_errors
+from .source import SceneWriter, locate_errors
 
 if TYPE_CHECKING:
     from ..scene.keys.tables import Structure
@@ -137,8 +137,8 @@ def replace_numbers(
     # What the scene contains for the engines, and its text with the new numbers
     motion = find_motion_features(scene, model.kind)
     unwritten = replace(model, source=None, rig=rig, motion=motion, **changes)
-    write = partial(write_resolved, scene, unwritten)
-    source = replace(model.source, write=write, sets=scene.sets)
+    writer = SceneWriter(partial(write_resolved, scene, unwritten), {})
+    source = replace(model.source, writer=writer, sets=scene.sets)
     return replace(unwritten, source=source)
 
 

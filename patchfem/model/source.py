@@ -4,9 +4,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from ..core import NotConverged, PatchfemError
 from ..scene.lines import locate_key, number_items_from_one
+from ..scene.sets import format_values
+
+
+class SceneWriter(NamedTuple):
+    """Writer of the resolved scene.
+
+    - write: function of `joint` that returns the text.
+    - joint: keys of the scene, with their values in SI, that state the joint which was subtracted from bolted modes.
+    """
+
+    write: Callable[[dict[str, float]], str]
+    joint: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -15,7 +28,7 @@ class Source:
 
     - path: scene file.
     - text: text of the scene as it was read.
-    - write: function that returns `resolved`.
+    - writer: writer of `resolved`.
     - effects: effects that the scene names.
     - remarks: sentences about keys without effect.
     - sets: ``key=value`` strings that were given in addition to the text.
@@ -26,7 +39,7 @@ class Source:
     path: Path
     title: str
     text: str
-    write: Callable[[], str]
+    writer: SceneWriter
     effects: tuple[str, ...]
     remarks: tuple[str, ...]
     sets: tuple[str, ...] = ()
@@ -35,7 +48,16 @@ class Source:
     @property
     def resolved(self) -> str:
         """Scene as TOML in SI units with all defaults; it is written on demand."""
-        return self.write()
+        return self.writer.write(self.writer.joint)
+
+    @property
+    def repeating_sets(self) -> tuple[str, ...]:
+        """The `sets` that repeat a run, and if there are any also those of the joint that was subtracted."""
+        if not self.sets:
+            return ()
+        changed = {text.partition("=")[0].strip() for text in self.sets}
+        stated = {key: value for key, value in self.writer.joint.items() if key not in changed}
+        return (*self.sets, *(f"{key}={format_values(key, stated[key])}" for key in stated))
 
     def where(self, key: str) -> str:
         """Return file, line and key as text for a message."""

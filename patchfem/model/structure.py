@@ -4,8 +4,11 @@
 give the same quantities for each description.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +23,47 @@ from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
 from .source import name_key
 
+# What is subtracted from bolted modes, by `name_joint_source`
+JOINT_WORDS = {
+    "given": "structure.measured_stiffness",
+    "written": "the stiffness of the joint of the scene as written",
+    "case": "the stiffness of the joint of each case",
+}
+
+# Tables of a scene, besides [structure], that describe its joint
+JOINT_TABLES = ("contact", "normal", "friction")
+
 _build_listed_modes = memoize(listed_modes.build_basis)
+
+
+class SubtractedJoint(NamedTuple):
+    """Joint that is subtracted from modes that were measured with it, with its bonded spring and damper.
+
+    - stiffness: stiffness [N/m] along each interface.
+    - error: error [N/m] of the stiffness, which a pressed patch has.
+    - damping: coefficient [N s/m] of the damper, or None for that of the scene itself.
+    """
+
+    stiffness: tuple[float, ...]
+    error: float = 0.0
+    damping: float | None = None
+
+    def stiffen(self) -> "SubtractedJoint":
+        """Return the joint that is stiffer by its error."""
+        return self._replace(stiffness=tuple(k + self.error for k in self.stiffness))
+
+    def list_values(self) -> dict[str, float]:
+        """Return the keys with which a scene states this joint, and their values in SI."""
+        if len(self.stiffness) == 1:
+            values = {"structure.measured_stiffness": self.stiffness[0]}
+        else:
+            items = enumerate(self.stiffness)
+            values = {f"structure.interface.{k}.measured_stiffness": value for k, value in items}
+        if self.error:
+            values["structure.measured_stiffness_error"] = self.error
+        if self.damping is not None:
+            values["structure.measured_damper"] = self.damping
+        return values
 
 
 def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
@@ -72,7 +115,7 @@ def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
     return import_effect("structure.bonded").add_spring(modes, stiffness, bonded.damping)
 
 
-def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:
+def build_modes_without_bond(scene, joint: SubtractedJoint | None = None) -> ModalBasis:
     """Build the modes of a rig, excluding the linear spring of the bonded joint.
 
     The joint is subtracted from modes that were measured while it stuck.
@@ -81,9 +124,9 @@ def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:
     ----------
     scene : Scene
         Checked scene with [structure] and [drive].
-    joint : float, optional
-        Stiffness [N/m] of the joint; by default it follows from the friction laws. Modes that
-        were measured with a pressed patch are not changed until its stiffness is given.
+    joint : SubtractedJoint, optional
+        Joint of a solved patch; by default that of `find_known_joint`. Modes that were measured
+        with a pressed patch are not changed until its stiffness is given.
 
     Returns
     -------
@@ -93,20 +136,16 @@ def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:
     modes = _build_given_modes(scene)
 
     # Modes without a joint are complete; a pressed patch must be solved first.
-    bolted_scene = find_bolted_scene(scene)
-    if scene.structure.measured == "free" or (joint is None and has_pressed_joint(bolted_scene)):
+    if joint is None and scene.structure.measured == "stuck":
+        joint = find_known_joint(scene)
+    if joint is None:
         return modes
 
-    # The bonded spring and its damper act beside the first interface.
-    bonded = bolted_scene.structure.bonded
-    stiffness = np.array(compute_joint_stiffnesses(bolted_scene) if joint is None else [joint])
-    damping = 0.0
-    if bonded is not None:
-        damping = bonded.damping
-        stiffness[:1] += bonded.stiffness
-
+    damping = joint.damping
+    if damping is None:
+        damping = _find_damping(scene)
     try:
-        return import_effect("structure.bonded").remove_springs(modes, stiffness, damping)
+        return import_effect("structure.bonded").remove_springs(modes, joint.stiffness, damping)
     except PatchfemError as error:
         key = "structure.measured"
         slides = [abs(mode.slide) for mode in scene.structure.mode or ()]
@@ -119,14 +158,67 @@ def build_modes_without_bond(scene, joint: float | None = None) -> ModalBasis:
         ) from None
 
 
-def find_bolted_scene(scene):
-    """Return the scene whose joint was bolted when the modes were measured.
+def name_joint_source(structure) -> str:
+    """Return where the joint comes from that is subtracted from bolted modes: "given", "written" or "case".
 
-    In a sweep, fit or backbone it is the scene as written, unless each case has its own modal test.
+    `structure` is the table [structure]. The keys of a scene give the joint; or it is that of the scene as written, or
+    that of each case.
     """
-    if scene.written is None or scene.structure.measured_joint == "case":
+    stiffnesses = [structure.measured_stiffness]
+    stiffnesses += [interface.measured_stiffness for interface in structure.interface]
+    if any(stiffness is not None for stiffness in stiffnesses):
+        return "given"
+    return structure.measured_joint or "written"
+
+
+def find_bolted_scene(scene):
+    """Return the scene whose joint was bolted when the modes were measured: the scene itself, or the one as written.
+
+    It is the scene itself if all its changes leave the joint alone, or if each case has its own modal test.
+    """
+    written = scene.written
+    if written is None or scene.structure.measured_joint == "case":
         return scene
-    return scene.written
+    is_same = all(getattr(scene, name) == getattr(written, name) for name in JOINT_TABLES)
+    joints = [(one.structure.bonded, one.structure.interface) for one in (scene, written)]
+    return scene if is_same and joints[0] == joints[1] else written
+
+
+def find_known_joint(scene) -> SubtractedJoint | None:
+    """Return the joint that is subtracted from the modes of a scene, or None if a patch must be solved for it.
+
+    The scene gives its stiffness, or it follows from the friction laws.
+    """
+    structure = scene.structure
+    spring = find_bolted_spring(scene)
+    if structure.measured_stiffness is not None:
+        error = structure.measured_stiffness_error or 0.0
+        return SubtractedJoint((structure.measured_stiffness,), error, spring.damping)
+    bolted_scene = find_bolted_scene(scene)
+    if has_pressed_joint(bolted_scene):
+        return None
+    given = [interface.measured_stiffness for interface in structure.interface]
+    stiffnesses = _compute_joint_stiffnesses(bolted_scene, given)
+    # The bonded spring acts beside a single interface.
+    if len(stiffnesses) == 1:
+        stiffnesses[0] += spring.stiffness[0]
+    return spring._replace(stiffness=tuple(stiffnesses))
+
+
+def find_bolted_spring(scene) -> SubtractedJoint:
+    """Return the linear spring and the damper beside the joint that was bolted when the modes were measured."""
+    bolted_scene = find_bolted_scene(scene)
+    bonded = bolted_scene.structure.bonded
+    damping = scene.structure.measured_damper
+    if damping is None and _find_damping(bolted_scene) != _find_damping(scene):
+        damping = _find_damping(bolted_scene)
+    return SubtractedJoint((0.0 if bonded is None else bonded.stiffness,), damping=damping)
+
+
+def _find_damping(scene) -> float:
+    """Return the coefficient [N s/m] of the damper in [structure.bonded] of a scene."""
+    bonded = scene.structure.bonded
+    return 0.0 if bonded is None else bonded.damping
 
 
 def has_pressed_joint(scene) -> bool:
@@ -140,13 +232,15 @@ def has_pressed_joint(scene) -> bool:
     return bool(contact.compliance_key or contact.load is None)
 
 
-def compute_joint_stiffnesses(scene) -> list[float]:
-    """Compute the stiffness [N/m] of each sticking interface of a scene from its law."""
+def _compute_joint_stiffnesses(scene, given: Sequence[float | None]) -> list[float]:
+    """Compute the stiffness [N/m] of each sticking interface of a scene from its law, unless it is `given`."""
     scene_load = find_normal_load(scene)
     stiffnesses = []
-    for interface in build_interface_laws(scene):
-        load = scene_load if interface.load is None else interface.load
-        stiffnesses.append(compute_sticking_stiffness(interface, load))
+    for interface, stiffness in zip_longest(build_interface_laws(scene), given):
+        if stiffness is None:
+            load = scene_load if interface.load is None else interface.load
+            stiffness = compute_sticking_stiffness(interface, load)
+        stiffnesses.append(stiffness)
     return stiffnesses
 
 

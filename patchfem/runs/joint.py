@@ -22,7 +22,7 @@ from ..core import frozen_array
 from ..effects import law_has_trait
 from ..friction import record
 from ..model.model import Model
-from ..model.source import locate_errors
+from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
 from .patch import mesh_levels, store
@@ -82,7 +82,13 @@ def solve_patch(model: Model) -> Patches:
     solve = partial(mesh_levels.solve_with_coarser, model.patch, model.accuracy.tolerance)
     if not model.has_bolted_patch:
         return solve()
-    return store.get_or_compute(("bolted patch", model.patch, model.accuracy.tolerance), solve)
+    key = ("bolted patch", store.content_key(model.patch), model.accuracy.tolerance)
+    return store.get_or_compute(key, solve)
+
+
+def find_source(model: Model) -> Source:
+    """Return the source of a model, which states the joint that is subtracted from bolted modes."""
+    return solve_without_joint(model).model.source if model.has_bolted_patch else model.source
 
 
 def remove_joint(model: Model, patches: Sequence) -> FreeRig:
@@ -106,31 +112,40 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
         return FreeRig(model, patches)
 
     # The bolted modes may belong to another contact than the one of this run: `written` is the one
-    # of the measurement.
+    # of the measurement, unless the scene states what is subtracted.
     bolted = model.rig.structure.bolted
     written = bolted.model or model
     with locate_errors(model.source):
-        written_patches = patches if bolted.model is None else solve_patch(written)
         own = _find_stick_stiffness(model, patches)
-        stiffnesses = find_bolted_stiffness(written, written_patches)
+        subtracted = bolted.subtracted
+        if subtracted is None:
+            written_patches = patches if bolted.model is None else solve_patch(written)
+            stiffness, stiffer = find_bolted_stiffness(written, written_patches)
+            (spring,) = bolted.spring.stiffness
+            subtracted = bolted.spring._replace(
+                stiffness=(stiffness + spring,), error=stiffer - stiffness
+            )
+        joints = (subtracted, subtracted.stiffen())
         builders = (bolted.build_rig, bolted.build_stiffer_rig or bolted.build_rig)
 
         def subtract(n_errors: int) -> FreeRig:
             """Return the rig without its joint, whose stiffness is the computed one (0) or larger by its error (1)."""
             own_patches = _match_stiffness(patches, own, n_errors)
-            rig = builders[n_errors](stiffnesses[n_errors])
+            rig = builders[n_errors](joints[n_errors])
             removed = bolted._replace(
                 build_rig=None,
-                stiffness=(stiffnesses[n_errors],),
+                subtracted=joints[n_errors],
                 stuck_stiffness=compute_full_stick_stiffness(model, own_patches[0]),
             )
             rig = replace(rig, structure=replace(rig.structure, bolted=removed))
-            return FreeRig(replace(model, rig=rig), own_patches)
+            return FreeRig(replace(model, rig=rig).state_subtracted_joint(), own_patches)
 
         # The second result has the joint stiffer by its error, and its change is the error of the
         # motion.
         free = subtract(0)
-        return free if own is None else free._replace(stiffer=subtract(1))
+        if own is None and not subtracted.error:
+            return free
+        return free._replace(stiffer=subtract(1))
 
 
 def find_bolted_stiffness(model: Model, patches: Sequence) -> tuple[float, float]:

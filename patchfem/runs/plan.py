@@ -6,7 +6,7 @@ automatic mesh is graded, and for the patch of a joint that was bolted when the 
 
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import friction, inputs
 from ..core import PatchfemError, add_interface_number
@@ -20,6 +20,9 @@ from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
+
+if TYPE_CHECKING:
+    from ..model.rig import BoltedJoint
 
 DIMENSIONLESS_GROUPS = {  # Definition and SI unit of each group.
     "D": (
@@ -158,9 +161,14 @@ def _make_plan(model: Model) -> Plan:
 
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     if model.has_bolted_patch:
-        model, values = _subtract_joint(model)
+        bolted = rig.structure.bolted
+        model, patches, _ = joint.solve_without_joint(model)
+        motion_sentences += model.describe_removed_joint()
+        values = {name: measure.value for name, measure in patches[0].measures.items()}
+        model = _require_joint(model, bolted)
         rig = model.rig
-    motion_sentences += model.describe_removed_joint()
+    else:
+        motion_sentences += model.describe_removed_joint()
 
     # Structure of the rig and contact of the patch.
     patch_sentences = []
@@ -219,18 +227,16 @@ def _make_plan(model: Model) -> Plan:
     return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
 
 
-def _subtract_joint(model: Model) -> tuple[Model, Values]:
-    """Subtract the stiffness of a bolted joint from the modes that were measured with it.
+def _require_joint(model: Model, before: "BoltedJoint") -> Model:
+    """Return a model with the modes of the structure alone, of which a run subtracts the joint again.
 
-    Returns the model with the modes of the structure alone, and the static measures of the solved joint by name.
+    The comparison run needs the solved patch, and each finer mesh has its own stiffness. `before` is the joint of the
+    model before its patch was solved.
     """
-    build_rig = model.rig.structure.bolted.build_rig
-    model, patches, _ = joint.solve_without_joint(model)
-    values = {name: measure.value for name, measure in patches[0].measures.items()}
-    # The run subtracts the joint again, because its comparison run needs the solved patch.
-    bolted = model.rig.structure.bolted._replace(build_rig=build_rig)
+    bolted = model.rig.structure.bolted
+    bolted = bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
     rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
-    return replace(model, rig=rig), values
+    return replace(model, rig=rig)
 
 
 def _interface_stiffnesses(model: Model) -> "of_rig.Chain":

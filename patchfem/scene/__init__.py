@@ -81,7 +81,6 @@ PUBLIC = {
         "Scene",
         "load",
         "loads",
-        "remember_written",
         "move_scene",
         "read_sweep_axes",
     ),

@@ -22,7 +22,7 @@ from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.together import holds
 from .rules.view import TableView
-from .scene import Scene, finish_scene
+from .scene import Scene, attach_written, finish_scene
 
 # Largest number of tables that a BaseScene caches, so that the cases of
 # a sweep do not read them again.
@@ -96,8 +96,7 @@ class BaseScene:
             if (name, repr(values)) in self._tables:
                 draft.read_before[id(values)] = self._tables[name, repr(values)]
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
-        if base.written is not None:
-            scene = replace(scene, written=base.written)
+        scene = attach_written(scene, known=base.written or (None if base.sets else base))
         # No SceneError was raised, so these tables are valid and can be used again.
         if len(self._tables) < MAX_CACHED_TABLES:
             for name, values in draft.raw.items():
@@ -159,7 +158,7 @@ class PlainNumbers:
         for key, value in numbers.items():
             name, *pieces = key.split(".")
             table = tables.get(name) or getattr(self.scene, name)
-            tables[name] = _replace_number(table, pieces, value)
+            tables[name] = replace_number(table, pieces, value)
         other_sets = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
         return replace(self.scene, sets=(*other_sets, *sets), **tables)
 
@@ -168,19 +167,26 @@ class PlainNumbers:
         return {key.partition(".")[0] for key in self.limits}
 
 
-def _replace_number(
+def replace_number(
     holder: Table | tuple[Table, ...], pieces: list[str], value: float
 ) -> Table | tuple[Table, ...]:
     """Return a copy of a table, or of an array of tables, with another number at a dotted key.
 
-    `holder` is the table or array, `pieces` are the words of the dotted key, and `value` is the number in SI.
+    Parameters
+    ----------
+    holder : Table or tuple of Table
+        Table, or array of tables.
+    pieces : list of str
+        Words of the dotted key inside it.
+    value : float
+        Number in SI.
     """
     name, *inner = pieces
     if isinstance(holder, tuple):
         items = list(holder)
-        items[int(name)] = _replace_number(holder[int(name)], inner, value)
+        items[int(name)] = replace_number(holder[int(name)], inner, value)
         return tuple(items)
-    new = _replace_number(getattr(holder, name), inner, value) if inner else value
+    new = replace_number(getattr(holder, name), inner, value) if inner else value
     return holder.model_copy(update={name: new})
 
 

@@ -30,11 +30,11 @@ __all__ = [
     "Scene",
     "SceneError",
     "add_sets",
+    "attach_written",
     "load",
     "loads",
     "move_scene",
     "read_sweep_axes",
-    "remember_written",
 ]
 
 # Largest number of characters of the effects and the --set values in the repr of a Scene.
@@ -54,8 +54,8 @@ class Scene:
     - sets: the ``table.key=value`` of --set, in their order.
     - sweep: axes of the table [sweep].
     - notes: sentences about what the defaults leave out.
-    - written: the scene before the changes of a sweep, fit or backbone, if its modes were measured with
-      a joint (`remember_written`); None for a scene without such changes.
+    - written: the scene of the file, without `sets`, if its joint may have to be subtracted from modes
+      that were measured with it; None for other scenes and without `sets`.
     """
 
     path: Path
@@ -179,6 +179,17 @@ def loads(
     SceneError
         With all mistakes at once.
     """
+    return attach_written(_read_scene(text, path, sets, faults, prepare), prepare)
+
+
+def _read_scene(
+    text: str,
+    path: str | Path,
+    sets: Iterable[str],
+    faults: Callable | None = None,
+    prepare: Callable | None = None,
+) -> Scene:
+    """Read a scene from its text, with the parameters of `loads`, but without the scene as written."""
     raw, lines = parse_text(text, path)
     sets = tuple(sets)
     draft = SceneDraft(str(path), lines, raw)
@@ -245,51 +256,55 @@ def finish_scene(
 
 
 def add_sets(scene: Scene, sets: Iterable[str]) -> Scene:
-    """Return a copy of a scene with further assignments `table.key=value`, `sets`; it keeps the scene as written before."""
-    changed = loads(scene.text, scene.path, [*scene.sets, *sets])
-    return replace(changed, written=scene.written)
+    """Return a copy of a scene with further assignments `table.key=value`, `sets`."""
+    return loads(scene.text, scene.path, [*scene.sets, *sets])
 
 
-def remember_written(scene: Scene, n_written: int = 0, prepare: Callable | None = None) -> Scene:
-    """Return a scene of a sweep, fit or backbone that remembers the scene as written.
+def attach_written(
+    scene: Scene, prepare: Callable | None = None, known: Scene | None = None
+) -> Scene:
+    """Return a scene with the scene of its file, whose joint is subtracted from modes that were measured with it.
 
-    The joint that was bolted in the modal test is that of the scene as written, so that all cases of the study
-    have the same structure. A scene without such modes is returned unchanged.
+    So all changes of a scene leave its structure alone. A scene without changes is returned unchanged.
 
     Parameters
     ----------
     scene : Scene
-        Checked scene with [structure] and [drive].
-    n_written : int
-        Number of the first assignments in `scene.sets` that belong to the scene as written.
+        Checked scene.
     prepare : Callable, optional
-        prepare(raw) changes the plain values before they are read.
+        prepare(raw) changes the plain values of the file before they are read.
+    known : Scene, optional
+        Scene of the file, if it was read before.
 
     Raises
     ------
     SceneError
-        If the scene as written is not valid.
+        If the scene of the file is not valid, but its joint is needed.
     """
-    if scene.structure is None or scene.structure.measured == "free":
+    structure = scene.structure
+    if not scene.sets or structure is None or structure.measured == "free":
         return scene
-    sets = scene.sets[:n_written]
-    if sets == scene.sets:
-        return replace(scene, written=scene)
+    if structure.measured_joint == "case":
+        return scene
     try:
-        written = require_files(loads(scene.text, scene.path, sets, prepare=prepare))
+        written = known or require_files(loads(scene.text, scene.path, prepare=prepare))
     except SceneError as error:
+        if structure.measured_stiffness is not None:
+            return scene
         raise SceneError(
             [
                 f"{scene.where('structure.measured')}: the joint that was bolted in the modal test is that of the scene "
-                f"as written, without --set, --over and --free, but that scene has a mistake: {error.mistakes[0]}"
+                f"as written, without --set, --over and --free, but that scene has a mistake: {error.mistakes[0]}; mend "
+                "it, or give structure.measured_stiffness"
             ]
         ) from None
-    return replace(scene, written=replace(written, sweep=()))
+    return replace(scene, written=replace(written, sweep=()) if written.sweep else written)
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:
     """Return a copy of the scene for another path, with file names relative to the new folder."""
-    return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
+    sets = make_relative_file_sets(scene, path.parent)
+    return replace(_read_scene(scene.text, path, [*scene.sets, *sets]), written=scene.written)
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list[assignments.Axis], list[str]]:

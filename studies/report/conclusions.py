@@ -6,7 +6,8 @@ slip begins 47 degrees before the input's maximum. Conclusion 9: the exact veloc
 the acceleration jumps.
 
 `conclusions.md` has every claim in short, what is found and the number, written by this study. The block is that of
-Figs 2 and 3: one mode at 143 Hz, an onset of 4.14 g, a damping ratio of 0.003.
+Figs 2 and 3, the rigid Coulomb block of block.toml and not the patch of the shipped rig.toml: one mode at 143 Hz, an
+onset of 4.14 g, a damping ratio of 0.003.
 
 Run: python studies/report/conclusions.py
 """
@@ -85,8 +86,10 @@ def first() -> Conclusion:
         f"The six onsets of slip in Table 1 have the mean {np.exp(onset.mean()):.2f} g and a standard "
         f"deviation of {100 * onset.std(ddof=1):.1f} %. A fitted power law of the frequency has the "
         f"exponent {line.slope:.1f} ± {half:.1f} (95 %). The onsets of the two series at 135 Hz "
-        "differ as much as the onsets at all frequencies do. A Coulomb block begins to slip at the "
-        f"same level, mu N/m, at {', '.join(map(str, held))} Hz.",
+        "differ as much as the onsets at all frequencies do. The rigid block of block.toml begins to slip at "
+        f"the same level, mu N/m = {ONSET} g, at {', '.join(map(str, held))} Hz. The patch of rig.toml slips part by "
+        "part and does not: the third harmonic of its acceleration exceeds 3 % from 3.39 g on at 135 Hz and from "
+        "2.96 g on at 155 Hz.",
     )
 
 

@@ -2,7 +2,7 @@
 
 See items.md in this folder, which this script writes.
 
-Of 79 items 70 work, 6 in part, one is missing, and of two there is nothing to compute. The verdict is on this program:
+Of 79 items 68 work, 8 in part, one is missing, and of two there is nothing to compute. The verdict is on this program:
 whether the report itself is right an item's study says. Paths are those of the repository.
 
 Run: python studies/report/items.py
@@ -387,7 +387,8 @@ ITEMS = (
         RIG,
         "studies/table_1/levels.py",
         "tests/response/test_levels.py",
-        "works",
+        "in part: a rigid block does so; the patch of rig.toml, which slips part by part, distorts it by 3 % from 3.39 g "
+        "(135 Hz) to 2.96 g (155 Hz) on",
     ),
     Item(
         "4.C",
@@ -476,7 +477,8 @@ ITEMS = (
         RIG,
         "studies/table_1/levels.py",
         "tests/studies/test_table_1.py",
-        "works",
+        "in part: the friction of rig.toml is set so that a rigid block slips from 4.00 g on; at 3 % third harmonic its own "
+        "onset is 2.96 to 3.39 g, that of the fitted models 3.95 to 4.9 g",
     ),
     Item(
         "Table 1",

@@ -4,7 +4,7 @@ The joint that is subtracted from the modes is that of the scene as written, so 
 same structure.
 """
 
-from dataclasses import replace
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from command_line import read_json, run_successfully
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.scene import loads, remember_written
+from patchfem.scene import loads
 
 MASS = 1.3  # modal mass [kg]
 SLIDE = 0.0169  # motion of the contact per motion of the output
@@ -93,7 +93,9 @@ def test_exact_backbone_over_load_has_stuck_frequency_of_each_load(contact, key)
         if contact is POINT:
             stiffnesses.append(0.3 * float(load.split()[0]) * 1e3 / 1.5e-6)
         else:
-            run = pf.run(contact + MODE + DRIVE, **{key: load})
+            # The joint of each load sticks, as the joint of the backbone does
+            own = {"structure.measured_joint": "case"}
+            run = pf.run(contact + MODE + DRIVE, **{key: load}, **own)
             stiffnesses.append(run.measures["tangential_stiffness"].value)
     for load, stiffness in zip(LOADS, stiffnesses):
         curves = pf.backbone(
@@ -103,7 +105,7 @@ def test_exact_backbone_over_load_has_stuck_frequency_of_each_load(contact, key)
         assert curves.attrs["stuck_frequency"] == pytest.approx(expected, rel=1e-9)
         free = stuck_frequency(0.0, stiffnesses[1])
         assert curves.attrs["free_frequency"] == pytest.approx(free, rel=1e-9)
-        assert f"without --set of {key};" in str(curves.attrs["notes"])
+        assert "the joint of the scene as written, " in str(curves.attrs["notes"])
 
 
 def test_exact_modes_given_beside_the_scene_keep_their_slide():
@@ -219,7 +221,153 @@ def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):
 def test_refuses_study_whose_scene_as_written_is_not_valid():
     """A scene that has a load only by the values of a study has no joint that could have been bolted."""
     text = (POINT + MODE + DRIVE).replace('load = "4 kN"\n', "")
-    with pytest.raises(PatchfemError, match=r"the scene as written.*normal.load"):
+    with pytest.raises(
+        PatchfemError, match=r"the scene as written.*normal.load.*measured_stiffness"
+    ):
         pf.backbone(text, **{"normal.load": "4 kN"})
-    scene = replace(loads(text, "a.toml", ["normal.load=4 kN"]), written=None)
-    assert remember_written(scene, 1).written is scene
+    stated = text.replace('"stuck"', '"stuck"\nmeasured_stiffness = "8e8 N/m"')
+    scene = loads(stated, "a.toml", ["normal.load=4 kN"])
+    assert scene.written is None and pf.build(scene).rig.structure.bolted.origin == "given"
+
+
+BONDED = (
+    POINT
+    + MODE
+    + DRIVE
+    + """\
+[structure.bonded]
+stiffness = "1e7 N/m"
+damping = "2 N s/m"
+"""
+)
+PRESSED = ROUGH + MODE + DRIVE
+# Options of a sweep, by the kind of its cases; the first value of the key is not that of the scene.
+SWEEPS = {
+    "over": ["--over", "{key}=3.2 kN,4 kN"],
+    "cases": ["--cases", "cases.csv"],
+    "random": ["--over", "{key}=3.2 kN..4.8 kN", "--random", "2"],
+    "sobol": ["--over", "{key}=3.2 kN..4.8 kN", "--sobol", "2"],
+    "table": [],
+    "pairs": ["--over", "{key}=3.2 kN,4 kN", "--over", "drive.force=0.1 N,0.2 N"],
+    "set": ["--over", "drive.force=0.1 N,0.2 N", "--set", "{key}=3.2 kN"],
+}
+
+
+@pytest.mark.parametrize("kind", SWEEPS)
+@pytest.mark.parametrize(
+    "text, key",
+    [(BONDED, "normal.load"), pytest.param(PRESSED, "contact.load", marks=pytest.mark.slow)],
+)
+def test_exact_each_case_is_repeated_by_its_scene_and_its_command(
+    tmp_path: Path, monkeypatch, text: str, key: str, kind: str
+):
+    """The resolved scene of a case, and its command, subtract the joint of the sweep: same values, errors and outcome."""
+    monkeypatch.chdir(tmp_path)
+    table = f'[sweep]\n"{key}" = "3.2 kN,4.8 kN"\n' if kind == "table" else ""
+    Path("joint.toml").write_text(text + table)
+    Path("cases.csv").write_text(f"{key} [kN]\n3.2\n4.4\n")
+    options = [option.format(key=key) for option in SWEEPS[kind]]
+    run_successfully("sweep", "joint.toml", *options, "--keep", "results", "--no-page", "-o", "out")
+
+    for case in Path("out/cases").iterdir():
+        row = read_json(case / "summary.json")
+        run_successfully("run", case / "scene.resolved.toml", "--no-page", "-o", "again")
+        # The words after "patchfem run joint.toml"
+        words = shlex.split(row["origin"]["command"])[3:]
+        run_successfully("run", "joint.toml", *words, "--no-page", "-o", "command")
+        for folder in ("again", "command"):
+            repeated = read_json(f"{folder}/summary.json")
+            assert repeated["outcome"] == row["outcome"]
+            assert repeated["measures"] == row["measures"]
+
+
+@pytest.mark.parametrize(
+    "text, key", [(BONDED, "normal.load"), (ROUGH + MODE + DRIVE, "contact.load")]
+)
+def test_exact_set_subtracts_the_joint_of_the_file(text: str, key: str):
+    """A changed load of a single run or of a plan leaves the structure alone, as in a sweep and a backbone."""
+    written = pf.plan(text)
+    changed = pf.plan(text, **{key: "3.2 kN"})
+    assert changed.model.rig.modes.omega == pytest.approx(written.model.rig.modes.omega, rel=1e-12)
+    assert changed.modes(changed.chain)[0]["stuck_frequency"] < 211
+    own = pf.plan(text, **{key: "3.2 kN", "structure.measured_joint": "case"})
+    assert own.modes(own.chain)[0]["stuck_frequency"] == pytest.approx(212, rel=1e-9)
+    assert "measured_stiffness" not in own.model.source.resolved
+
+
+def test_exact_each_of_several_interfaces_states_its_stiffness(tmp_path: Path):
+    """The resolved scene of a rig with several interfaces has the stiffness that was subtracted at each of them."""
+    mass = np.diag([1.0, 2.0])
+    stiffness = np.array([[4e6, -1e6], [-1e6, 6e6]])
+    rows = {"output": np.array([1.0, 0.0]), "base": np.ones(2)}
+    np.savez(tmp_path / "rig.npz", M=mass, K=stiffness, C=1e-5 * stiffness, **rows)
+    law = POINT.partition("[friction]\n")[2]
+    text = '[structure]\nfile = "rig.npz"\nmeasured = "stuck"\n'
+    for number in (1, 2):
+        text += f'[[structure.interface]]\nbetween = [{number}, 0]\nload = "{number} N"\n{law}'
+    (tmp_path / "rig.toml").write_text(text + DRIVE)
+
+    changed = pf.build(tmp_path / "rig.toml", **{"structure.interface.0.load": "1.5 N"})
+    (tmp_path / "again.toml").write_text(changed.source.resolved)
+    repeated = pf.build(tmp_path / "again.toml")
+    assert repeated.rig.structure.bolted.subtracted.stiffness == pytest.approx(
+        (2e5, 4e5), rel=1e-12
+    )
+    assert (repeated.rig.modes.omega == changed.rig.modes.omega).all()
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ('measured = "stuck"', 'measured_stiffness = "1e7 N/m"', "add structure.measured"),
+        (
+            'measured = "stuck"',
+            'measured = "stuck"\nmeasured_joint = "case"\nmeasured_stiffness = "1e7 N/m"',
+            "keep only one",
+        ),
+        ('measured = "stuck"', 'measured = "stuck"\nmeasured_stiffness_error = "1 N/m"', "missing"),
+    ],
+)
+def test_refuses_a_measured_stiffness_without_meaning(old: str, new: str, message: str):
+    """The keys of the subtracted joint need modes that were measured with it, and contradict `measured_joint = "case"`."""
+    with pytest.raises(PatchfemError, match=message):
+        pf.load((ROUGH + MODE + DRIVE).replace(old, new))
+
+
+@pytest.mark.slow
+def test_fitted_scene_subtracts_the_joint_of_the_fit(tmp_path: Path, monkeypatch):
+    """The scene that a fit writes has the curve of the fit, though its load is not that of the modal test."""
+    monkeypatch.chdir(tmp_path)
+    Path("joint.toml").write_text(POINT + MODE + DRIVE)
+    key = "normal.load"
+    truth = pf.backbone(
+        Path("joint.toml"), amplitudes="20 um..400 um:4", method="balance", **{key: "3.6 kN"}
+    )
+    columns = [truth[f"balance_{name}"].values for name in ("amplitude", "frequency", "damping")]
+    header = "amplitude [m],frequency [Hz],damping"
+    np.savetxt("curve.csv", np.transpose(columns), "%.17g", ",", header=header, comments="")
+    run_successfully(
+        "fit",
+        "joint.toml",
+        "--to",
+        "curve.csv",
+        "--free",
+        f"{key}=3 kN..5 kN",
+        "-o",
+        "fit",
+        "--no-page",
+    )
+    fitted = pf.backbone(
+        Path("fit/scene.fitted.toml"), amplitudes="20 um..400 um:4", method="balance"
+    )
+    assert fitted["balance_frequency"].values == pytest.approx(columns[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("joint", ["1.5 um", "0.01 um"])
+def test_always_default_amplitudes_resolve_the_onset_of_slip(joint: str):
+    """Frequency and damping ratio change by at most 8 % of their range between neighbouring default amplitudes."""
+    text = (POINT + MODE + DRIVE).replace("1.5 um", joint).replace('"stuck"', '"free"')
+    curves = pf.backbone(text, method="balance")
+    for name in ("frequency", "damping"):
+        values = curves[f"balance_{name}"].values
+        assert np.abs(np.diff(values)).max() <= 0.081 * np.ptp(values), name

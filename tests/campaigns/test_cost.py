@@ -6,6 +6,7 @@ import pytest
 from command_line import run_cli
 from scene_texts import PIECE
 
+import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
     Cost,
@@ -119,6 +120,7 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     [
         (["--over", "colour"], "use one of element_size"),
         (["--over", "steps_per_cycle"], "possible settings: element_size"),
+        (["--over", "accuracy.steps_per_cycle"], "possible settings: element_size"),
     ],
 )
 def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, message):
@@ -127,3 +129,13 @@ def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, message):
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = run_cli("cost", scene, *words)
     assert answer.code == 2 and message in answer.err
+
+
+def test_exact_key_of_the_scene_names_its_setting():
+    """`cost` takes the keys of a scene as a sweep does, besides its own short names."""
+    curves = [
+        pf.cost(pf.new("bench"), over=name, say=lambda line: None)
+        for name in ("steps_per_cycle", "accuracy.steps_per_cycle")
+    ]
+    labels = [[run["label"] for run in curve["steps_per_cycle"]["runs"]] for curve in curves]
+    assert labels[0] == labels[1]

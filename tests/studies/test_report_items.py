@@ -31,5 +31,5 @@ def test_always_docstring_states_the_counts_of_items(items):
         sum(item.verdict.split(":")[0] == verdict for item in items.ITEMS)
         for verdict in items.VERDICTS
     ]
-    assert counts == [70, 6, 1, 2]
-    assert "79 items 70 work, 6 in part, one is missing, and of two" in items.__doc__
+    assert counts == [68, 8, 1, 2]
+    assert "79 items 68 work, 8 in part, one is missing, and of two" in items.__doc__

@@ -24,8 +24,10 @@ MAX_LINEAR_AMPLITUDE = 1e-3  # largest amplitude of a linear rig [m]
 N_LINEAR_AMPLITUDES = 4  # number of amplitudes of a linear rig, whose values are constant
 # Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
 MAX_CURVE_CHANGE = 0.08
-MIN_AMPLITUDE_SPACING_RATIO = 1.02  # ratio of neighbouring amplitudes below which no point is added
-MAX_CURVE_REFINEMENTS = 3  # each one may halve the spacing
+# Ratio of neighbouring amplitudes below which no point is added. A rigid contact begins to slip at once, so that its damping
+# jumps; this is the width within which the place of the jump is found.
+MIN_AMPLITUDE_SPACING_RATIO = 1.001
+MAX_CURVE_REFINEMENTS = 9  # each may halve the spacing, from the default one to the smallest
 N_EXTENSION_DECADES = 8  # number of decades by which the default range is extended to reach a force
 MAX_FORCE_INTERPOLATIONS = 8  # largest number of interpolations towards the amplitude of a force
 

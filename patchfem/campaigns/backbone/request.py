@@ -9,10 +9,9 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_quantity
 from ...model.model import Model
-from ...model.rig import JOINT_TABLES, SCENES_OF_SUBTRACTED_JOINT
 from ...model.source import Source
+from ...runs.joint import solve_without_joint
 from ...scene.assignments import Axis, read_assignments, read_positive_values, read_values
-from ...scene.backbone_scene import BackboneTables, parse_modes
 from ...scene.scene import SceneError
 from .curves import AmplitudesOrForces, choose_methods, compute_backbones
 from .given_modes import prepare_model
@@ -126,11 +125,13 @@ def compute_cases(
     for k, case in enumerate(prepared):
         backbones[k] = backbones[k]._replace(notes=(*case.notes, *backbones[k].notes))
     base = models[0]
-    notes = []
     if axis is not None:
         base = _build_base_model(build, request.modes) or base
+    if base.has_bolted_patch:
+        base = solve_without_joint(base).model
+    notes = base.describe_removed_joint()
+    if axis is not None:
         notes += _note_written_value(base, axis, backbones)
-    notes += _note_changed_joint(base, build, request.modes)
     backbones = [case._replace(notes=(*case.notes, *notes)) for case in backbones]
     return BackboneCases(axis, backbones, base.source)
 
@@ -160,7 +161,7 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
         One for each value. If all have the same frequency with a sticking joint, the key does not change this joint.
     """
     bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
+    if bolted is None or bolted.origin != "written":
         return []
     stuck = [backbone.frequencies.stuck for backbone in backbones]
     if axis.key.startswith("structure.") or None in stuck or np.allclose(stuck, stuck[0], 1e-9, 0):
@@ -184,32 +185,3 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
     if text not in listed:
         note += "; no curve has this value"
     return [note]
-
-
-def _note_changed_joint(
-    base: Model, build: Callable[..., Model], modes: str | Iterable
-) -> list[str]:
-    """Return a list of notes on keys of a bolted joint whose values in the written file are not those of the modal test.
-
-    These are keys that --set changes. `base` is the model whose scene is written, and `build` and `modes` are as in
-    `compute_cases`.
-    """
-    bolted = base.rig.structure.bolted
-    if bolted is None or bolted.scene == SCENES_OF_SUBTRACTED_JOINT["case"]:
-        return []
-    sets = base.source.sets
-    if not any(text.startswith(JOINT_TABLES) for text in sets):
-        return []
-
-    # Assignments of the scene as written, which the API accepts, come first.
-    written = build(BackboneTables(parse_modes(modes) if modes else (), stuck=False), None)
-    changed = sets[len(written.source.sets) :]
-    keys = dict.fromkeys(text.partition("=")[0].strip() for text in changed)
-    names = [key for key in keys if key.startswith(JOINT_TABLES)]
-    if not names:
-        return []
-    return [
-        "the joint that is subtracted from the modes is that of the scene as written, without --set of "
-        f"{' and '.join(names)}; scene.resolved.toml has the values of --set, so that its run subtracts another joint: "
-        "repeat this backbone with the scene as written and the same --set"
-    ]

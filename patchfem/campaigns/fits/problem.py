@@ -16,6 +16,7 @@ from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...model.rig import JOINT_TABLES
+from ...model.structure import name_joint_source
 from ...runs.patch import mesh_levels
 from ...scene.assignments import BOUNDS_FORM, Range, read_assignments
 from ...scene.lines import find_scene_value
@@ -202,7 +203,9 @@ def warn_of_bolted_joint(scene: Scene, ranges: Iterable[Range]) -> list[str]:
     `ranges` are those of the free keys of the scene. The list is empty otherwise.
     """
     structure = scene.structure
-    if structure is None or structure.measured == "free" or structure.measured_joint == "case":
+    if structure is None or structure.measured == "free":
+        return []
+    if name_joint_source(structure) != "written":
         return []
     keys = [bound.key for bound in ranges if bound.key.startswith(JOINT_TABLES)]
     if not keys:

@@ -19,12 +19,12 @@ from ... import __version__
 from ...core import PatchfemError
 from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
-from ...model.rig import SCENES_OF_SUBTRACTED_JOINT
 from ...model.similar_models import SimilarModels
+from ...model.structure import JOINT_WORDS, name_joint_source
 from ...scene.files import require_files
 from ...scene.lines import split_assignment
 from ...scene.overrides import BaseScene
-from ...scene.scene import Scene, SceneError, loads, read_sweep_axes, remember_written
+from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,11 @@ class SweepScene:
         Content of the scene file.
     sets : tuple of str
         --set strings of all cases.
-    n_written : int
-        Number of the first strings of `sets` that belong to the scene as written, whose joint is
-        subtracted from bolted modes.
     """
 
     path: Path
     text: str
     sets: tuple[str, ...] = ()
-    n_written: int = 0
 
     def read_scene(self, sets: Sequence[str]) -> Scene:
         """Return the scene with additional `table.key=value` strings, `sets`."""
@@ -57,7 +53,7 @@ class SweepScene:
     def _parse_scene(self, sets: Sequence[str]) -> Scene:
         """Parse the scene text with additional `table.key=value` strings, `sets`."""
         scene = require_files(loads(self.text, self.path, (*self.sets, *sets)))
-        return remember_written(replace(scene, sweep=()), self.n_written)
+        return replace(scene, sweep=())
 
     def build_model(self, sets: Sequence[str]) -> Model:
         """Build the model of a single case of the sweep.
@@ -134,8 +130,8 @@ class SweepScene:
         if structure is None or structure.measured == "free":
             return ""
         return (
-            "the modes were measured with the joint bolted, so the stiffness of the joint of "
-            f"{SCENES_OF_SUBTRACTED_JOINT[structure.measured_joint]} is subtracted from them"
+            "the modes were measured with the joint bolted, so "
+            f"{JOINT_WORDS[name_joint_source(structure)]} is subtracted from them"
         )
 
     def read_axes(self) -> tuple[list, list[str]]:
@@ -165,8 +161,6 @@ class SweepScene:
         tables.pop("sweep", None)
         files = hash_named_files([*iterate_texts(tables), *self.sets], self.path.parent)
         shared = [__version__, tables, self.sets, files]
-        if self.n_written:
-            shared.append(self.n_written)
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:

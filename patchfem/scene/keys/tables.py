@@ -302,6 +302,10 @@ class Interface(Friction):
         "normal force on the interface; a patch, [structure.interface.contact], may be given in place of this key",
         "unless [structure.interface.contact] is given",
     )
+    measured_stiffness: optional(
+        quantity("stiffness", ge=0),
+        "structure.measured_stiffness of this interface, for a structure with several",
+    )
     contact: Contact | None = None
 
     @property
@@ -397,6 +401,20 @@ class Structure(Table):
         "which joint is subtracted in a sweep, fit or backbone that changes the joint: 'written' (the default): in "
         "every case that of the scene as written, before --set, --over and --free; 'case': in each case its own, as "
         "if each joint had been measured bolted with these frequencies",
+    )
+    measured_stiffness: optional(
+        quantity("stiffness", ge=0),
+        "stiffness that is subtracted from modes measured with the joint: that of the joint and of a spring in "
+        "[structure.bonded]; resolved scenes have it; default: it is computed, for the joint of the file as written",
+    )
+    measured_stiffness_error: optional(
+        quantity("stiffness", ge=0),
+        "error of measured_stiffness, which widens the errors of all measures; default: 0",
+    )
+    measured_damper: optional(
+        quantity("damping", ge=0),
+        "coefficient of the damper that is subtracted from modes measured with the joint; default: that of "
+        "[structure.bonded] in the file as written",
     )
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None

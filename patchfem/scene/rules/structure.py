@@ -73,8 +73,27 @@ def _check_file(structure: TableFacts) -> None:
 
 
 def _check_joint(structure: TableFacts) -> None:
-    """Report a bonded spring of a structure that has no interface or several."""
+    """Report a bonded spring of a structure that has no interface or several, and a stiffness of the wrong interface."""
     n_interfaces = len(tuple(structure.interface))
+    if structure.has("measured_stiffness") and n_interfaces > 1:
+        structure.add_mistake(
+            "measured_stiffness",
+            f"applies only to a single contact, but there are {n_interfaces} interfaces; give each of them its own "
+            "structure.interface.measured_stiffness",
+        )
+    for index in range(n_interfaces):
+        if not structure.has(f"interface.{index}.measured_stiffness"):
+            continue
+        if structure.measured != "stuck":
+            instead = 'structure.measured = "stuck"'
+        elif n_interfaces == 1:
+            instead = "structure.measured_stiffness in its place"
+        else:
+            continue
+        structure.add_mistake(
+            f"interface.{index}.measured_stiffness",
+            f"is for a structure of several interfaces whose modes were measured with the joint; give {instead}",
+        )
     if structure.bonded and structure.table.masses is not None and n_interfaces != 1:
         structure.add_mistake(
             "bonded",

@@ -78,7 +78,7 @@ def are_identical(a, b) -> bool:
         return all(
             are_identical(getattr(a, one.name), getattr(b, one.name))
             for one in fields(a)
-            if one.name != "write"
+            if one.name != "writer"
         ) and (not hasattr(a, "resolved") or a.resolved == b.resolved)
     return a == b and repr(a) == repr(b)
 
