@@ -118,6 +118,8 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
             part = text.format(_format_measure(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
+            if name == "worn_depth_max" and result.plan.model.patch.gap.is_split:
+                part += " of the mean over the short waves"
             parts.append(part)
     if not parts:
         return ""

@@ -74,6 +74,11 @@ class Gap:
     file: str = ""
 
     @property
+    def is_split(self) -> bool:
+        """Whether asperities represent the short waves of a measured profile, so that worn depths are means over them."""
+        return self.is_rough and self.profile is not None
+
+    @property
     def angle(self) -> float:
         """Prescribed angle [rad] of the upper piece."""
         return next((angle for keys, angle in self._values("angle") if keys.on == "upper"), 0.0)

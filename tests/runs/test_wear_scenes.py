@@ -272,3 +272,24 @@ def test_refuses_to_resume_wear_without_valid_state(tmp_path):
         assert answer.code == 2 and "cannot be read" in answer.err, answer.err
     scene.write_text(TILTED + COULOMB + SINE)
     assert run_cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2
+
+
+def test_always_run_says_that_worn_depth_of_split_trace_is_a_mean(tmp_path, monkeypatch):
+    """A run of a trace whose short waves are a layer says that its worn depth is a mean, and the layer does not wear."""
+    monkeypatch.chdir(tmp_path)
+    rows = (f"{10 * k},{np.sin(k):.3f}" for k in range(400))
+    Path("trace.csv").write_text("x [um],z [um]\n" + "\n".join(rows) + "\n")
+    Path("scene.toml").write_text(
+        '[contact]\nlength = "4 mm"\nwidth = "4 mm"\nheight = "4 mm"\nload = "100 N"\nsubstrate = "steel"\n'
+        'element_size = "0.2 mm"\n[contact.profile]\nfile = "trace.csv"\nheights = "surface"\n[contact.asperities]\n'
+        'law = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "0.2 um"\ncutoff = "0.8 mm"\n'
+        + COULOMB
+        + SINE
+        + WEAR
+        + "[accuracy]\ntolerance = 0.2\n"
+    )
+    result = run_successfully("run", "scene.toml", "-o", "out")
+    output = result.out + result.err
+    assert "at the deepest place of the mean over the short waves" in output
+    assert "worn_depth_max is a mean over the short waves" in output
+    assert "the layer itself does not wear" in output

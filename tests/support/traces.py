@@ -41,8 +41,8 @@ def draw_uneven_trace(count=50, seed=3) -> tuple:
 def write_traces(kind: str, seed: int, folder: Path, names: tuple) -> list:
     """Write both traces of a stored pair as tables in um and return their paths.
 
-    kind, seed: the pair, one of KINDS with seed 41003, or "groove" with 30077, 7100 or 7101; names: of both files, without
-    ending.
+    kind, seed: the pair, one of KINDS with seed 41003, "groove" with 30077, 7100 or 7101, or "elsewhere" with 20261133;
+    names: of both files, without ending.
     """
     paths = [folder / f"{name}.csv" for name in names]
     with np.load(Path(__file__).with_name("trace_pairs.npz")) as stored:

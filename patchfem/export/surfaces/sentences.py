@@ -28,6 +28,8 @@ VERDICT_HEADLINES = {
     "grew at the ends: both are possible.",
     "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
     "instrument: both are possible.",
+    "scar_or_step": "Either a scar of {scar_depth} that reaches beyond the end of the traces, or a jump of the datum of the "
+    "instrument by this height: both are possible.",
     "scar_or_drift": "Either wear of {scar_depth}, the mean over {region}, or drift of the instrument: both are possible.",
     "elsewhere": "Not comparable: no common part of both surfaces is found, and no unworn flanks of a track show a depth.",
     "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
@@ -44,6 +46,7 @@ NO_DEPTH_ADVICE = {
     "growth_at_ends": "Measurements that end on unworn surface on both sides would decide.",
     "scar_or_drift": "The unworn parts drift so much that one of many places may look as deep; comparing two measurements "
     "of the worn surface would show the drift alone.",
+    "scar_or_step": "Traces with unworn surface on both sides of the scar, or a second measurement, would decide.",
     "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
 }
 
@@ -105,6 +108,7 @@ MISSING_VALUE_REASONS = {
     "mirror_finish": "the short waves of the surface hardly exceed the noise",
     "growth_at_ends": "a scar and growth at the ends are both possible",
     "scar_or_bow": "a scar and a bent datum are both possible",
+    "scar_or_step": "a scar and a jump of the datum are both possible",
     "scar_or_drift": "wear and drift of the instrument are both possible",
     "flat": "the surface is flat",
     "undetermined": "the heights do not determine it",

@@ -57,7 +57,8 @@ class TraceSplit:
         return (
             f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; "
             f"{reason}. Use the stiffnesses of the split. Its pressure is a mean over the short "
-            "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
+            "waves, and its contact_fraction counts where the layer carries, not where peaks touch. Worn depth is a mean "
+            "over these waves, too: single peaks wear deeper, and the layer does not wear. The layer is too soft "
             f"where the pressure exceeds {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves flat, "
             "and too stiff where few of them carry. The changes at twice the cutoff and at a hundredth of the decay_length "
             f"show the error. {'' if is_scene_written else command}Tables:\n    {table_lines}"

@@ -130,7 +130,8 @@ PATCH_MEASURE_ROWS = (
         "worn_depth_max",
         "m",
         1e-15,
-        "largest worn depth on the interface, both pieces together",
+        "largest worn depth on the interface, both pieces together; with a profile and [contact.asperities], a mean over "
+        "the waves that these represent",
         group="wear",
         minimum=0.0,
     ),

@@ -32,6 +32,11 @@ N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
 # which the stiffness of the unworn piece is valid.
 MAX_WORN_THICKNESS_FRACTION = 0.2
 WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
+# Note on the wear of a trace whose short waves are represented by asperities
+SPLIT_TRACE_NOTE = (
+    "worn_depth_max is a mean over the short waves that [contact.asperities] represents: single peaks wear deeper; the "
+    "layer itself does not wear, its stiffness and decay length stay those of the new surface"
+)
 MEASURE_BY_HOLDER_MOTION = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -76,6 +81,8 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
 
     # A run that continues an earlier one, or wears through a coating, says so.
     notes = list(result.notes)
+    if model.patch.gap.is_split:
+        notes.append(SPLIT_TRACE_NOTE)
     if model.wear.start is not None:
         notes.append(model.wear.start.sentence)
     if "worn_through_cycle" in worn:

@@ -31,6 +31,8 @@ PARABOLA_NOISE_RATIO = 0.8
 # Noise about a parabola relative to that about a line below which the parabola is subtracted even if it leaves heights
 # above the first trace: then no line fits at all
 CLEAR_PARABOLA_NOISE_RATIO = 0.2
+# Noise about a parabola relative to that about a line above which the parabola takes worn heights for the datum
+MAX_PARABOLA_NOISE_RATIO = 1.5
 # Fraction of the heights above the first trace that a parabola may add
 MAX_GROWTH_FRACTION_BY_PARABOLA = 0.01
 # Significance of the correlation at a place above which the place is sure without other evidence
@@ -232,9 +234,8 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
     if gain < CLEAR_PARABOLA_NOISE_RATIO:
         return True
     has_grown = bent.grown.mean() > straight.grown.mean() + MAX_GROWTH_FRACTION_BY_PARABOLA
-    return bool(
-        (gain < PARABOLA_NOISE_RATIO or bent.n_changed < straight.n_changed / 2) and not has_grown
-    )
+    is_simpler = bent.n_changed < straight.n_changed / 2 and gain < MAX_PARABOLA_NOISE_RATIO
+    return bool((gain < PARABOLA_NOISE_RATIO or is_simpler) and not has_grown)
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:

@@ -1,8 +1,8 @@
 """Comparison of two surfaces before and after wear: place, datum, worn parts, verdict, numbers.
 
 Traces and scans take the same way (see the package); what differs by the number of axes stands in tables. Codes of the
-verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow", "scar_or_drift", "elsewhere",
-"no_datum", "mirror_finish", "identical".
+verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow", "scar_or_step", "scar_or_drift",
+"elsewhere", "no_datum", "mirror_finish", "identical".
 """
 
 from dataclasses import replace
@@ -19,7 +19,7 @@ from ..profile import Profile, measure_step, robust_deviation
 from ..quantity import HALF_WIDTH_95, Quantity
 from . import waves
 from .alignment import CALIBRATED_GAIN_DEVIATION, SURE_SIGNIFICANCE, Aligned, align
-from .changes import find_detection_limit
+from .changes import find_changed, find_detection_limit
 from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
@@ -48,8 +48,10 @@ WORN_MARGIN_SIDE = 7
 MAX_TRACK_FRACTION = 0.8
 # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
 MIN_SCAR_FRACTION = 0.9
-# Mean height of a bow relative to the short waves, from which on it may be a scar.
-MIN_BOW_TO_WAVES_RATIO = 3.0
+# Mean height of a bow relative to the short waves, from which on it may be a scar. Instruments have lower ones.
+MIN_BOW_TO_WAVES_RATIO = 1.0
+# Area of a bow relative to the worn area, from which on the verdict depends on whether the bow is a scar
+MIN_BOW_TO_WORN_RATIO = 0.5
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_WORN_TRACK_FRACTION = 0.6
@@ -249,12 +251,10 @@ def _measure(
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else HALF_WIDTH_95
     # Drift may be as large as the loss of sharp tops, but is no cause of it.
-    sharp = measure_sharp_loss(depths) if is_placed else 0.0
+    sharp, sharp_error = measure_sharp_loss(depths) if is_placed else (0.0, 0.0)
     drift = 0.0 if sharp > 0 else error
     largest = max(area, sharp)
-    lowest = max(
-        area - HALF_WIDTH_95 * error, (1 - HALF_WIDTH_95 * depths.errors.model) * sharp, 0.0
-    )
+    lowest = max(area - HALF_WIDTH_95 * error, sharp - HALF_WIDTH_95 * sharp_error, 0.0)
     highest = max(area + HALF_WIDTH_95 * error + depths.measure_hidden(covered), sharp)
     loss = name_quantity(names.lost, largest, lowest, highest)
     sure_area = depths.integrate(depths.worn)[0]
@@ -266,6 +266,9 @@ def _measure(
         # The area of a single track is that of the common part.
         whole = loss[:3] if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
+    if tracks and not _is_clear_track(tracks[0], depths, is_placed=is_placed):
+        is_beyond_drift = is_placed and area > HALF_WIDTH_95 * error
+        code = "scar_or_drift" if is_beyond_drift else ("no_wear" if is_placed else "elsewhere")
     # The subtracted parabola of a trace, 0 without one.
     bend = float(aligned.fit.state[-2]) if is_trace and is_placed else 0.0
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
@@ -359,10 +362,14 @@ def _collect_findings(
 
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
-    short_noise = robust_deviation(np.diff(depths.depth)) / np.sqrt(2)
+    short_noise = _measure_short_noise(depths)
     first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
     rows = (
-        (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
+        (
+            not is_placed and tracks,
+            "no_old_surface_left",
+            {"from": float(first), "to": float(last)},
+        ),
         (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
         (is_placed, "hidden_even_wear", {"limit": None}),
         (
@@ -423,7 +430,8 @@ def _doubt(
 ) -> tuple[str, dict[str, float]]:
     """Replace the verdict by that of an ambiguous case if two causes explain the depths equally well.
 
-    Growth at both ends looks like a scar between them, and a bow of the instrument like a wide scar.
+    Growth at both ends looks like a scar between them, a bow of the instrument like a wide scar, and a jump of its datum
+    like a scar that begins in the trace and continues beyond its end.
 
     Parameters
     ----------
@@ -446,25 +454,67 @@ def _doubt(
         Heights [m] by name that both causes would have, or {} if there is one cause.
     """
     area, grown, bend = sizes
-    bow = 2 / 3 * max(bend, 0.0) * depths.size
-    is_cut = bool(tracks) and any(tracks[0].cut)
     if code == "grown" and _has_grown_at_ends(depths):
         height = grown / (float(depths.grown.sum()) * depths.cell)
         return "growth_at_ends", {"scar_depth": height, "growth_height": height}
-    if code == "scar_or_drift":
-        return code, {"scar_depth": area / depths.size}
     if depths.depth.ndim > 1:
         return code, {}
-    if code.startswith("worn") and not is_cut:
+
+    # A bow is doubtful where no other wear is sure, the track has only one flank, or the datum is no parabola.
+    is_cut = bool(tracks) and any(tracks[0].cut)
+    is_worn = code.startswith("worn")
+    bow = 2 / 3 * max(bend, 0.0) * depths.size
+    waves_height = robust_deviation(remove_long_waves(depths.after))
+    is_bow_large = (
+        bow > MIN_BOW_TO_WORN_RATIO * area and bend > MIN_BOW_TO_WAVES_RATIO * waves_height
+    )
+    has_poor_datum = is_cut or depths.errors.drift > _measure_short_noise(depths)
+    if is_bow_large and (code in ("no_wear", "scar_or_drift") or (is_worn and has_poor_datum)):
+        return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
+    if code == "scar_or_drift":
+        return code, {"scar_depth": area / depths.size}
+    if is_worn and not is_cut:
         is_wide = tracks[0].values["width"].value > MAX_TRACK_FRACTION * depths.size
         if is_wide and not _is_broken(depths, spans[0], MIN_SCAR_FRACTION):
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
-    waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = bow > area and bend > MIN_BOW_TO_WAVES_RATIO * waves_height
-    if is_bow_large and (code == "no_wear" or (code.startswith("worn") and is_cut)):
-        return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
+    if is_worn and len(spans) == 1 and sum(tracks[0].cut) == 1:
+        height = _find_step(depths, at_end=tracks[0].cut[1])
+        if height:
+            return "scar_or_step", {"scar_depth": height}
     return code, {}
+
+
+def _is_clear_track(track: Track, depths: DepthMap, *, is_placed: bool) -> bool:
+    """Return whether the smallest mean depth of a track, by its area and its width, is beyond its error.
+
+    Below flanks, each depth contains the roughness of the surface, which is the noise of the `depths`; the mean depth of
+    a track must exceed it. With `is_placed`, the depth of a common place contains none.
+    """
+    width = track.values["width"].high or depths.size
+    return track.values["area_gross"].low / width > (0.0 if is_placed else depths.noise_level)
+
+
+def _measure_short_noise(depths: DepthMap) -> float:
+    """Return the standard deviation [m] of the depths of a trace that neighbours do not share."""
+    return float(robust_deviation(np.diff(depths.depth)) / np.sqrt(2))
+
+
+def _find_step(depths: DepthMap, *, at_end: bool) -> float:
+    """Return the height [m] of a single step that explains all depths of a trace but for their noise, 0 if none does.
+
+    `at_end` tells whether the trace is low beyond the step, or before it.
+    """
+    depth = depths.depth if at_end else depths.depth[::-1]
+    noise = depths.noise if at_end else depths.noise[::-1]
+    is_worn = depths.worn if at_end else depths.worn[::-1]
+    height = float(np.median(depth[is_worn]))
+    # The place of least squares: beyond it, each depth is nearer to the height than to 0 on average.
+    gain = np.cumsum((depth * height - height**2 / 2)[::-1])
+    residual = depth.copy()
+    residual[depth.size - 1 - int(np.argmax(gain)) :] -= height
+    has_other_change = find_changed(residual, noise).any() or find_changed(-residual, noise).any()
+    return 0.0 if has_other_change else height
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:

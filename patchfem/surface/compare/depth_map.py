@@ -10,8 +10,8 @@ import numpy as np
 from .statistics import remove_long_waves, subtract_local_level
 
 UNWORN_LIMIT_DEVIATIONS = 2.5  # standard deviations within which a depth counts as unworn
-# Relative standard deviation of an area or volume due to tip and interpolation
-INTERPOLATION_RELATIVE_ERROR = 0.004
+# Variance of an even distribution over an interval of length 1
+EVEN_VARIANCE = 1 / 12
 # Errors relative to those that the tiles show, which are few.
 FEW_TILES_ERROR_FACTOR = 1.3
 
@@ -23,14 +23,14 @@ class DepthErrors(NamedTuple):
     - drift: root mean square [m] of the mean depths of unworn tiles about the datum, 0 if these are too few.
     - freedom: degrees of freedom of the variance: number of independent tiles less the terms of the datum.
     - correlation: number of neighbouring heights that share an error.
-    - model: relative standard deviation of a single depth due to gain, tip and interpolation.
+    - gain: standard deviation of the gain of the instrument, which is a relative error of every depth.
     """
 
     variance: Callable[[np.ndarray], float]
     drift: float = 0.0
     freedom: float = np.inf
     correlation: float = 1.0
-    model: float = INTERPOLATION_RELATIVE_ERROR
+    gain: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +82,29 @@ class DepthMap:
         known = beside[np.isfinite(beside)]
         return float(known.std()) if known.size else 0.0
 
+    @cached_property
+    def step_variance(self) -> np.ndarray:
+        """Variance (n,) or (m, n) [m2] of the depth over the cell of a point, which is known at its middle only.
+
+        Between two points, the depth may fall anywhere from one value to the other.
+        """
+        steps = [
+            np.diff(self.depth, axis=k, append=np.take(self.depth, [-1], k))
+            for k in range(self.depth.ndim)
+        ]
+        return EVEN_VARIANCE * sum(step**2 for step in steps)
+
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
         """Integrate the depth over a mask, and return area [m2] or volume [m3] and its standard deviation.
 
         `part` is the mask. With the sign -1 grown material counts as positive.
         """
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
-        error = FEW_TILES_ERROR_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
+        error = FEW_TILES_ERROR_FACTOR * np.sqrt(self.errors.variance(part))
         # The line over a gap misses the tops in it, which are worn deeper, and its valleys.
-        gaps = self.scatter * float((part & self.missing).sum()) * self.cell
-        return value, float(
-            np.sqrt(error**2 + gaps**2 + (INTERPOLATION_RELATIVE_ERROR * value) ** 2)
-        )
+        gaps = self.scatter * float((part & self.missing).sum())
+        sampling = np.sqrt(self.step_variance[part].sum())
+        return value, self.cell * float(np.sqrt(error**2 + gaps**2 + sampling**2))
 
     def measure_hidden(self, covered) -> float:
         """Return the area [m2] or volume [m3] of wear that may be hidden by the noise, outside the mask `covered`.

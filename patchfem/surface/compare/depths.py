@@ -1,14 +1,15 @@
 """Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage, special
 
 from ..quantity import HALF_WIDTH_95, Quantity
+from .changes import WINDOW_SIDES
 from .depth_map import (
     FEW_TILES_ERROR_FACTOR,
-    INTERPOLATION_RELATIVE_ERROR,
     UNWORN_LIMIT_DEVIATIONS,
     DepthErrors,
     DepthMap,
@@ -17,7 +18,7 @@ from .fit import Fit
 from .model import Model
 from .raster import fill_gaps
 from .records import name_quantity
-from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
+from .statistics import MIN_DIVISOR, estimate_correlation, find_box, split_tiles, subtract_plane
 
 # Number of tiles along each side, whose means show the errors of the datum
 N_DATUM_ERROR_TILES = {1: 40, 2: 8}
@@ -27,8 +28,10 @@ MIN_DATUM_ERROR_TILES = 6
 MIN_INDEPENDENT_TILES = 3.0
 # Smallest number of unworn heights in a tile that shows the errors of the datum
 MIN_DATUM_TILE_HEIGHTS = 5
-# Side of the window whose median depths give the largest depth
-MAX_DEPTH_WINDOW_SIDE = {1: 5, 2: 3}
+# Distance from the largest mean, in its standard deviations, within which other means are counted as equally deep
+NEAR_DEVIATIONS = 2.0
+N_TRIED_COUNTS = 200  # number of numbers of equally deep places that are compared with what is seen
+MEDIAN_SIDE = {1: 5, 2: 3}  # side of the window whose median leaves outliers out, by number of axes
 # Variance of the median of normal errors relative to that of their mean, pi/2
 MEDIAN_TO_MEAN_VARIANCE = 1.57
 # Noise relative to the median above which a depth cannot be the largest
@@ -78,7 +81,6 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         shifts.append(_bend_datum(depth, unworn, base))
     errors = estimate_errors(depth, noise, unworn, base, shifts)
 
-    model_error = float(np.hypot(INTERPOLATION_RELATIVE_ERROR, gain_error))
     # Holes of missing heights belong to the common part.
     inside = ndimage.binary_fill_holes(model.common[box])
     axes = [axis[part] for axis, part in zip(model.sampled.axes, box)]
@@ -93,7 +95,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         inside=inside,
         missing=inside & ~model.known[box],
         cell=float(np.prod(model.sampled.steps)),
-        errors=errors._replace(model=model_error),
+        errors=errors._replace(gain=gain_error),
     )
 
 
@@ -200,22 +202,78 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
 def _bend_datum(depth, unworn, base) -> np.ndarray:
     """Return by how much [m] the datum (n,) of a trace would change with two more polynomial terms.
 
-    With a slow drift, this is the error of the datum in a wide track, which the scatter of the flanks does not show.
+    With a slow drift, this is the error of the datum in a wide track, which the scatter of the flanks does not show. The
+    part of its square that noise without a drift would give is subtracted.
 
     `depth` and `unworn` (n,) are the depths [m] and the mask of the unworn ones, which determine the datum. `base` (k,
     n) are the functions of which it is a combination.
     """
     x = np.linspace(-1, 1, depth.size)
     bent = np.vstack((base, x ** len(base), x ** (len(base) + 1)))
-    return subtract_plane(depth, base, unworn) - subtract_plane(depth, bent, unworn)
+    remainders = [subtract_plane(depth, columns, unworn) for columns in (base, bent)]
+
+    # Chi square of both terms, which is 2 on average for noise alone
+    squares = [float((remainder[unworn] ** 2).sum()) for remainder in remainders]
+    correlation = estimate_correlation(remainders[1][unworn])
+    noise_square = correlation * squares[1] / max(unworn.sum() - len(bent), 1) + MIN_DIVISOR
+    chi_square = (squares[0] - squares[1]) / noise_square
+    return np.sqrt(max(1 - 2 / max(chi_square, 2.0), 0.0)) * (remainders[0] - remainders[1])
+
+
+class Extreme(NamedTuple):
+    """Largest mean over windows of some side, and how many of them are as deep but for the noise.
+
+    - value: largest mean [m]; sigma: its standard deviation [m].
+    - at: index of the middle of the window.
+    - n_places: number of independent windows that are as deep.
+    """
+
+    value: float
+    sigma: float
+    at: tuple[int, ...]
+    n_places: float
+
+    def find_noise(self, probability: float, n_places: float) -> float:
+        """Return a quantile [m] of what noise alone adds to the largest of a number of means that are equally deep."""
+        return self.sigma * float(special.ndtri(probability ** (1 / n_places)))
+
+
+def _find_extreme(depth, noise, side: int, correlation: float) -> Extreme:
+    """Return the largest mean of depths over windows of a side.
+
+    Parameters
+    ----------
+    depth, noise : (n,) or (m, n) array [m]
+        Depths, at most 0 where they cannot be the largest, and the standard deviation of an unworn one.
+    side : int
+        Side of the window in samples.
+    correlation : float
+        Number of neighbouring depths that share an error.
+    """
+    means = ndimage.uniform_filter(depth, side)
+    at = np.unravel_index(np.argmax(means), means.shape)
+    # Heights that share an error do not improve a mean.
+    n_shared = max(side**depth.ndim, correlation)
+    square = float(ndimage.uniform_filter(noise**2, side)[at])
+    sigma = float(np.sqrt(square * correlation / n_shared))
+
+    # Of n independent normal values about one level, n Q(t - NEAR_DEVIATIONS) are within NEAR_DEVIATIONS of the largest,
+    # where Q is the upper tail and t the median of the largest value.
+    n_near = float((means > means[at] - NEAR_DEVIATIONS * sigma).sum()) / n_shared
+    counts = np.geomspace(1.0, means.size, N_TRIED_COUNTS)
+    largest = special.ndtri(0.5 ** (1 / counts))
+    n_expected = counts * special.ndtr(NEAR_DEVIATIONS - largest)
+    n_places = float(np.interp(n_near, n_expected, counts))
+    return Extreme(float(means[at]), sigma, tuple(map(int, at)), n_places)
 
 
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     """Measure the largest depth of the worn parts without the bias of the maximum of noisy depths.
 
-    The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the interval
-    contains every single depth, because a crest may be worn as deep. Both ends contain what the samples do not resolve,
-    which is the part of the largest depth that every second sample does not show.
+    No mean over a window is above the largest depth, so that the lower end is the highest one of several sides of
+    windows: where a bottom is smooth, wide windows average the noise. The upper end is that of single depths, because a
+    crest may be worn as deep, with what the samples do not resolve of a crest: the part of the largest depth that every
+    second sample does not show. What noise alone adds to the largest of many depths is subtracted.
 
     Parameters
     ----------
@@ -233,28 +291,38 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     is_sure = depths.noise < MAX_DEPTH_NOISE_RATIO * depths.noise_level
     if (is_sure & depths.worn).any():
         is_sure &= depths.worn
-    smooth = ndimage.median_filter(depths.depth, MAX_DEPTH_WINDOW_SIDE[n_axes])
-    smooth = np.where(is_sure, smooth, -np.inf)
-    depth = np.where(is_sure, depths.depth, -np.inf)
-
-    top = np.unravel_index(np.argmax(smooth), smooth.shape)
-    # Heights that share an error do not improve a median.
+    depth = np.where(is_sure, depths.depth, np.minimum(depths.depth, 0.0))
     correlation = depths.errors.correlation
-    factor = MEDIAN_TO_MEAN_VARIANCE * correlation / MAX_DEPTH_WINDOW_SIDE[n_axes] ** n_axes
-    sigma = float(depths.noise[top]) * min(np.sqrt(factor), 1.0)
-    near = smooth > smooth[top] - 2 * sigma
-    bias = float(np.sqrt(2 * np.log(max(near.sum() / correlation, 1.0))) / 2 * sigma)
-    value = float(smooth[top]) - bias
+    sides = WINDOW_SIDES[n_axes]
+    single = _find_extreme(depth, depths.noise, 1, correlation)
 
-    crest = float(depth.max())
-    halves = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
-    coarser = float(np.mean([depth[half].max() for half in halves]))
-    unresolved = crest - coarser if np.isfinite(coarser) else 0.0
-    sigma = float(np.hypot(sigma, depths.level_error))
-    scatter = np.hypot(FEW_TILES_ERROR_FACTOR * sigma, depths.errors.model * value)
-    error = HALF_WIDTH_95 * float(scatter) + unresolved
-    # A missing height may be as much deeper as worn depths scatter about those beside them.
-    if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
-        crest += HALF_WIDTH_95 * depths.scatter
-    low = max(value - bias - error, 0.0)
-    return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near
+    # Medians leave single outliers out, and scatter a little more than means.
+    medians = ndimage.median_filter(depth, MEDIAN_SIDE[n_axes])
+    noise = np.sqrt(MEDIAN_TO_MEAN_VARIANCE) * depths.noise
+    wide = [_find_extreme(medians, noise, side, correlation) for side in sides[1:]]
+    # The best one of several windows is chosen, as if there were as many times more places.
+    lowest = [each.value - each.find_noise(0.975, len(wide) * each.n_places) for each in wide]
+    best = wide[int(np.argmax(lowest))]
+    value = best.value - best.find_noise(0.5, best.n_places)
+
+    # The datum has an error at the deepest place, which is that of the mean depth of a tile around it.
+    tile = np.zeros(depth.shape, bool)
+    halves = [size // (2 * N_DATUM_ERROR_TILES[n_axes]) for size in depth.shape]
+    tile[tuple(slice(max(k - half, 0), k + half + 1) for k, half in zip(best.at, halves))] = True
+    level = FEW_TILES_ERROR_FACTOR * np.sqrt(depths.errors.variance(tile)) / tile.sum()
+    common = HALF_WIDTH_95 * float(np.hypot(level, depths.errors.gain * value))
+    low = value - float(np.hypot(common, value - max(lowest)))
+
+    # A bottom that is not flat has fewer places as deep than are near; at least the root of their number is.
+    crest = single.value - single.find_noise(0.5, single.n_places)
+    noise_above = single.value - single.find_noise(0.025, np.sqrt(single.n_places)) - crest
+    high = max(crest + float(np.hypot(common, noise_above)), value + common)
+    every_second = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
+    high += single.value - float(np.mean([depth[part].max() for part in every_second]))
+    # A missing height may be as much deeper than the line over its gap as worn depths scatter about those beside them.
+    gaps = depths.missing & ndimage.binary_dilation(depths.worn)
+    if gaps.any():
+        high = max(high, float(depths.depth[gaps].max()) + HALF_WIDTH_95 * depths.scatter)
+    near = medians > value - NEAR_DEVIATIONS * best.sigma
+    near[best.at] = True
+    return name_quantity("worn_depth_max", value, max(low, 0.0), high), near

@@ -1,6 +1,7 @@
 """Robust fit of the place and the datum of a second surface to the heights that did not wear."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -147,8 +148,6 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
     (n,) array
         Standard deviation of each depth [m], also of worn ones.
     """
-    from scipy.optimize import nnls
-
     noise = np.full(depth.size, sigma)
     for _ in range(4):
         use = ~worn & (np.abs(depth) < UNWORN_LIMIT_DEVIATIONS * noise)
@@ -157,6 +156,43 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
         weight = 1 / noise[use] ** 2
         scale = terms[use].max(axis=0) + MIN_DIVISOR
         variance = depth[use] ** 2 / UNWORN_VARIANCE_RATIO
-        factors = nnls(terms[use] / scale * weight[:, None], variance * weight)[0] / scale
+        factors = (
+            solve_non_negative(terms[use] / scale * weight[:, None], variance * weight) / scale
+        )
         noise = np.sqrt(np.maximum(terms @ factors, (MIN_NOISE_OVER_SCALE * sigma) ** 2))
     return noise
+
+
+def solve_non_negative(columns, values) -> np.ndarray:
+    """Solve a linear least-squares problem with non-negative factors, for few columns.
+
+    The solution is that of least squares for some subset of the columns, so all subsets are tried. SciPy's `nnls` would
+    import the whole of `scipy.optimize`, which takes longer than the comparison of two traces.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+        Functions that are combined, with k of at most about 5.
+    values : (n,) array
+        Values that the combination fits.
+
+    Returns
+    -------
+    (k,) array
+        Factors, at least 0.
+    """
+    normal = columns.T @ columns
+    right = columns.T @ values
+    best = np.zeros(len(right))
+    lowest = 0.0
+    for size in range(1, len(right) + 1):
+        for subset in combinations(range(len(right)), size):
+            chosen = list(subset)
+            part = np.linalg.lstsq(normal[np.ix_(chosen, chosen)], right[chosen], rcond=None)[0]
+            # Change of half the sum of squared residuals from that of zero factors
+            change = -0.5 * float(right[chosen] @ part)
+            if (part >= 0).all() and change < lowest:
+                lowest = change
+                best = np.zeros(len(right))
+                best[chosen] = part
+    return best

@@ -28,18 +28,21 @@ def find_sure_loss(depths: DepthMap) -> float:
     return float(HALF_WIDTH_95 * student[1] / student[0])
 
 
-def measure_sharp_loss(depths: DepthMap) -> float:
-    """Return the area [m2] or volume [m3] lost from worn tops, measured from the unworn heights around them.
+def measure_sharp_loss(depths: DepthMap) -> tuple[float, float]:
+    """Return the area [m2] or volume [m3] lost from worn tops and its standard deviation.
 
-    No drift is so sharp, so that this loss is wear beyond doubt. `depths` are those of a trace or a scan.
+    It is measured from the unworn heights around the tops. No drift is so sharp, so that this loss is wear beyond doubt.
+    `depths` are those of a trace or a scan.
     """
     if not depths.worn.any():
-        return 0.0
+        return 0.0, 0.0
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
     relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
     height = (depths.before + depths.after) / 2 / depths.noise_level
-    tops = find_worn_tops(relative, height, HALF_WIDTH_95 * depths.errors.model)
-    return float((relative * depths.noise)[tops].sum()) * depths.cell
+    tops = find_worn_tops(relative, height, HALF_WIDTH_95 * depths.errors.gain)
+    value = float((relative * depths.noise)[tops].sum()) * depths.cell
+    noise = np.sqrt(depths.errors.correlation * (depths.noise[tops] ** 2).sum()) * depths.cell
+    return value, float(np.hypot(noise, depths.errors.gain * value))
 
 
 def judge_change(

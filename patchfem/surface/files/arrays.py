@@ -8,8 +8,8 @@ import io
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs import matlab
 from ...inputs.damage import refuse_damage, shorten
-from ...inputs.matlab import read_real_arrays
 from .content import DAMAGED_FILE_REMEDY, Content
 from .table import Table
 from .units import HEADER_EXAMPLE
@@ -36,7 +36,7 @@ def read_mat(content: Content) -> Table:
     The matrix has two or three columns.
     """
     path = content.path
-    arrays = read_real_arrays(path, content.data)
+    arrays = matlab.read_real_arrays(path, content.data)
     by_name = {name.lower(): array for name, array in arrays.items()}
     height = next((name for name in HEIGHT_ARRAY_NAMES if name in by_name), None)
     if not height or "x" not in by_name:

@@ -25,6 +25,7 @@ VERDICTS = {
     "worn_and_grown": {"grown": 40e-12, "lost": 35e-12},
     "growth_at_ends": {"scar_depth": 2e-6, "growth_height": 2.1e-6},
     "scar_or_bow": {"scar_depth": 2e-6},
+    "scar_or_step": {"scar_depth": 2e-7},
     "scar_or_drift": {"scar_depth": 2e-8},
     "elsewhere": {},
     "no_datum": {"unworn": 0.12},

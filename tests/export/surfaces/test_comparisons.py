@@ -15,12 +15,13 @@ from patchfem.export.surfaces import compare, sentences
 
 # what the first sentence must state for each code of the verdict
 STATED = {
-    "worn": "Worn depth 500.0 nm (494.3 to 505.8), the mean of the lost material over the common length.",
+    "worn": "Worn depth 500.0 nm (495.9 to 504.2), the mean of the lost material over the common length.",
     "no_wear": "No wear is shown: the mean worn depth over the common length is at most 12 nm.",
     "grown": "40 um^2 stand above the first surface, 0 um^2 are lost",
     "worn_and_grown": "the mean of the lost material over the common length, and material grew: 35 um^2 lost",
     "growth_at_ends": "a scar of 2 um over the rest of the surface, or 2.1 um of material that grew at the ends: both are",
     "scar_or_bow": "Either a scar over all of the surface, up to 2 um deep on average, or a bent datum",
+    "scar_or_step": "Either a scar of 200 nm that reaches beyond the end of the traces, or a jump of the datum",
     "scar_or_drift": "Either wear of 20 nm, the mean over the",
     "elsewhere": "Not comparable: no common part of both surfaces is found",
     "no_datum": "too few heights agree (0.12 of all)",

@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+from command_line import modules_after
+from scipy import optimize
 from scipy.ndimage import gaussian_filter1d
+from traces import write_traces
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Options, Profile
-from patchfem.surface.compare.compare import compare_surfaces
+from patchfem.surface.compare.compare import compare_files, compare_surfaces
+from patchfem.surface.compare.fit import solve_non_negative
 
 UM = 1e-6
 NM = 1e-9
@@ -174,6 +178,34 @@ def test_exact_deep_track_at_another_place_is_measured_below_its_flanks():
     assert found.values["shift"].value is None
 
 
+def test_always_valley_of_another_place_is_no_track(tmp_path):
+    """Two unworn places, of which the second has a wide valley, are not comparable: it may be as deep as they are rough."""
+    paths = write_traces("elsewhere", 20261133, tmp_path, ("before", "after"))
+    found = compare_files(*paths)
+    assert found.verdict.code == "elsewhere" and not found.tracks
+    assert not has_finding(found, "no_old_surface_left")
+
+
+def test_always_comparison_imports_no_optimizers(tmp_path):
+    """SciPy's optimizers, whose import takes longer than a comparison, are not imported."""
+    paths = write_traces("groove", 30077, tmp_path, ("before", "after"))
+    code = (
+        "import json, sys; from pathlib import Path; from patchfem.surface.compare.compare import compare_files; "
+        "compare_files(*map(Path, sys.argv[1:])); print(json.dumps(list(sys.modules)))"
+    )
+    assert not {"scipy.optimize", "scipy.sparse"} & modules_after(code, *paths)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_exact_non_negative_least_squares_agrees_with_scipy(seed):
+    """The factors are those of `scipy.optimize.nnls`, also where some of them are 0."""
+    random = np.random.default_rng(seed)
+    columns = random.normal(size=(40, 3)) + 0.5
+    values = columns @ random.normal(size=3) + 0.1 * random.normal(size=40)
+    expected = optimize.nnls(columns, values)[0]
+    assert solve_non_negative(columns, values) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
 def test_exact_known_shift_is_used():
     """A known shift places traces that no search could place."""
     worn = make_parabola(0.2 * UM, 1500, 2500)
@@ -224,6 +256,25 @@ def test_always_scar_like_a_parabola_may_be_a_bow():
     assert found.verdict.code in ("worn", "growth_at_ends")
 
 
+def test_always_low_scar_like_a_parabola_may_be_a_bow():
+    """A parabola over all of the trace, hardly higher than the waves, is no "no wear" either."""
+    found = compare_surfaces(*make_pair(make_parabola(0.7 * UM, 0, 4000)))
+    assert found.verdict.code == "scar_or_bow"
+    assert found.verdict.numbers["scar_depth"] == pytest.approx(0.467 * UM, rel=0.1)
+
+
+def test_exact_clean_pair_has_narrow_intervals():
+    """With a noise of 5 nm in 1 um, area and largest depth are known to .5 and 1.5 % on either side."""
+    worn = make_parabola(UM, 1500, 2500)
+    values = compare_surfaces(*make_pair(worn)).values
+    for name, true, limit in (
+        ("worn_area", worn.sum() * UM, 5e-3),
+        ("worn_depth_max", UM, 1.5e-2),
+    ):
+        assert values[name].low <= true <= values[name].high, name
+        assert values[name].high - values[name].low < 2 * limit * true, name
+
+
 def test_always_transfer_of_equal_area_is_worn_and_grown():
     """Material lost at one place and built up at another one is stated as both."""
     change = make_parabola(UM, 600, 1400) - make_parabola(UM, 2400, 3200)
@@ -247,13 +298,21 @@ def test_exact_pile_up_is_measured_beside_the_track():
 
 def test_exact_cut_track_has_no_end_beyond_the_trace():
     """A track that leaves the common part has one end, and a width without upper limit."""
-    worn = np.zeros(4000)
-    worn[2500:] = UM
+    worn = UM * np.clip((np.arange(4000) - 2500) / 100, 0, 1)
     found = compare_surfaces(*make_pair(worn))
     assert found.verdict.code == "worn"
     assert found.track.cut == (False, True)
     assert found.track.values["to"].reason == "cut_off" and found.track.values["width"].high is None
     assert found.track.values["from"].value == pytest.approx(2500 * UM, abs=6 * UM)
+
+
+@pytest.mark.parametrize("depth", [0.1 * UM, UM])
+def test_always_step_to_the_end_of_a_trace_may_be_a_jump_of_the_datum(depth):
+    """A step without a flank that reaches an end is a scar or a jump of the datum: its height is stated, no depth."""
+    found = compare_surfaces(*make_pair(depth * (np.arange(4000) > 2500)))
+    assert found.verdict.code == "scar_or_step"
+    assert found.verdict.numbers["scar_depth"] == pytest.approx(depth, rel=0.02)
+    assert found.values["worn_depth_mean"].reason == "scar_or_step" and not found.tracks
 
 
 def test_exact_spikes_and_dropouts_are_left_out():
