@@ -33,7 +33,9 @@ from .return_maps_kernels import (
 LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 MAX_TRIALS = 60  # Newton steps and bisections for the increment of a step
-CASE_RESIDUAL = 1e-7  # residual of a step relative to its increments
+# Residual of a step relative to its increments. The residuals of successive steps have the same sign, so that the error of
+# a motion is some ten times as large; it must stay far below that of the steps.
+CASE_RESIDUAL = 1e-10
 GAUSS_POINT = (
     0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
@@ -80,7 +82,7 @@ def solve_step(free, response, dt, case, now, numbers, memory, j):
     -------
     (float, float, float, float, float)
         Increment [m], velocity at the end [m/s], path-mean force [N], its time mean [N], and the distance of the path mean
-        from the mean of the forces at both ends [N].
+        from the mean of the forces at both ends [N], inf without convergence.
     """
     # Increment and velocity per unit of a constant force, and of a force that changes as t/dt - 1/2. Columns 2 and 3 of
     # the response belong to accelerations 1 and t.
@@ -102,6 +104,7 @@ def solve_step(free, response, dt, case, now, numbers, memory, j):
     change = 0.0
     time_mean = force
     mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
+    is_solved = False
 
     # Newton's method; the step falls back to bisection where it would leave the bracket.
     for _ in range(MAX_TRIALS):
@@ -118,6 +121,7 @@ def solve_step(free, response, dt, case, now, numbers, memory, j):
             time_mean += elastic / dq * bend
         residual = dq - free[0] + beta * time_mean + tilt * change
         if abs(residual) <= CASE_RESIDUAL * (abs(free[0]) + abs(dq)):
+            is_solved = True
             break
         if residual > 0:
             high = dq
@@ -133,8 +137,9 @@ def solve_step(free, response, dt, case, now, numbers, memory, j):
         # Velocity and displacement at the end differ from the free ones by the same mean force.
         end = free[1] - gamma / beta * (free[0] - dq - tilt * change) - velocity_tilt * change
 
+    # A force that is steeper than the iteration can follow is resolved by shorter steps.
     bend = mean.bend if not follows_path else force - now[Now.FORCE] - 0.5 * change
-    return dq, end, force, time_mean, bend
+    return dq, end, force, time_mean, bend if is_solved else inf
 
 
 @njit(**NJIT_KERNEL)

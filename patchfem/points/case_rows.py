@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 # Change between two cycles relative to the range of the motion, below which it repeats
-SAME_CASE_CYCLE = 1e-8
+SAME_CASE_CYCLE = 1e-10
 
 
 class Number(IntEnum):

@@ -18,7 +18,15 @@ from ..convergence import (
 )
 from ..core import Measure
 from .measures import Measures, Values
-from .rows import AMPLITUDE, error_floor, find_definition, larger_term, select_names
+from .rows import (
+    SLIP_START_PHASE,
+    STICK_FRACTION,
+    error_floor,
+    find_definition,
+    larger_term,
+    select_names,
+    subtracted_terms,
+)
 
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
@@ -220,6 +228,12 @@ def split_errors(values: Values, errors) -> dict[str, Values]:
         for source, errors_by_name in errors:
             parts[source] = parts.get(source, 0.0) + errors_by_name.get(name, abs(value))
         parts_by_name[name] = parts
+
+    # Slip starts at the same instants that end the time of stick.
+    stick_parts = parts_by_name.get(STICK_FRACTION, {})
+    for source, error in parts_by_name.get(SLIP_START_PHASE, {}).items():
+        if source in stick_parts:
+            stick_parts[source] = max(stick_parts[source], error / np.pi)
     return parts_by_name
 
 
@@ -246,7 +260,7 @@ def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Meas
     return updated
 
 
-def total_error(name: str, values: Values, parts, min_relative_error: float):
+def total_error(name: str, values: Values, parts, min_relative_error):
     """Return the total error of a measure, of one run or of n runs.
 
     The round-off of a small difference of large terms is added: of a friction force whose first harmonic lags the slide by
@@ -260,7 +274,7 @@ def total_error(name: str, values: Values, parts, min_relative_error: float):
         Values by name, each a float or (n,).
     parts : sequence
         Errors by source that are added.
-    min_relative_error : float
+    min_relative_error : float or (n,)
         Relative error that is added [1].
     """
     value = values[name]
@@ -269,7 +283,7 @@ def total_error(name: str, values: Values, parts, min_relative_error: float):
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))
-    if name == "drift_per_cycle":  # a difference of mean values has their round-off
-        amplitude = np.abs(values.get(AMPLITUDE, 0.0))
-        return error + max(DIFFERENCE_ROUND_OFF, min_relative_error) * amplitude
-    return error + DIFFERENCE_ROUND_OFF * larger_term(name, values)
+    error = error + DIFFERENCE_ROUND_OFF * larger_term(name, values)
+    return error + np.maximum(DIFFERENCE_ROUND_OFF, min_relative_error) * subtracted_terms(
+        name, values
+    )

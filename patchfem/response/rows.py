@@ -235,6 +235,8 @@ def _random_rows(
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
+STICK_FRACTION = "stick_fraction"
+SLIP_START_PHASE = "slip_start_phase"
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
 UNIT_LARGER_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
@@ -662,6 +664,28 @@ def larger_term(name: str, values: Values):
     if row.larger_term is None:
         return 0.0
     return row.larger_term[1](_find_own_values(name, values))
+
+
+def subtracted_terms(name: str, values: Values):
+    """Return the size of the terms whose round-off a difference has, in the unit of the measure; 0 of other measures.
+
+    The drift is a difference of positions, and the secant stiffness one of friction forces over the range of the slide.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measure.
+    values : dict
+        Values by name of one run, or (n,) of n runs.
+    """
+    amplitude = np.abs(values.get(AMPLITUDE, 0.0))
+    if name == "drift_per_cycle":
+        return amplitude
+    if name == "secant_stiffness":
+        force = np.abs(values.get("friction_force_peak", 0.0))
+        ratio = force / np.maximum(amplitude, np.finfo(float).tiny)
+        return np.where(amplitude > 0, ratio, 0.0)[()]
+    return 0.0
 
 
 def _find_own_values(name: str, values: Values) -> Values:

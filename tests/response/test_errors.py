@@ -7,6 +7,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 import patchfem as pf
 from patchfem.convergence import ERROR_SAFETY_FACTOR
 from patchfem.response import convergence_errors
+from patchfem.response.errors import add_errors
 
 NAME = "relative_displacement_amplitude"
 
@@ -68,3 +69,26 @@ def test_always_errors_of_march_that_ends_between_whole_steps(law, steps, cycles
         if measure.error is not None and truth.value is not None:
             allowed = measure.error + truth.error + measure.floor
             assert abs(measure.value - truth.value) <= allowed, name
+
+
+def test_exact_stick_fraction_has_error_of_instants_at_which_slip_starts():
+    """The error of the stick fraction is at least that of the phase at which slip starts, divided by pi, by source."""
+    values = {"stick_fraction": 0.4774, "slip_start_phase": 1.8666}
+    errors = [
+        ("mesh", {"stick_fraction": 5.6e-4, "slip_start_phase": 2.8e-3}),
+        ("own", dict.fromkeys(values, 1e-6)),
+    ]
+    measures = add_errors(values, errors)
+    assert measures["stick_fraction"].error == pytest.approx(2.8e-3 / np.pi + 1e-6)
+    assert measures["slip_start_phase"].error == pytest.approx(2.801e-3)
+
+
+def test_exact_secant_stiffness_of_zero_has_round_off_of_forces():
+    """The secant stiffness of a law of the velocity, 0 up to the round-off of the forces, has an error that contains 0."""
+    values = {
+        "relative_displacement_amplitude": 4.6e-5,
+        "friction_force_peak": 7.9,
+        "secant_stiffness": 7.6e-13,
+    }
+    measure = add_errors(values, [("own", dict.fromkeys(values, 1.4e-13))])["secant_stiffness"]
+    assert measure.value < measure.error < 1e-6

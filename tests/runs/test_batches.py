@@ -104,8 +104,8 @@ def test_exact_batch_agrees_with_single_runs(kind):
 def test_always_95_of_100_measures_lie_within_both_errors(law):
     """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors.
 
-    Motion, stick and forces differ by a quarter of the tolerance at most, and 99 of 100 measures by five times the errors,
-    also where a change between two marches is small by accident, or where the secant stiffness of `tanh` is 0.
+    Motion, stick and forces meet the tolerance. 99 of 100 measures differ by at most five times the errors, also where a
+    change between two marches is small by accident, or where the secant stiffness of `tanh` is 0.
     """
     cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
@@ -122,7 +122,7 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
         is_known = np.isfinite(expected)
         allowed = cases[0].accuracy.tolerance * np.abs(expected) + singles.floors[name]
         difference = np.abs(results.values[name] - expected)
-        assert (difference <= 0.25 * allowed)[is_known].all(), name
+        assert (difference <= allowed)[is_known].all(), name
         n_compared += is_known.any()
     assert n_compared >= 4
 

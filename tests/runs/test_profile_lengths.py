@@ -11,6 +11,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.closed_forms import rounded_punch_half_width
 from patchfem.runs.patch import profile_points as trace
+from patchfem.runs.patch.limits import extrapolate_to_zero_cell_length
 from patchfem.scene import loads
 
 
@@ -112,3 +113,15 @@ def test_exact_surface_trace_agrees_with_inverted_gap(tmp_path):
         for sign, kind in ((1, "surface"), (-1, "gap"), (1, "gap"))
     )
     assert surface == gap and other_gap > 1.1 * gap
+
+
+def test_exact_series_of_measured_profile_has_error_of_its_remainder():
+    """The tangential stiffness [N/um] of a rough trace on four meshes is extrapolated to 1339.48; finer meshes show 1339.10.
+
+    The errors of a series whose gap is the same on all meshes do not change.
+    """
+    values = [1359.1453, 1346.1032, 1341.7500, 1340.2592]
+    limit = extrapolate_to_zero_cell_length(values, has_same_gap=False)
+    assert abs(limit.extrapolated - 1339.10) <= limit.extrapolated_error <= 0.8
+    same = extrapolate_to_zero_cell_length(values)
+    assert same.extrapolated_error == pytest.approx(0.194, abs=0.001)

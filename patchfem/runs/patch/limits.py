@@ -41,14 +41,17 @@ class Limit(NamedTuple):
     extrapolated_error: float
 
 
-def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
+def extrapolate_to_zero_cell_length(
+    values, nested: bool = True, *, has_same_gap: bool = True
+) -> Limit:
     """Extrapolate values on successively refined meshes to vanishing cell length.
 
     Three values give a ratio of successive changes. It is regular between MIN_CONVERGING_RATIO_OF_CHANGES and
     MAX_REGULAR_RATIO_OF_CHANGES. The value is then extrapolated by the remainder of the geometric series, and the error
     of the value on the finest mesh is REGULAR_SERIES_ERROR_FACTOR times this remainder. The error of the
     extrapolated value is a quarter of the remainder, half of it if the ratio is below MIN_EXPECTED_RATIO_OF_CHANGES; it
-    is at least the change of the extrapolated value by the last refinement, and doubled if this is unknown.
+    is at least the change of the extrapolated value by the last refinement, and doubled if this is unknown. It is the whole
+    remainder if each mesh has another gap, because the changes then do not become a geometric series.
 
     If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_SERIES_ERROR_FACTOR times the last
     change, or a fraction of the change before if that is larger. With two values the error is twice their
@@ -61,6 +64,8 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
         Values from the coarsest to the finest mesh, two or more.
     nested : bool
         Whether each mesh halves the cells of the previous one.
+    has_same_gap : bool
+        Whether the gap is the same on all meshes; the means of a measured profile over the cells are not.
 
     Returns
     -------
@@ -99,6 +104,8 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     else:
         change = abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
         extrapolated_error = max(extrapolated_error, change)
+    if not has_same_gap:
+        extrapolated_error = max(extrapolated_error, abs(remainder))
     return Limit(
         finest, REGULAR_SERIES_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error
     )

@@ -105,6 +105,7 @@ def estimate_static_measures(
             all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
             max(MIN_REPORTED_RELATIVE_ERROR, fine.pair.round_off_error),
             UNRESOLVED_ROUNDING_ERROR_FACTOR if missed_peak else 1.0,
+            has_same_gap=fine.model.gap.profile is None,
         )
     else:
         error = 0.0 if coarse else None
@@ -235,6 +236,8 @@ def extrapolate_static_measures(
     nested: bool = True,
     min_relative_error: float = MIN_REPORTED_RELATIVE_ERROR,
     error_factor: float = 1.0,
+    *,
+    has_same_gap: bool = True,
 ) -> Measures:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
@@ -255,6 +258,8 @@ def extrapolate_static_measures(
         Lower bound of the relative errors.
     error_factor : float
         Factor on all errors.
+    has_same_gap : bool
+        Whether the gap is the same on all meshes, which that of a measured profile is not.
 
     Returns
     -------
@@ -263,7 +268,8 @@ def extrapolate_static_measures(
     """
     out = {}
     for name, finest in values_by_mesh[-1].items():
-        limit = extrapolate_to_zero_cell_length([values[name] for values in values_by_mesh], nested)
+        series = [values[name] for values in values_by_mesh]
+        limit = extrapolate_to_zero_cell_length(series, nested, has_same_gap=has_same_gap)
         hidden = hidden_errors.get(name, 0.0)
 
         # The limit replaces the value only if it is needed and has the smaller error.
