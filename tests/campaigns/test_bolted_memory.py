@@ -13,7 +13,7 @@ MATERIALS = {"steel": (210e9, 0.3), "Ti-8Al-1Mo-1V": (120e9, 0.32), "aluminium":
 
 
 def make_joint(number: int) -> str:
-    """Return the scene of a random bolted joint: tilted if `number` is even, with the tolerance 1e-4 in every second pair."""
+    """Return the scene of a random bolted joint, tilted if `number` is even; every second pair has the tolerance 1e-4."""
     rng = np.random.default_rng([SEED, number])
 
     def draw(low: float, high: float) -> float:
