@@ -13,7 +13,10 @@ from ..core import NotConverged, frozen_array
 from ..formatting import format_length
 from ..mesh import pieces
 from ..mesh.elements import ELEMENTS, Element
-from .fronts import CellBlock, Fronts, condense_to_interface
+from .fronts import MIN_SAFE_PIVOT, CellBlock, Fronts, condense_to_interface
+
+# Cells whose stiffness is integrated at once: the terms of this many cells need 40 MB
+MAX_INTEGRATED_CELLS = 20_000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -176,21 +179,43 @@ class Piece:
             If the stiffness is singular to working precision; the message says what to change.
         """
         if "factor" not in self.computed:
-            mesh = self.mesh
-            is_fixed = np.zeros((mesh.n_nodes, 2), bool)
-            is_fixed[mesh.far] = True
-            if self.guided is not None:
-                x = mesh.points[:, 0]
-                is_fixed[(x == x.min()) | (x == x.max()), self.guided] = True
-            try:
-                factor = condense_to_interface(
-                    self._stiffness_blocks(), mesh.cell_positions, mesh.interface, is_fixed
-                )
-                self.computed["round_off_error"] = factor.estimate_round_off()
-            except NotConverged as error:
-                raise NotConverged(f"{error}; {self._describe_remedy()}") from None
-            self.computed["factor"] = factor
+            self.computed["factor"] = self._condense(keep_fronts=True)
         return self.computed["factor"]
+
+    def compute_compliance(self) -> np.ndarray:
+        """Return the compliance (2 m, 2 m) [m2/N] of the interface without keeping the factors of the piece.
+
+        The order of its rows is that of `Fronts.compliance`.
+        """
+        if "factor" in self.computed:
+            return self.factor.compliance
+        condensed = self._condense(keep_fronts=False)
+        # Only the factors show the round-off error, and a piece with one needs them.
+        if condensed.smallest_pivot <= MIN_SAFE_PIVOT:
+            return self.factor.compliance
+        return condensed.compliance
+
+    def _condense(self, *, keep_fronts: bool) -> Fronts:
+        """Condense the piece to its interface; with fronts, also estimate its round-off error."""
+        mesh = self.mesh
+        is_fixed = np.zeros((mesh.n_nodes, 2), bool)
+        is_fixed[mesh.far] = True
+        if self.guided is not None:
+            x = mesh.points[:, 0]
+            is_fixed[(x == x.min()) | (x == x.max()), self.guided] = True
+        try:
+            condensed = condense_to_interface(
+                self._stiffness_blocks(),
+                mesh.cell_positions,
+                mesh.interface,
+                is_fixed,
+                keep_fronts=keep_fronts,
+            )
+            if keep_fronts:
+                self.computed["round_off_error"] = condensed.estimate_round_off()
+        except NotConverged as error:
+            raise NotConverged(f"{error}; {self._describe_remedy()}") from None
+        return condensed
 
     @property
     def round_off_error(self) -> float:
@@ -205,7 +230,12 @@ class Piece:
         for kind, cells in self.mesh.blocks.items():
             lam, mu = constants[:, n_cells : n_cells + len(cells)]
             n_cells += len(cells)
-            matrices = compute_stiffness(self.mesh.points, cells, ELEMENTS[kind], lam, mu)
+            matrices = np.empty((len(cells), 2 * cells.shape[1], 2 * cells.shape[1]))
+            for begin in range(0, len(cells), MAX_INTEGRATED_CELLS):
+                part = slice(begin, begin + MAX_INTEGRATED_CELLS)
+                matrices[part] = compute_stiffness(
+                    self.mesh.points, cells[part], ELEMENTS[kind], lam[part], mu[part]
+                )
             out.append(CellBlock(cells, matrices))
         return out
 
@@ -332,9 +362,12 @@ class InterfaceCompliance(NamedTuple):
     nt: np.ndarray
 
 
-def compute_interface_compliance(piece: Piece) -> InterfaceCompliance:
-    """Compute the compliances of a piece at its interface, per unit width."""
-    both = piece.factor.compliance
+def compute_interface_compliance(piece: Piece, *, keep_factor: bool = True) -> InterfaceCompliance:
+    """Compute the compliances of a piece at its interface, per unit width.
+
+    `keep_factor` tells whether the piece keeps its factors, with which the displacements inside it are computed.
+    """
+    both = piece.factor.compliance if keep_factor else piece.compute_compliance()
     along = slice(0, None, 2)
     inward = slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])

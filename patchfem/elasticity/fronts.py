@@ -59,7 +59,7 @@ class Fronts:
     """Factors of the stiffness of a piece with n nodes, of which m lie on the interface.
 
     - ``blocks``: cells, in which fixed displacements are decoupled
-    - ``fronts``: fronts in the order of elimination
+    - ``fronts``: fronts in the order of elimination; empty if only the compliance is wanted
     - ``interface``: (m,) nodes
     - ``compliance``: (2 m, 2 m) displacements of the interface per unit force on it [m2/N], node by node along x and
       inward
@@ -190,19 +190,23 @@ def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
     return parts, leaves
 
 
-def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
+def condense_to_interface(
+    blocks: list[CellBlock], positions, interface, is_fixed, *, keep_fronts: bool = True
+) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
     ----------
     blocks : list of CellBlock
-        Stiffnesses of the t cells, by element.
+        Stiffnesses of the t cells, by element, in which the fixed displacements are then decoupled.
     positions : (t, 2) ndarray
         Positions of the cells, by which they are divided.
     interface : (m,) ndarray of int
         Nodes that remain.
     is_fixed : (n, 2) ndarray of bool
         Fixed displacements; none of them belongs to the interface unless the compliance there is not used.
+    keep_fronts : bool
+        Whether to keep the fronts, with which displacements inside the piece are computed. They need some 3 kB per node.
 
     Returns
     -------
@@ -214,7 +218,8 @@ def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixe
         If the stiffness is not positive definite.
     """
     # A node is eliminated in the smallest part that contains all of its cells
-    blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
+    for block in blocks:
+        _decouple_fixed(block, is_fixed)
     parts, leaves = _bisect_cells(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
@@ -223,6 +228,7 @@ def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixe
     # Halves stand before their part, so their stiffnesses are ready when the part is reached
     stiffnesses = {}
     fronts = []
+    smallest_pivots = []
     with use_one_blas_thread():
         for number, part in enumerate(parts):
             if part.halves:
@@ -238,7 +244,9 @@ def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixe
             add_terms = _add_stiffnesses if part.halves else _assemble_cells
             matrix = add_terms(terms, order, position)
             front, stiffnesses[number] = _eliminate(own, boundary, matrix)
-            fronts.append(front)
+            smallest_pivots.append(front.smallest_pivot)
+            if keep_fronts:
+                fronts.append(front)
 
         # The last stiffness is the Schur complement; its rows and columns are put in the order of the interface
         nodes, schur = stiffnesses[len(parts) - 1]
@@ -246,24 +254,21 @@ def condense_to_interface(blocks: list[CellBlock], positions, interface, is_fixe
         unknowns = _number_unknowns(position[interface])
         factor, pivot = _factorise(schur.take(unknowns, 0).take(unknowns, 1))
         compliance = cho_inverse(factor)
-    smallest_pivot = min([pivot, *(front.smallest_pivot for front in fronts)])
+    smallest_pivot = min(pivot, *smallest_pivots)
     return Fronts(blocks, fronts, interface, compliance, len(is_fixed), smallest_pivot)
 
 
-def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
-    """Return cells in which the fixed displacements are decoupled, with a stiffness of 1 on the diagonal.
+def _decouple_fixed(block: CellBlock, is_fixed) -> None:
+    """Decouple the fixed displacements in the stiffness of each cell of a block, with 1 on the diagonal.
 
-    `is_fixed` (N, 2) tells which displacements are 0. The rows and columns of these in the stiffness of each cell of the
-    `block` become 0.
+    `is_fixed` (N, 2) tells which displacements are 0. Their rows and columns become 0.
     """
     is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
     cells = np.flatnonzero(is_fixed.any(axis=1))
     is_free = ~is_fixed[cells]
-    matrices = block.matrices.copy()
-    matrices[cells] *= is_free[:, :, None] & is_free[:, None]
+    block.matrices[cells] *= is_free[:, :, None] & is_free[:, None]
     cell, unknown = np.nonzero(is_fixed)
-    matrices[cell, unknown, unknown] = 1.0
-    return block._replace(matrices=matrices)
+    block.matrices[cell, unknown, unknown] = 1.0
 
 
 def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:

@@ -30,8 +30,8 @@ MAX_FIXED_STEP_HALVINGS = 4
 USE_ERROR_ADVICE = "use the value with its stated error"
 ELEMENT_SIZE_KEY = "contact.element_size"
 STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
-# Ratio of the proposed accuracy.max_seconds to the expected CPU time, which varies by tens of per cent.
-MAX_SECONDS_MARGIN = 2.0
+# Ratio of a proposed limit to the expected CPU time, which varies by tens of per cent, or to the expected memory.
+LIMIT_MARGIN = 2.0
 
 
 class Missed(NamedTuple):
@@ -74,8 +74,8 @@ class Missed(NamedTuple):
         """Named measure with the largest ratio of error to allowed error."""
         return max(self.find_names(), key=self.excess.get)
 
-    def is_time_short(self, axis: str) -> bool:
-        """Return whether accuracy.max_seconds ended the refinement along an axis, such as "mesh" or "steps"."""
+    def is_limited(self, axis: str) -> bool:
+        """Return whether a limit of time or memory ended the refinement along an axis, such as "mesh" or "steps"."""
         shortage = self.result.shortage
         return shortage is not None and shortage.axis == axis
 
@@ -196,8 +196,8 @@ def _advise_mesh(
         return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
     if not all(patch_model.mesh.is_automatic for patch_model, _ in solved):
         return Advice(f"{cause}leave out {ELEMENT_SIZE_KEY}", ELEMENT_SIZE_KEY)
-    if missed.is_time_short("mesh"):
-        return _advise_time(missed, "finer meshes", cause)
+    if missed.is_limited("mesh"):
+        return _advise_limit(missed, "finer meshes", cause)
     if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
         return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
@@ -211,17 +211,21 @@ def _advise_mesh(
     return Advice(text, "accuracy.tolerance", tolerance)
 
 
-def _advise_time(missed: Missed, purpose: str, cause: str = "") -> Advice:
-    """Return the advice to raise accuracy.max_seconds to the CPU time that a finer run needs.
+def _advise_limit(missed: Missed, purpose: str, cause: str = "") -> Advice:
+    """Return the advice to raise the limit that ended the refinement to what a finer run needs.
 
-    `purpose` says what the time is for, such as "smaller time steps". `cause` is a clause at the beginning of the advice.
+    `purpose` says what the time or memory is for, such as "smaller time steps". `cause` is a clause at the beginning of the
+    advice.
     """
-    # The proposed time has two significant digits.
-    seconds = MAX_SECONDS_MARGIN * missed.result.shortage.seconds
-    unit = 10.0 ** (floor(log10(seconds)) - 1)
-    limit = unit * ceil(seconds / unit)
-    text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for {purpose}"
-    return Advice(text, "accuracy.max_seconds", limit)
+    # The proposed limit has two significant digits.
+    shortage = missed.result.shortage
+    needed = LIMIT_MARGIN * shortage.needed
+    unit = 10.0 ** (floor(log10(needed)) - 1)
+    limit = unit * ceil(needed / unit)
+    value = format_number(limit, 2)
+    if shortage.key == "accuracy.max_memory":
+        value = f'"{format_number(limit / 1e9, 2)} GB"'
+    return Advice(f"{cause}set {shortage.key} = {value} for {purpose}", shortage.key, limit)
 
 
 def _advise_on_motion(missed: Missed) -> Advice:
@@ -232,8 +236,8 @@ def _advise_on_motion(missed: Missed) -> Advice:
     """
     name = missed.worst
     axis = refine.find_axis(missed.measures[name], name)
-    if axis != "mesh" and missed.is_time_short(axis):
-        return _advise_time(missed, "smaller time steps")._replace(axis=axis)
+    if axis != "mesh" and missed.is_limited(axis):
+        return _advise_limit(missed, "smaller time steps")._replace(axis=axis)
     advise = ADVICE_BY_AXIS.get(axis)
     advice = None if advise is None else advise(missed)
     if advice is not None:

@@ -15,7 +15,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..convergence import convergence_error
 from ..core import frozen_array
@@ -74,15 +73,24 @@ def solve_without_joint(model: Model) -> FreeRig:
     return remove_joint(model, solve_patch(model))
 
 
-def solve_patch(model: Model) -> Patches:
+def solve_patch(model: Model, solved: Patches = ()) -> Patches:
     """Return the patch of a model on its meshes, from fine to coarse.
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a rig with a patch.
+    solved : tuple
+        Patches of an earlier pass, from fine to coarse, whose meshes are refined further.
     """
-    solve = partial(mesh_levels.solve_with_coarser, model.patch, model.accuracy.tolerance)
-    if not model.has_bolted_patch:
+    tolerance = model.accuracy.tolerance
+    solve = partial(mesh_levels.solve_with_coarser, model.patch, tolerance, solved=solved)
+    # The joint of a model may have been subtracted already.
+    if model.rig is None or model.rig.structure.bolted is None:
         return solve()
-    key = ("bolted patch", store.content_key(model.patch), model.accuracy.tolerance)
+    key = ("bolted patch", store.content_key(model.patch), tolerance)
     return store.get_or_compute(key, solve)
 
 
@@ -281,6 +289,10 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
 
     if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
+
+    # scipy.optimize takes half a second to import, and most joints have no bonds and no strips.
+    from scipy.optimize import brentq
+
     factor = np.exp(
         brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
     )

@@ -5,15 +5,16 @@ change.
 """
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 from .. import structure
 from ..core import Missing
+from . import refine
 from .plan import Plan
 from .rig import engines, numerics
 
-PROGRAM_BYTES = 160e6  # packages and compiled code [bytes]
 BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them [bytes]
 BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion [bytes]
 BYTES_PER_STRIP_NODE = 3e3  # per strip and interface node [bytes]
@@ -77,7 +78,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
 
     size = nodes * (BYTES_PER_STATIC_NODE if model.kind == "patch" else BYTES_PER_MOVING_NODE)
     parts = [
-        MemoryPart(PROGRAM_BYTES, "packages and compiled code"),
+        MemoryPart(refine.PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),
     ]
     layers = [patch.interface.strips for patch in patches]
@@ -199,16 +200,43 @@ def _read_number(path: Path, name: str = "", place: int = 0) -> float:
         return float("nan")
 
 
-def refuse_insufficient_memory(plan: Plan) -> None:
-    """Raise Missing if a run would need more memory than is free, with the largest contribution and its remedy."""
+def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = None) -> None:
+    """Refuse a run that would need more memory than is free or than its scene allows.
+
+    A run that needs more than the default of accuracy.max_memory, which the scene does not give, is not refused.
+
+    Parameters
+    ----------
+    plan : Plan
+        Plan of the run.
+    say : callable, optional
+        Callback for a sentence on a run that needs more than the default.
+
+    Raises
+    ------
+    Missing
+        With the largest contribution and its remedy.
+    """
     parts = list_parts(plan)
-    free = free_bytes()
     total = sum(part.bytes for part in parts)
-    if total <= free:
+    free = free_bytes()
+    given = plan.model.accuracy.max_memory
+    if total <= min(free, given or refine.DEFAULT_MAX_BYTES):
         return
-    text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
+
+    limit = f"accuracy.max_memory allows {(given or refine.DEFAULT_MAX_BYTES) / 1e9:.3g} GB"
+    other_remedy = ", or raise accuracy.max_memory"
+    if total > free:
+        limit = f"only {max(free, 0.0) / 1e9:.2g} GB are free"
+        other_remedy = ""
+    text = f"about {total / 1e9:.3g} GB of memory are needed, but {limit}"
     largest = next(part for part in parts if part.remedy)
     if largest.bytes < 0.1 * total:
-        raise Missing(f"{text}; free some memory, or run on a machine with more memory", "")
-    size = f"{largest.bytes / 1e9:.3g} GB"
-    raise Missing(f"{text}; {size} of these are for {largest.what}: {largest.remedy}", "")
+        text += "; free some memory, or run on a machine with more memory"
+    else:
+        size = f"{largest.bytes / 1e9:.3g} GB"
+        text += f"; {size} of these are for {largest.what}: {largest.remedy}{other_remedy}"
+    if total > free or given is not None:
+        raise Missing(text, "")
+    if say is not None:
+        say(text)

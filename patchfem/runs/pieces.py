@@ -11,6 +11,7 @@ import numpy as np
 from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
+from .patch.mesh_levels import select_pair_for_stress
 from .patch.strength import YIELDING_NEGLECTED, Strength, min_von_mises_ratio, yield_strength
 from .results.patch_rows import Arrays
 from .results.result import patch_surface
@@ -83,13 +84,15 @@ class _LoadedPiece(NamedTuple):
     error: recovery.StressError
 
 
-def compute_pieces(result) -> Pieces:
+def compute_pieces(result, pair=None) -> Pieces:
     """Compute displacement and stress of both pieces in the frames of a run.
 
     Parameters
     ----------
     result : Result
         A run with a solved patch.
+    pair : CondensedPair, optional
+        Pieces on whose mesh they are computed; by default `select_pair_for_stress`.
 
     Returns
     -------
@@ -97,10 +100,13 @@ def compute_pieces(result) -> Pieces:
     """
     patch = result.patch
     fields = result.fields
-    pair = patch.pair
-    low_forces, high_forces = _nodal_forces(patch, fields)
-    low = _load_piece(-1.0, pair.piece, *low_forces)
-    high = _load_piece(1.0, pair.upper, *high_forces)
+    pair = pair or select_pair_for_stress(patch)
+    low_forces, high_forces = _nodal_forces(patch, fields, pair)
+    recover = _Recoverer(pair.piece)
+    low = recover.load(-1.0, *low_forces)
+    if pair.upper is not pair.piece:
+        recover = _Recoverer(pair.upper)
+    high = recover.load(1.0, *high_forces)
     held = _holder_motion(patch, fields, high.cells.points)
     lower = _make_piece(low, high.error, 0.0)
     upper = _make_piece(high, low.error, held)
@@ -118,8 +124,8 @@ def compute_pieces(result) -> Pieces:
     return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
 
 
-def _nodal_forces(patch, fields: Arrays) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return shear and normal forces (1 + f, n) [N/m] on the nodes of the lower and upper piece.
+def _nodal_forces(patch, fields: Arrays, pair) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return shear and normal forces (1 + f, n) [N/m] on the nodes of the lower and upper piece of a CondensedPair.
 
     The first row is the pressed state, the others add to it in each frame. A frame of a worn patch
     has its own pressure.
@@ -130,25 +136,56 @@ def _nodal_forces(patch, fields: Arrays) -> list[tuple[np.ndarray, np.ndarray]]:
     shear = np.concatenate([none[:1], fields.get("shear_stress", none)])
     change = fields["normal_stress"] - pressed if "holder_closing" in fields else none
     normal = np.concatenate([pressed[None], change])
-    low_shear, high_shear = patch.pair.forces(shear * length)
-    low_normal, high_normal = patch.pair.forces(normal * length)
+    shear = shear * length
+    normal = normal * length
+    if pair is not patch.pair:
+        nodes = pair.compliance.interface.x
+        shear = _lump_forces(shear, patch.x, nodes)
+        normal = _lump_forces(normal, patch.x, nodes)
+    low_shear, high_shear = pair.forces(shear)
+    low_normal, high_normal = pair.forces(normal)
     return [(low_shear, low_normal), (-high_shear, high_normal)]
 
 
-def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
-    """Return a condensed piece with its displacement and stress under nodal forces [N/m].
+def _lump_forces(forces, x, nodes) -> np.ndarray:
+    """Distribute forces (f, m) at positions x (m,) [m] to the neighbouring ones of nodes (n,) [m] by the lever rule.
 
-    `sign` is -1 for the lower and 1 for the upper piece, and `piece` has y towards its inside. The forces `shear` and
-    `normal` (1 + f, n) act on the nodes of its face, and their first row is the pressed state.
+    Both are in ascending order and have the same ends. The sum of the forces and their moment stay.
     """
-    cells = recovery.get_cells(piece)
-    u = compute_displacement(piece, shear, normal)
-    motion = u[:1] + u[1:]
-    stress = recovery.compute_centre_stress(cells, motion)
-    gauss_points = recovery.make_points(cells, "gauss")
-    fit = recovery.fit_recovery(cells)
-    error = recovery.estimate_error(fit, motion, stress, gauss_points)
-    return _LoadedPiece(sign, cells, piece.mesh.pressure_nodes, u, stress, error)
+    after = np.clip(np.searchsorted(nodes, x), 1, nodes.size - 1)
+    fraction = (x - nodes[after - 1]) / (nodes[after] - nodes[after - 1])
+    out = np.zeros((nodes.size, len(forces)))
+    np.add.at(out, after, (forces * fraction).T)
+    np.add.at(out, after - 1, (forces * (1 - fraction)).T)
+    return out.T
+
+
+class _Recoverer:
+    """Recovery of the stress in a condensed piece, which serves both pieces if they are equal.
+
+    Parameters
+    ----------
+    piece : Piece
+        With y towards its inside.
+    """
+
+    def __init__(self, piece):
+        self.piece = piece
+        self.cells = recovery.get_cells(piece)
+        self.fit = recovery.fit_recovery(self.cells)
+        self.gauss_points = recovery.make_points(self.cells, "gauss")
+
+    def load(self, sign: float, shear, normal) -> _LoadedPiece:
+        """Return the piece with its displacement and stress under nodal forces [N/m].
+
+        `sign` is -1 for the lower and 1 for the upper piece. The forces `shear` and `normal` (1 + f, n) act on the nodes
+        of its face, and their first row is the pressed state.
+        """
+        u = compute_displacement(self.piece, shear, normal)
+        motion = u[:1] + u[1:]
+        stress = recovery.compute_centre_stress(self.cells, motion)
+        error = recovery.estimate_error(self.fit, motion, stress, self.gauss_points)
+        return _LoadedPiece(sign, self.cells, self.piece.mesh.pressure_nodes, u, stress, error)
 
 
 def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:

@@ -3,8 +3,9 @@
 In: a function that solves a problem with a resolution, and one that judges the solution. Each pass of `refine` has twice
 the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
 steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
-accuracy.max_seconds is not repeated; its result names the axis and the time that would be needed. The meshes of a single
-patch (`patch.mesh_levels`), curves, backbones and fits have loops of their own.
+accuracy.max_seconds, or whose next mesh would exceed accuracy.max_memory, is not repeated; its result names the axis and the
+time or memory that would be needed. The meshes of a single patch (`patch.mesh_levels`), curves, backbones and fits have
+loops of their own.
 """
 
 from collections.abc import Callable, Hashable, Iterable
@@ -21,8 +22,15 @@ from ..formatting import format_number
 from ..model.model import Model
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import PATCH_TABLE, Measures, Values
-from .results.result import TimeShortage
+from .results.result import Shortage
 
+# Memory [bytes] per node of a mesh whose factors are not kept, while its pieces are condensed; measured: 1.4e3 to 1.8e3
+CONDENSING_BYTES_PER_NODE = 1.8e3
+# Memory [bytes] per pair of interface nodes: compliances of the patch, their factors, and those of the coarser meshes;
+# measured: 110 without the motion
+BYTES_PER_INTERFACE_PAIR = 200.0
+PROGRAM_BYTES = 160e6  # Packages and compiled code [bytes].
+DEFAULT_MAX_BYTES = 2e9  # Memory [bytes] of a run without accuracy.max_memory.
 DEFAULT_MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 HALVED_MESH_COST_RATIO = 4.0  # Expected ratio of the CPU times of runs with half the element size.
 # The same of runs with twice the steps, or with a hundredth of the step error.
@@ -50,6 +58,7 @@ class Verdict(NamedTuple):
     - cost_ratio: expected ratio of the CPU times of two successive passes.
     - max_passes: number of finer passes at the end of which the axis reaches its limit.
     - reason: why another pass follows, and its resolution; "" without one.
+    - bytes: memory that the next pass needs [bytes]; 0 if it hardly needs more than the last one.
     """
 
     excess: float
@@ -59,6 +68,7 @@ class Verdict(NamedTuple):
     cost_ratio: float = HALVED_MESH_COST_RATIO
     max_passes: float = inf
     reason: str = ""
+    bytes: float = 0.0
 
     def predict_seconds(self) -> float:
         """Return the expected CPU time [s] of all further passes, each of which divides the excess by PASS_ERROR_RATIO."""
@@ -66,28 +76,30 @@ class Verdict(NamedTuple):
         return self.seconds * sum(self.cost_ratio**k for k in range(1, n_passes + 1))
 
 
-class TimeLimit(NamedTuple):
-    """CPU time that a run may take.
+class RunLimit(NamedTuple):
+    """CPU time and memory that a run may take.
 
     - seconds: largest CPU time of the run [s], accuracy.max_seconds.
     - begin: CPU time of this process at which the run began [s].
     - clock: function that returns the CPU time of this process [s], without that of compiling.
+    - bytes: largest memory of the run [bytes], accuracy.max_memory.
     """
 
     seconds: float
     begin: float
     clock: Callable[[], float] = measure_cpu_time
+    bytes: float = DEFAULT_MAX_BYTES
 
 
 class Refined(NamedTuple, Generic[Solution]):
     """Last solution of a refinement.
 
     - solution: the solution.
-    - shortage: TimeShortage if accuracy.max_seconds ended the refinement, else None.
+    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
     """
 
     solution: Solution
-    shortage: TimeShortage | None = None
+    shortage: Shortage | None = None
 
 
 class WorstMeasure(NamedTuple):
@@ -107,7 +119,7 @@ def refine(
     solve: Callable[[Resolution, Solution | None], Solution | None],
     resolution: Resolution,
     judge: Callable[[Solution, list[float]], Verdict],
-    limit: TimeLimit,
+    limit: RunLimit,
     say: Callable[[str], None] | None = None,
 ) -> Refined[Solution]:
     """Solve a problem with finer and finer resolutions, and return the last solution.
@@ -121,8 +133,9 @@ def refine(
         First resolution.
     judge : callable
         Function of a solution and of the excesses of all solutions before.
-    limit : TimeLimit
-        No pass follows after which the run would need more CPU time to meet the tolerance.
+    limit : RunLimit
+        No pass follows that would need more memory, or after which the run would need more CPU time to meet the
+        tolerance.
     say : callable, optional
         Callback for the reason of another pass.
     """
@@ -137,11 +150,14 @@ def refine(
         excesses.append(verdict.excess)
         resolution = verdict.finer
 
-        # The time that the run would need in all is compared with its limit before each further pass.
+        # The memory of the next pass, and the time that the run would need in all, are compared with their limits.
         if resolution is not None:
+            if verdict.bytes > limit.bytes:
+                shortage = Shortage(verdict.axis, verdict.bytes, "accuracy.max_memory")
+                return Refined(solution, shortage)
             expected = limit.clock() - limit.begin + verdict.predict_seconds()
             if expected > limit.seconds:
-                return Refined(solution, TimeShortage(verdict.axis, expected))
+                return Refined(solution, Shortage(verdict.axis, expected))
             if say is not None and verdict.reason:
                 say(verdict.reason)
     return Refined(solution)
@@ -254,7 +270,11 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
     resolution = "half the element size"
     cost_ratio = HALVED_MESH_COST_RATIO
     max_passes = inf
-    if axis == "steps":
+    n_bytes = 0.0
+    if axis == "mesh":
+        pairs = [face.patch.pair for face in done.pressed]
+        n_bytes = _predict_halved_mesh_bytes(pairs)
+    else:
         resolution = "twice the steps"
         cost_ratio = DOUBLED_STEPS_COST_RATIO
         max_passes = int(log2(MAX_REFINED_BENCH_STEPS / result.settings.steps_per_cycle))
@@ -262,7 +282,18 @@ def judge_pass(given: Model, done, excesses: list[float]) -> Verdict:
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
         f"{resolution}"
     )
-    return Verdict(excess, finer, axis, done.seconds, cost_ratio, max_passes, reason)
+    return Verdict(excess, finer, axis, done.seconds, cost_ratio, max_passes, reason, n_bytes)
+
+
+def _predict_halved_mesh_bytes(pairs) -> float:
+    """Predict the memory [bytes] of a run whose patches have meshes with half the element size.
+
+    `pairs` are the CondensedPairs of the present meshes. The pieces are condensed one after the other.
+    """
+    n_nodes = [4 * body.n_nodes for pair in pairs for body in pair.meshes if body is not None]
+    n_points = [2 * pair.compliance.interface.x.size for pair in pairs]
+    held = BYTES_PER_INTERFACE_PAIR * sum(count**2 for count in n_points)
+    return PROGRAM_BYTES + CONDENSING_BYTES_PER_NODE * max(n_nodes) + held
 
 
 def bound_errors(measures: Measures, before: Measures) -> Measures:

@@ -102,7 +102,7 @@ def run(
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
-        memory.refuse_insufficient_memory(runnable)
+        memory.refuse_insufficient_memory(runnable, say)
         if fresh:
             store.clear_cache()
 
@@ -135,8 +135,8 @@ class _Passes:
 
     Attributes
     ----------
-    limit : TimeLimit
-        CPU time that all passes together may take.
+    limit : RunLimit
+        CPU time that all passes together may take, and memory.
     """
 
     def __init__(self, run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate):
@@ -146,7 +146,8 @@ class _Passes:
         self.state_file = state_file
         self.estimate = estimate
         max_seconds = run_plan.model.accuracy.max_seconds or refine.DEFAULT_MAX_SECONDS
-        self.limit = refine.TimeLimit(max_seconds, measure_cpu_time())
+        max_bytes = run_plan.model.accuracy.max_memory or refine.DEFAULT_MAX_BYTES
+        self.limit = refine.RunLimit(max_seconds, measure_cpu_time(), bytes=max_bytes)
         self._count = 0
         self._pressed: tuple[Face, ...] = ()
 
@@ -319,7 +320,9 @@ def _press_interfaces(
     if model.patch is None:
         return tuple(faces.solve_interface_patches(model)) if model.has_interface_patches else ()
     if model.has_bolted_patch:
-        return (Face(0, "", model, joint.solve_patch(model)),)
+        # The patches of the pass before, whose stiffness was then matched to that of the joint, are stored as they were.
+        solved = joint.solve_patch(before[0].model) if before else ()
+        return (Face(0, "", model, joint.solve_patch(model, solved)),)
     tolerance = model.accuracy.tolerance
     solved = (before[0].unworn or before[0].patches) if before else ()
     patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))

@@ -6,7 +6,6 @@ first. A spring in series with them corrects it; the friction forces after they 
 """
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..core import frozen_array
 
@@ -62,7 +61,16 @@ def add_edge_springs(compliance: np.ndarray, is_loaded: np.ndarray, stiffness: f
     if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_COMPLIANCE_RATIO):
         return frozen_array(compliance * (forces.sum() / stiffness))
 
+    # Bisection to the last digit: the sum has a term per edge, and the import of scipy.optimize takes half a second.
+    high = MAX_SPRING_COMPLIANCE_RATIO
+    ratio = (low + high) / 2
+    while low < ratio < high:
+        if remaining_excess(ratio) > 0:
+            low = ratio
+        else:
+            high = ratio
+        ratio = (low + high) / 2
+
     out = compliance.copy()
-    ratio = brentq(remaining_excess, low, MAX_SPRING_COMPLIANCE_RATIO, xtol=1e-15)
     out[nodes, nodes] += ratio * scale**2
     return frozen_array(out)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from any_mesh_cases import mesh_of_grid
@@ -124,3 +126,16 @@ def test_exact_patch_test(kind, plane):
         assert np.abs(stress[..., 1] / -1e7 - 1).max() <= 1e-10
     nn = compute_interface_compliance(piece).nn
     assert nn @ pressure == pytest.approx(1e7 / 200e9 * 1e-3, rel=1e-10)
+
+
+def test_exact_compliance_without_factors_needs_half_the_memory():
+    """A piece that does not keep its factors has the same compliance; it holds none and needs at most 2.5 kB per node."""
+    mesh = make_graded_grid(2e-3, 1e-3, 2e-5)
+    layers = Layers((200e9, 0.3), (200e9, 0.3), "strain")
+    pieces = [Piece(mesh, layers) for _ in range(2)]
+    tracemalloc.start()
+    compliance = compute_interface_compliance(pieces[0], keep_factor=False)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert "factor" not in pieces[0].computed and peak <= 2500 * mesh.n_nodes
+    np.testing.assert_array_equal(compliance.tt, compute_interface_compliance(pieces[1]).tt)

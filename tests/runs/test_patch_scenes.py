@@ -10,6 +10,7 @@ from command_line import read_json, run_successfully
 from scene_runs import find_sentences, run_scene
 from scene_texts import COATED, PIECE
 
+import patchfem as pf
 from patchfem import build
 from patchfem.core import PatchfemError
 from patchfem.model import make_piece_meshes
@@ -269,3 +270,14 @@ def test_exact_prescribed_rotation_has_no_error_and_no_warning():
     peak = coarse.measures["pressure_peak"]
     modulus = 210e9 / (1 - 0.3**2) / 2
     assert abs(peak.value - np.sqrt(modulus * 1.2e5 / (np.pi * 0.06))) <= peak.error
+
+
+def test_exact_approach_near_its_change_of_sign_needs_no_finer_mesh():
+    """An approach of about 0 is judged by the terms of which it is the difference, as in the result, not by 1e-13 m."""
+    tilted = {"contact.tilt.angle": "0.1 mrad"}
+    steady, changing = (
+        pf.run(pf.new("patch"), **tilted, **{"contact.load": load})
+        for load in ("200 N", "283.66 N")
+    )
+    assert abs(changing.measures["approach"].value) < 1e-3 * abs(steady.measures["approach"].value)
+    assert changing.patch.x.size < 1.2 * steady.patch.x.size and not changing.warnings

@@ -38,6 +38,37 @@ cycles = 4
 """
 
 
+BOLTED = """\
+[contact]
+length = "10.931 mm"
+width = "12.534 mm"
+height = "2.6951 mm"
+load = "458.38 N"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.tilt]
+angle = "0.00016448 rad"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.40914
+[structure]
+measured = "stuck"
+moving_mass = "2.0792 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "405.41 Hz"
+damping = 0.01166
+slide = 0.051239
+base = 1.0
+output = 1.0
+[drive]
+kind = "force"
+frequency = "368.97 Hz"
+force = "3.8025 N"
+cycles = 400
+"""
+
+
 def find_excess(result) -> float:
     """Return the largest ratio of error to allowed error of the main measures."""
     tolerance = result.plan.model.accuracy.tolerance
@@ -113,17 +144,17 @@ def test_exact_passes_of_a_run_end_where_it_would_need_more_time(excess, passes,
         return refine.Verdict(left, 2 * solution, "steps", solution, 2.0, n_passes)
 
     needed = 2.0**passes - 1
-    limit = refine.TimeLimit(needed - 0.5 if is_short else needed, 100.0, lambda: clock[0])
+    limit = refine.RunLimit(needed - 0.5 if is_short else needed, 100.0, lambda: clock[0])
     solution, shortage = refine.refine(solve, 1, judge, limit)
     if is_short and passes > 1:
-        assert (solution, shortage) == (1, ("steps", needed))
+        assert (solution, shortage) == (1, ("steps", needed, "accuracy.max_seconds"))
     else:
         assert (solution, shortage) == (2 ** (passes - 1), None)
 
 
 def test_compiling_takes_no_time_of_a_run():
     """The CPU time in which code is compiled is left out, so that the first run on a machine is refined like the others."""
-    limit = refine.TimeLimit(1.0, refine.measure_cpu_time())
+    limit = refine.RunLimit(1.0, refine.measure_cpu_time())
     begin = process_time()
     with compiled.measure_compile_time():
         sum(range(10**6))
@@ -141,7 +172,7 @@ def test_exact_steps_of_a_rig_are_refined_within_its_time():
     (finding,) = once.findings
     assert finding.advice.axis == once.shortage.axis == "steps"
     assert finding.advice.key == "accuracy.max_seconds"
-    assert finding.advice.value >= once.shortage.seconds > 1e-6
+    assert finding.advice.value >= once.shortage.needed > 1e-6
     assert once.warnings == [finding.sentence]
 
     # A method without steps does not use the key, and says so.
@@ -174,3 +205,12 @@ def test_exact_errors_of_a_pass_are_bounded_with_their_causes():
     now = {"a": Measure(1.0, "m", 0.0, 0.0, parts={"steps": 0.0})}
     bounded = refine.bound_errors(now, before)["a"]
     assert (bounded.error, bounded.parts) == (1.0, {"steps": 1.0})
+
+
+def test_exact_mesh_beyond_the_memory_is_not_computed():
+    """A joint whose next mesh needs more than accuracy.max_memory keeps its mesh, and its warning names a larger value."""
+    result = pf.run(pf.load(BOLTED), **{"accuracy.max_memory": "300 MB"})
+    (warning,) = [text for text in result.warnings if "max_memory" in text]
+    assert result.shortage.axis == "mesh" and 300e6 < result.shortage.needed < 2e9
+    assert float(re.search(r'set accuracy\.max_memory = "([\d.]+) GB"', warning)[1]) > 0.3
+    assert find_excess(result) > 1

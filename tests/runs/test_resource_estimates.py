@@ -123,3 +123,18 @@ def test_exact_free_memory_of_control_groups(tmp_path):
         (folder / name / "memory.max").write_text("max")
     assert memory.free_bytes(tmp_path, folder) == 20 * 1024 + own
     assert memory.free_bytes(tmp_path / "none", folder) == float("inf")
+
+
+def test_refuses_run_above_the_memory_of_its_scene():
+    """A run above accuracy.max_memory is refused with the key; one above the default only says what it needs."""
+    sets = [MARCH, "drive.cycles=4e7"]
+    run_plan = plan(loads(RIG, "a.toml", sets))
+    said = []
+    memory.refuse_insufficient_memory(run_plan, said.append)
+    (sentence,) = said
+    assert "accuracy.max_memory allows 2 GB" in sentence and "lower drive.cycles" in sentence
+
+    given = plan(loads(RIG, "a.toml", [*sets, "accuracy.max_memory=300 MB"]))
+    refusal = "allows 0\\.3 GB.*lower drive\\.cycles, or raise accuracy\\.max_memory"
+    with pytest.raises(Missing, match=refusal):
+        memory.refuse_insufficient_memory(given)

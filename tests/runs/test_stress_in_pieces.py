@@ -1,9 +1,11 @@
 """Stress inside the pieces under a uniform load."""
 
 import numpy as np
+import pytest
 
 import patchfem as pf
 from patchfem.runs import compute_pieces
+from patchfem.runs.patch.condensed import condense
 
 UNIFORM = """\
 [contact]
@@ -33,3 +35,19 @@ def test_exact_uniform_load_has_uniform_stress():
     np.testing.assert_allclose(pieces.upper.displacement[-1, far, 1], -2 * shortening, 1e-9)
     face = pieces.lower.points[:, 1] == 0
     np.testing.assert_allclose(pieces.lower.displacement[-1, face, 1], -shortening, 1e-9)
+
+
+def test_exact_stress_on_a_coarser_mesh():
+    """On a mesh with half the columns the resultants of the forces stay, and the peak stress changes by its error."""
+    tilted = (
+        UNIFORM.replace('element_size = "100 um"\n', "") + '[contact.tilt]\nangle = "0.2 mrad"\n'
+    )
+    result = pf.run(pf.load(tilted))
+    patch = result.patch
+    fine = compute_pieces(result)
+    coarse = compute_pieces(result, condense(patch.model, patch.pair.grid.coarsen()))
+    assert len(coarse.lower.points) < 0.3 * len(fine.lower.points)
+    assert coarse.upper.von_mises.max() == pytest.approx(fine.upper.von_mises.max(), rel=0.02)
+    motion = fine.interface["displacement"]
+    atol = 5e-3 * np.abs(motion).max()
+    np.testing.assert_allclose(coarse.interface["displacement"], motion, atol=atol)

@@ -5,6 +5,7 @@ pieces and their compliance. A mortar method joins pieces whose interface nodes 
 """
 
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import numpy as np
@@ -72,6 +73,11 @@ class CondensedPair:
         """Meshes of the lower and of the upper piece; the latter is None for identical pieces."""
         return self.grid, None if self.upper is self.piece else self.upper_grid
 
+    def forget_factors(self) -> None:
+        """Delete the factors of both pieces, which are computed again if displacements inside the pieces are needed."""
+        for piece in (self.piece, self.upper):
+            piece.computed.pop("factor", None)
+
     def forces(self, nodal) -> tuple[np.ndarray, np.ndarray]:
         """Distribute interface forces (..., m) to the nodes of the lower and of the upper piece."""
         if self.joint is None:
@@ -79,7 +85,7 @@ class CondensedPair:
         return self.joint.distribute_forces(nodal)
 
 
-def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
+def condense(patch_model, grid, upper_grid=None, *, keep_factors: bool = True) -> CondensedPair:
     """Assemble the two pieces of a `PatchModel` and condense them to their interface.
 
     Parameters
@@ -88,6 +94,9 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
         Patch whose materials, width and coatings the pieces have.
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
+    keep_factors : bool
+        Whether the pieces keep the factors of their stiffness, which need far more memory than the compliance. Without
+        them they are computed again if displacements inside the pieces are needed.
 
     Returns
     -------
@@ -97,10 +106,11 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = process_time()
     piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
-    lower_compliance = upper_compliance = compute_interface_compliance(piece)
+    compute = partial(compute_interface_compliance, keep_factor=keep_factors)
+    lower_compliance = upper_compliance = compute(piece)
     if upper_grid is not None:
         upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
-        upper_compliance = compute_interface_compliance(upper)
+        upper_compliance = compute(upper)
 
     # Interfaces with different nodes are joined by the mortar method.
     joint = None
@@ -151,9 +161,6 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
 def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
     """Condense the two pieces of a `PatchModel` on meshes that several patches share, or return the result from before.
 
-    Its factorized stiffness matrices, which need far more memory than the compliance, are deleted. They are computed
-    again if fields are needed.
-
     Parameters
     ----------
     patch_model : PatchModel
@@ -162,18 +169,12 @@ def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
         Meshes of the lower and the upper piece. The upper one is None if the pieces are identical.
     """
 
-    def make() -> CondensedPair:
-        """Condense the pieces to their interface, and delete their factors, except those with a round-off error above 0."""
-        pair = condense(patch_model, grid, upper_grid)
-        for piece in (pair.piece, pair.upper):
-            if not piece.round_off_error:
-                piece.computed.clear()
-        return pair
-
     pieces = patch_model.pieces
     width = pieces.width * pieces.pairs
     key = ("pair", grid, upper_grid, pieces.lower, pieces.upper, pieces.plane, width)
-    return store.get_or_compute(key, make)
+    return store.get_or_compute(
+        key, lambda: condense(patch_model, grid, upper_grid, keep_factors=False)
+    )
 
 
 def _nodes_match(lower_x, upper_x) -> bool:

@@ -127,12 +127,16 @@ def estimate_static_measures(
 def with_static_measures(patches, tolerance: float | None, points=None) -> Patches:
     """Return solved patches of which the finest one has its static measures with their errors.
 
+    The floor of the error of a measure that is a difference of larger terms is at least the tolerance times these terms:
+    rotation times half the length for the approach, half the length for the centre of pressure, and load times half the
+    length for the moment.
+
     Parameters
     ----------
     patches : sequence of Patch or None
         One patch on meshes from fine to coarse; None where there is no such mesh.
     tolerance : float or None
-        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`).
+        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`). None: no floor is raised.
     points : PointSolution, optional
         Solution on the points of a profile, added to the finest patch.
 
@@ -146,6 +150,16 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
         fine = replace(fine, points=points, averaging=points.spacing)
     used_tolerance = tolerance if fine.model.mesh.is_automatic else None
     measures = estimate_static_measures(fine, *coarse, tolerance=used_tolerance)
+
+    arm = fine.model.pieces.length / 2
+    larger_terms = {
+        "approach": abs(measures["rotation"].value) * arm,
+        "pressure_centre": arm,
+        "moment": measures["normal_load"].value * arm,
+    }
+    for name, size in larger_terms.items():
+        floor = max(measures[name].floor, (tolerance or 0.0) * size)
+        measures[name] = replace(measures[name], floor=floor)
     return replace(fine, measures=measures), *coarse
 
 

@@ -12,7 +12,7 @@ from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, store
-from .condensed import condense, condense_once
+from .condensed import CondensedPair, condense, condense_once
 from .grids import (
     COARSE_GRID_DENSITY,
     MIN_NESTED_MESHES,
@@ -63,11 +63,16 @@ def solve_with_coarser(
     if mesh.shared is None and mesh.is_automatic:
         return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
     levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
-    condense_level = condense if mesh.shared is None else condense_once
 
     def solve() -> Patches:
         """Solve the patch on the meshes that the scene prescribes or that the cases of a sweep share."""
-        pairs = [condense_level(patch_model, *level) for level in levels]
+        if mesh.shared is not None:
+            pairs = [condense_once(patch_model, *level) for level in levels]
+        else:
+            # Only the finest mesh needs factors, for the stress inside the pieces.
+            pairs = [
+                condense(patch_model, *level, keep_factors=level is levels[0]) for level in levels
+            ]
         return solve_on_pairs(patch_model, pairs, tolerance)
 
     if mesh.shared is None:
@@ -192,8 +197,13 @@ def solve_on_refined_meshes(
         if number < len(solved):
             patch = solved[-1 - number]
         elif with_errors or number == MIN_NESTED_MESHES - 1:
+            # Only the last mesh needs factors, for the stress inside the pieces, which is computed on a coarser mesh if
+            # this one is expensive.
+            if coarse is not None:
+                coarse.pair.forget_factors()
             try:
-                pair = condense(patch_model, *meshes)
+                keeps = not is_too_expensive(patch_model, meshes)
+                pair = condense(patch_model, *meshes, keep_factors=keeps)
                 patch = solve_patch_contact(patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
@@ -242,6 +252,20 @@ def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
     """
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
+
+
+def select_pair_for_stress(patch: Patch) -> CondensedPair:
+    """Return condensed pieces on whose mesh the stress inside the pieces is computed.
+
+    They are those of the patch, unless the motion needed a finer mesh than the static measures may have. Such a mesh is
+    coarsened: it is fine because of the contact edges, and all its nodes in all frames would need gigabytes.
+    """
+    meshes = patch.pair.meshes
+    if not (patch.model.mesh.is_automatic and is_too_expensive(patch.model, meshes)):
+        return patch.pair
+    while is_too_expensive(patch.model, meshes):
+        meshes = [mesh and mesh.coarsen() for mesh in meshes]
+    return condense(patch.model, *meshes)
 
 
 def is_too_expensive(patch_model, bodies) -> bool:

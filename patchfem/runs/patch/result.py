@@ -50,11 +50,9 @@ def make_piece_meshes_of_run(model) -> "tuple[piece_meshes.Mesh, piece_meshes.Me
 
 
 def static_measures(model, patch) -> Measures:
-    """Return the measures of a solved patch with the floors of their errors.
+    """Return the measures of a solved patch.
 
-    Values and errors are those of `Patch.measures`, but strips with different pressures have no errors. The floor of a
-    measure that is a difference of larger terms is at least the tolerance times these terms: rotation times half the
-    length for the approach, half the length for the centre of pressure, and load times half the length for the moment.
+    They are those of `Patch.measures`, but strips with different pressures have no errors.
 
     Parameters
     ----------
@@ -68,23 +66,12 @@ def static_measures(model, patch) -> Measures:
     dict
         Measure by name.
     """
-    patch_model = model.patch
-    tolerance = model.accuracy.tolerance
-    arm = patch_model.pieces.length / 2
-    larger_terms = {
-        "approach": abs(patch.measures["rotation"].value) * arm,
-        "pressure_centre": arm,
-        "moment": patch.measures["normal_load"].value * arm,
-    }
-    measures = {}
-    for name, measure in patch.measures.items():
-        floor = max(measure.floor, tolerance * larger_terms.get(name, 0.0))
-        measures[name] = replace(measure, floor=floor)
+    measures = dict(patch.measures)
     if not patch.has_unequal_strips:
         return measures
 
     # Without the coupling of the strips, only what the scene prescribes has an error.
-    for name in measures.keys() - list_prescribed_measures(patch_model):
+    for name in measures.keys() - list_prescribed_measures(model.patch):
         if measures[name].value is not None:
             measures[name] = replace(
                 measures[name], error=None, parts=None, reason=UNCOUPLED_STRIPS_REASON

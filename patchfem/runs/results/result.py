@@ -81,15 +81,17 @@ class Finding(NamedTuple):
         return self.words if self.advice is None else f"{self.words}; {self.advice.text}"
 
 
-class TimeShortage(NamedTuple):
-    """Refinement that accuracy.max_seconds ended before the main measures met the tolerance.
+class Shortage(NamedTuple):
+    """Refinement that a limit of the scene ended before the main measures met the tolerance.
 
     - axis: axis that was not refined further, such as "mesh" or "steps".
-    - seconds: expected CPU time [s] of a run that meets the tolerance.
+    - needed: expected CPU time [s] of a run that meets the tolerance, or memory [bytes] of the next pass.
+    - key: scene key of the limit.
     """
 
     axis: str
-    seconds: float
+    needed: float
+    key: str = "accuracy.max_seconds"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,7 +105,7 @@ class RunInputs:
     - say, progress: callbacks for a line of text and for the completed fraction, or None.
     - estimate: whether to estimate the errors from coarser runs.
     - stiffer: rig and patch with a stiffer joint, if a joint was subtracted from the modes; else None.
-    - limit: `refine.TimeLimit` of the run.
+    - limit: `refine.RunLimit` of the run.
     """
 
     plan: object
@@ -229,7 +231,7 @@ class Result:
     - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
     - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
     - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
-    - shortage: TimeShortage if accuracy.max_seconds ended the refinement, else None.
+    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
     """
 
     plan: object
@@ -248,7 +250,7 @@ class Result:
     findings: tuple[Finding, ...] = ()
     faces: tuple = ()
     yielding_faces: dict = field(default_factory=dict)
-    shortage: TimeShortage | None = None
+    shortage: Shortage | None = None
 
     __getattr__ = refuse_attribute
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from .types import Fraction, Table, key, number, optional, whole_number
+from .types import Fraction, Table, key, number, optional, quantity, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
@@ -21,6 +21,11 @@ class Accuracy(Table):
         number(gt=0),
         "CPU time [s] in which a run may be repeated with finer meshes or smaller time steps until its main measures meet "
         "the tolerance; default: 60",
+    )
+    max_memory: optional(
+        quantity("size of memory", gt=0),
+        "memory that a run may need: it is not repeated with a finer mesh that needs more, and is refused if it needs more "
+        'itself; default: "2 GB", above which a run only says before it starts what needs more',
     )
     method: key(
         Literal["auto", "exact", "march", "harmonic"],
