@@ -48,6 +48,7 @@ from .window_kernels import (
     write_samples,
 )
 
+IS_VECTORISED = False  # loops over modes and interfaces are short (`compiled`)
 MIN_CUT_SPEED = (
     1e-6  # speed, relative to the largest one, above which an interface does not reverse
 )
