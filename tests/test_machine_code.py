@@ -142,6 +142,17 @@ def test_refuses_damaged_code_file(stored_sum, tmp_path, damage):
     assert machine.load_file(tmp_path / "none.code") is None
 
 
+@pytest.mark.parametrize("text", [b"", b"define void @a() { of a later version }", b"\xff"])
+def test_refuses_portable_code_that_llvm_cannot_read(tmp_path, text):
+    """Portable code without a header, or in a language that this version of LLVM does not know, is not loaded."""
+    header = {"name": "a", "results": "", "nogil": False, "is_vectorised": False}
+    assert machine.compile_for_this_cpu(tmp_path / "a.code", text) is None
+    if text:
+        portable = machine.join_file(header, text)
+        assert machine.compile_for_this_cpu(tmp_path / "a.code", portable) is None
+    assert not list(tmp_path.iterdir())
+
+
 def test_exact_none_and_exceptions_are_passed_on(tmp_path):
     """A stored function without a return value returns None, and one that raises ends in RuntimeError."""
     out = np.zeros(3)

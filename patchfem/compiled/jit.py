@@ -204,7 +204,13 @@ def compile_unoptimised(
     argument_types = tuple(
         get_argument_type(dispatcher.typeof_pyval(argument)) for argument in arguments
     )
-    dispatcher.compile(argument_types)
+    # Numba optimises its own functions for this CPU, whose vector instructions do not belong into portable code.
+    is_vectorised = numba.config.LOOP_VECTORIZE
+    numba.config.LOOP_VECTORIZE = False
+    try:
+        dispatcher.compile(argument_types)
+    finally:
+        numba.config.LOOP_VECTORIZE = is_vectorised
     return dispatcher.targetctx, dispatcher.overloads[argument_types]
 
 
@@ -234,7 +240,7 @@ class UnoptimisedLibrary(JITCodeLibrary):
     def _optimize_functions(self, module):
         """Run the LLVM passes for single functions on every function of a module that has a body.
 
-        They are those for any CPU, as `machine.optimise_for_any_cpu` needs them.
+        They are those for any CPU, because the code becomes portable code of `machine`.
         """
         module.data_layout = self._codegen._data_layout
         for function in module.functions:

@@ -16,6 +16,7 @@ import ctypes
 import hashlib
 import json
 import os
+import re
 import struct
 import threading
 from collections.abc import Callable
@@ -33,6 +34,8 @@ NUMBA_SUCCESS_CODES = (0, -2)
 # Type code of `struct` for each type of number that a function takes.
 STRUCT_TYPE_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
 _ARRAY_FORMATS = {}  # `ArrayFormat` for each (dtype, number of dimensions, flags) of an array
+# Portable code of the functions that numba compiled in this process, by the names of their files.
+PORTABLE_CODES: dict[str, bytes] = {}
 # Number of tuples whose words are cached. A run passes the same few in many calls, of several functions in turn.
 MAX_CACHED_TUPLES = 12
 
@@ -202,7 +205,7 @@ def load_file(path: Path) -> LoadedFunction | None:
 def load_code(content: bytes) -> LoadedFunction | None:
     """Load a function from the content of its file; return None if this machine cannot use it."""
     try:
-        header, code = _split_file(content)
+        header, code = split_file(content)
         if not (os.name == "posix" and all(map(_is_in_c_library, header["calls"]))):
             return None
         engine = _create_engine()
@@ -290,7 +293,8 @@ def compile_function(
         text = _write_portable_code(target, result, header)
     except Exception:  # numba reports an error of the function at the call
         return None
-    return compile_for_this_cpu(path, _join_file(header, text.encode()))
+    PORTABLE_CODES[path.name] = join_file(header, text.encode())
+    return compile_for_this_cpu(path, PORTABLE_CODES[path.name])
 
 
 def compile_for_this_cpu(path: Path, portable: bytes) -> LoadedFunction | None:
@@ -309,7 +313,7 @@ def compile_for_this_cpu(path: Path, portable: bytes) -> LoadedFunction | None:
         None if the portable code is damaged, or if this version of LLVM cannot read it.
     """
     try:
-        header, text = _split_file(portable)
+        header, text = split_file(portable)
         binding = _import_binding()
         target_machine = create_target_machine(*_find_cpu(binding))
         module = binding.parse_assembly(text.decode())
@@ -325,32 +329,30 @@ def compile_for_this_cpu(path: Path, portable: bytes) -> LoadedFunction | None:
         builder.getModulePassManager().run(module, builder)
 
     # What is declared but not defined here must be found in the C library when the code is loaded.
-    header["calls"] = [
-        symbol.name
-        for symbol in (*module.functions, *module.global_variables)
-        if symbol.is_declaration and not symbol.name.startswith("llvm.")
-    ]
+    symbols = (*module.functions, *module.global_variables)
+    declared = [symbol.name for symbol in symbols if symbol.is_declaration]
+    header["calls"] = [name for name in declared if not name.startswith("llvm.")]
     if not all(map(_is_in_c_library, header["calls"])):
         return None
-    content = _join_file(header, target_machine.emit_object(module))
+    content = join_file(header, target_machine.emit_object(module))
     user_cache.write_cache_file(path, content)
     return load_code(content)
 
 
-def _join_file(header: dict[str, object], code: bytes) -> bytes:
+def join_file(header: dict[str, object], code: bytes) -> bytes:
     """Return the content of a file: a line of JSON with the hash of the code, and the code."""
     header = header | {"sha256": hashlib.sha256(code).hexdigest()}
     return json.dumps(header).encode() + b"\n" + code
 
 
-def _split_file(content: bytes) -> tuple[dict[str, object], bytes]:
+def split_file(content: bytes) -> tuple[dict[str, object], bytes]:
     """Return the header and the code in the content of a file.
 
-    ValueError or KeyError is raised if the file is damaged.
+    ValueError is raised if the file is damaged.
     """
     line, _, code = content.partition(b"\n")
     header = json.loads(line)
-    if header["sha256"] != hashlib.sha256(code).hexdigest():
+    if not isinstance(header, dict) or header.get("sha256") != hashlib.sha256(code).hexdigest():
         raise ValueError("the checksum does not match")
     return header, code
 
@@ -399,21 +401,23 @@ def _write_portable_code(target, result, header: dict[str, object]) -> str:
     linked.link_in(binding.parse_assembly(entry_text))
 
     # Only the entry function is visible from outside, so that LLVM may change how the others are called and remove what
-    # it does not call. An engine is 1.5 times faster than with symbols that become internal after the optimisation.
-    for symbol in (*linked.functions, *linked.global_variables):
+    # it does not call: the engine is 1.5 times faster than with symbols that become internal after the optimisation. Names
+    # of numba depend on the process.
+    for number, symbol in enumerate((*linked.functions, *linked.global_variables)):
         if not symbol.is_declaration and symbol.name != header["name"]:
+            symbol.name = f"symbol_{number}"
             symbol.linkage = "internal"
-    # Level 1 without vector instructions: levels 2 and 3 give engines of the same speed, and vector instructions belong
-    # to a CPU.
-    builder = create_pass_builder(create_target_machine())
-    builder.getModulePassManager().run(linked, builder)
 
-    # Names depend on the order of compilation.
+    # Levels 2 and 3 give engines of the same speed, and vector instructions belong to a CPU.
+    builder = create_pass_builder(create_target_machine(), level=1)
+    builder.getModulePassManager().run(linked, builder)
     passes = binding.create_new_module_pass_manager()
     passes.add_strip_symbols_pass()
     passes.run(linked, builder)
+    # Functions that numba has optimised itself have their names in the metadata of aliases.
+    text = re.sub(r'!"_ZN[^"]*"', '!"numba"', str(linked))
     described = ("; ModuleID", "source_filename", "target ")
-    lines = str(linked).splitlines(keepends=True)
+    lines = text.splitlines(keepends=True)
     return "".join(line for line in lines if not line.startswith(described))
 
 
@@ -435,12 +439,20 @@ def _find_cpu(binding) -> tuple[str, str]:
 
 
 def create_pass_builder(target_machine, *, level: int = 1, is_vectorised: bool = False):
-    """Return the builder of the passes of LLVM at an optimisation level, with or without vector instructions."""
-    from llvmlite import binding
+    """Return the builder of the optimisation passes of LLVM.
 
-    options = binding.create_pipeline_tuning_options(speed_level=level)
+    Parameters
+    ----------
+    target_machine
+        Machine of LLVM for which the passes optimise.
+    level : int
+        Optimisation level, 1 to 3.
+    is_vectorised : bool
+        Whether loops may become vector instructions.
+    """
+    options = _import_binding().create_pipeline_tuning_options(speed_level=level)
     options.loop_vectorization = options.slp_vectorization = is_vectorised
-    return binding.create_pass_builder(target_machine, options)
+    return _import_binding().create_pass_builder(target_machine, options)
 
 
 def _write_entry_function(target, result, name: str, n_result_words: int, linked) -> str:
