@@ -1,14 +1,16 @@
 """The cache of compiled code: shared by processes, renewed for an edited law, and never a cause of failure."""
 
 import json
+import lzma
 import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import numba
 import pytest
@@ -17,13 +19,13 @@ from scene_texts import PLASTIC, POINT, TRIANGLE
 
 import patchfem
 from patchfem import compiled
-from patchfem.compiled import cache_files, hook, prebuilt
+from patchfem.compiled import cache_files, portable
 from patchfem.disk import user_cache
 
 # A prescribed slide has the smallest time loop that contains a friction law.
 SCENE = POINT + PLASTIC + TRIANGLE
 BENCH = """\
-import gc, json, sys
+import gc, json, lzma, sys
 import patchfem.runs.run as simulate
 from patchfem.compiled import KernelFunction
 from patchfem.scene.scene import loads
@@ -35,25 +37,35 @@ print(json.dumps({"work": result.measures["loop_area"].value,
                   "numba": "numba" in sys.modules,
                   "stored": [one.name for one in kernels if all(one.loaded_functions.values())],
                   "not stored": [one.name for one in kernels if not all(one.loaded_functions.values())]}))
+if len(sys.argv) > 2:
+    from patchfem import compiled
+    from patchfem.compiled import machine, portable
+    kernels = compiled.hash_kernels()
+    packed = portable.pack_portable_codes(machine.PORTABLE_CODES, kernels, "of this process")
+    with open(sys.argv[2], "wb") as file:
+        file.write(lzma.compress(packed))
 """
 
 
 def copy_package(folder: Path) -> Path:
-    """Copy the package into `folder` without bytecode, and return `folder`."""
+    """Copy the package into `folder` without bytecode and portable code, and return `folder`."""
     shutil.copytree(
         Path(patchfem.__file__).parent,
         folder / "patchfem",
-        ignore=shutil.ignore_patterns("__pycache__"),
+        ignore=shutil.ignore_patterns("__pycache__", "portable.xz"),
     )
     return folder
 
 
-def run_slide(home: Path, cache: Path) -> dict:
-    """Run a short prescribed slide with the package in `home` in a new process with its own cache."""
+def run_slide(home: Path, cache: Path, *arguments: str) -> dict:
+    """Run a short prescribed slide with the package in `home` in a new process with its own cache.
+
+    With an argument, a path, it writes the functions that it compiled as portable code.
+    """
     environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache)}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
-        [sys.executable, "-c", BENCH, SCENE],
+        [sys.executable, "-c", BENCH, SCENE, *arguments],
         capture_output=True,
         text=True,
         env=environment,
@@ -66,14 +78,10 @@ def run_slide(home: Path, cache: Path) -> dict:
     return answer
 
 
-def start_process(cache: Path, code: str = BENCH) -> subprocess.Popen:
-    """Start a process that runs a prescribed slide or other code."""
-    return subprocess.Popen(
-        [sys.executable, "-c", code, SCENE],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PATCHFEM_CACHE": str(cache)},
-    )
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """Return the folder of a copy of the package."""
+    return copy_package(tmp_path_factory.mktemp("package"))
 
 
 @pytest.fixture(scope="module")
@@ -83,13 +91,15 @@ def shared_cache(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def parallel_results(shared_cache):
-    """Return the results of two processes started at once on an empty cache; the one that compiled comes first."""
-    both = [start_process(shared_cache) for _ in range(2)]
-    return sorted(
-        (json.loads(one.communicate(timeout=300)[0]) for one in both),
-        key=lambda one: not one["numba"],
-    )
+def parallel_results(shared_cache, package):
+    """Return the results of two processes started at once on an empty cache; the one that compiled comes first.
+
+    It writes its portable code.
+    """
+    paths = [str(shared_cache / f"{number}.xz") for number in range(2)]
+    with ThreadPoolExecutor() as threads:
+        results = list(threads.map(partial(run_slide, package, shared_cache), paths))
+    return sorted(results, key=lambda one: not one["numba"])
 
 
 def test_exact_only_first_of_two_processes_compiles(parallel_results):
@@ -126,66 +136,56 @@ def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_res
     assert len(list((cache / "patchfem").iterdir())) == 2
 
 
-def test_exact_prebuilt_code_needs_matching_machine(tmp_path, monkeypatch):
-    """Prebuilt code is used only on the machine type for which it was built.
+def test_exact_portable_code_needs_no_numba(tmp_path, shared_cache, parallel_results):
+    """A first run with portable code gives the bits of one that numba compiled, without numba and without a message.
 
-    Processor, instruction set, versions and sources must agree.
+    With damaged portable code, and with checks of indices, numba compiles.
     """
-    monkeypatch.setattr(prebuilt, "COMPILED_FOLDER", tmp_path)
-    (tmp_path / "machine.py").touch()
-
-    def find_prebuilt():
-        """Return the folder of prebuilt code, or None."""
-        return prebuilt.find_folder.__wrapped__(compiled.hash_sources)
-
-    assert find_prebuilt() is None
-    folder = tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)
-    folder.mkdir(parents=True)
-    features = dict.fromkeys(prebuilt.COMMON_CPUS["x86_64"].instruction_sets, True)
-    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: features)
-    assert find_prebuilt() == folder
-    with monkeypatch.context() as more:
-        more.setenv("NUMBA_BOUNDSCHECK", "1")
-        assert find_prebuilt() is None
-    for lacking, name in (({"avx2": False}, "x86_64"), ({}, "riscv64")):
-        with monkeypatch.context() as more:
-            more.setattr(
-                "llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: features | lacking
-            )
-            more.setattr("platform.machine", lambda name=name: name)
-            (tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)).mkdir(
-                exist_ok=True
-            )
-            assert find_prebuilt() is None
-    with monkeypatch.context() as more:
-        more.setattr(prebuilt, "find_package_version", lambda name: "0.0")
-        assert find_prebuilt() is None
-    (tmp_path / "machine.py").write_text("# edited")
-    assert find_prebuilt() is None
+    home = copy_package(tmp_path)
+    largest = max(shared_cache.glob("*.xz"), key=lambda path: path.stat().st_size)
+    kept = home / "patchfem/compiled/portable.xz"
+    shutil.copy(largest, kept)
+    first = run_slide(home, tmp_path / "first")
+    assert not first["numba"] and not first["said"]
+    assert all(first[name] == parallel_results[0][name] for name in ("work", "peak"))
+    code = lzma.decompress(kept.read_bytes()).decode()
+    assert not re.search(r"target-cpu|target-features|target triple|_ZN|\.py", code)
 
 
-def test_exact_wheel_has_machine_code_only_on_request(monkeypatch):
-    """A wheel contains machine code only if PATCHFEM_MACHINE_CODE is 1 and the build is not editable."""
-    monkeypatch.setitem(
-        sys.modules,
-        "hatchling.builders.hooks.plugin.interface",
-        SimpleNamespace(BuildHookInterface=object),
-    )
-    monkeypatch.setattr(
-        hook, "build_machine_code", lambda shared_cache: (shared_cache / "KEY").mkdir()
-    )
-    for asked, version, has in (
-        ("", "standard", False),
-        ("0", "standard", False),
-        ("1", "editable", False),
-        ("1", "standard", True),
-    ):
-        monkeypatch.setenv("PATCHFEM_MACHINE_CODE", asked)
-        data = {"force_include": {}}
-        builder = hook.get_build_hook()()
-        builder.initialize(version, data)
-        assert [*data["force_include"].values()] == ["patchfem/compiled/generic"] * has
-        assert data.get("tag", "").startswith("py3-none-") is has
+@pytest.mark.parametrize(
+    "harm", ["", "cut", "a bit", "empty", "gone", "no header", "other kernels", "index checks"]
+)
+def test_exact_unfit_portable_code_is_ignored(tmp_path, monkeypatch, harm):
+    """Portable code that is damaged or made for other kernels, and any if indices are checked, is ignored."""
+    kernels = "of others" if harm == "other kernels" else compiled.hash_kernels()
+    content = portable.pack_portable_codes({"b": b"second", "a": b"first"}, kernels, "any")
+    data = bytearray(lzma.compress(b"[]\n" if harm == "no header" else content))
+    changed = data.copy()
+    changed[len(data) // 2] ^= 1
+    path = tmp_path / "portable.xz"
+    path.write_bytes({"cut": data[:-5], "a bit": changed, "empty": b""}.get(harm, data))
+    monkeypatch.setattr(portable, "PORTABLE_PATH", path if harm != "gone" else tmp_path / "none.xz")
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", str(int(harm == "index checks")))
+    portable.read_portable_codes.cache_clear()
+    found = compiled.list_portable_codes()
+    portable.read_portable_codes.cache_clear()
+    assert found == ({} if harm else {"a": b"first", "b": b"second"})
+
+
+@pytest.mark.slow
+def test_exact_portable_code_of_package_can_be_made_again(tmp_path):
+    """The portable code of the package is what numba makes of the present kernels, byte by byte.
+
+    Run `python tests/support/portable_code.py` at a release. Other versions make another text.
+    """
+    path = tmp_path / "portable.xz"
+    maker = Path(__file__).parent / "support/portable_code.py"
+    subprocess.run([sys.executable, maker, path], check=True)
+    made, kept = (lzma.decompress(one.read_bytes()) for one in (path, portable.PORTABLE_PATH))
+    versions = [json.loads(one.partition(b"\n")[0])["versions"] for one in (made, kept)]
+    if versions[0] != versions[1]:
+        pytest.skip(f"the portable code was made with {versions[1]}")
+    assert made == kept
 
 
 KEYS = """\

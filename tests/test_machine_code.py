@@ -75,11 +75,16 @@ def make_arguments():
     return 3, Outer(rng.normal(size=5), Inner(rng.normal(size=7), 0.7), 5, grid), 1e-3, np.zeros(5)
 
 
+def store_code(path, function, arguments) -> bool:
+    """Compile a function of numba into a file, and return whether it can be stored."""
+    return machine.compile_function(path, function, arguments, jit.compile_unoptimised) is not None
+
+
 def compile_and_reload(path, function, *arguments):
     """Return the result of numba, and the function read back from its file or None."""
     made = njit(error_model="numpy", _nrt=function is allocated_size)(function)
     answer = made(*arguments)
-    return answer, machine.load_file(path) if machine.store_code(path, made, arguments) else None
+    return answer, machine.load_file(path) if store_code(path, made, arguments) else None
 
 
 def pack_arguments(*arguments) -> bytes:
@@ -95,7 +100,7 @@ def stored_sum(tmp_path_factory):
     given = make_arguments()
     made = njit(error_model="numpy", _nrt=False)(weighted_sum)
     answer = made(*given)
-    assert machine.store_code(path, made, given)
+    assert store_code(path, made, given)
     return path, given, answer, machine.load_file(path), made
 
 
@@ -137,6 +142,17 @@ def test_refuses_damaged_code_file(stored_sum, tmp_path, damage):
     assert machine.load_file(tmp_path / "none.code") is None
 
 
+@pytest.mark.parametrize("text", [b"", b"define void @a() { of a later version }", b"\xff"])
+def test_refuses_portable_code_that_llvm_cannot_read(tmp_path, text):
+    """Portable code without a header, or in a language that this version of LLVM does not know, is not loaded."""
+    header = {"name": "a", "results": "", "nogil": False, "is_vectorised": False}
+    assert machine.compile_for_this_cpu(tmp_path / "a.code", text) is None
+    if text:
+        portable = machine.join_file(header, text)
+        assert machine.compile_for_this_cpu(tmp_path / "a.code", portable) is None
+    assert not list(tmp_path.iterdir())
+
+
 def test_exact_none_and_exceptions_are_passed_on(tmp_path):
     """A stored function without a return value returns None, and one that raises ends in RuntimeError."""
     out = np.zeros(3)
@@ -158,13 +174,9 @@ def test_refuses_code_that_needs_numba(tmp_path):
     for unsupported in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
         with pytest.raises(machine.UnsupportedError):
             machine.ArgumentConverter().convert(unsupported)
-    dispatcher = njit(double_positive)
-    dispatcher(1.0)
-    # the folder does not exist
-    assert not machine.store_code(tmp_path / "none/folder/a.code", dispatcher, (1.0,))
-    assert not machine.store_code(
-        tmp_path / "a.code", dispatcher, (1,)
-    )  # the function was never compiled for an integer
+    assert not list(tmp_path.iterdir())
+    # The folder does not exist, but the function is compiled and loaded.
+    assert store_code(tmp_path / "none/folder/a.code", njit(double_positive), (1.0,))
     assert not list(tmp_path.iterdir())
 
 

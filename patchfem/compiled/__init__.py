@@ -2,8 +2,9 @@
 
 `load_compiled_module` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in
 which some imports are replaced. The module, and with it numba, is imported only if a function is called whose machine
-code is not stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code,
-`prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
+code is not stored.
+`jit` contains the decorator `njit` of all kernels, `machine` compiles, stores and loads machine code, `portable` has code
+that needs no numba, `cache_files` is the cache of numba for functions that `machine` cannot store. Read
 `load_compiled_module`, `instantiate` and `KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
@@ -13,9 +14,9 @@ and a loop for any friction law is written out once per law by `instantiate`, wi
 NUMBA_DISABLE_JIT=1 runs every kernel as Python for debuggers and coverage tools. NUMBA_BOUNDSCHECK=1 compiles all
 kernels again with checks of every index.
 
-The optimisation level is 3, the default of numba. Levels 2 and 1 save no compile time: the rig and five laws took 64
-and 61 CPU seconds instead of 63, most of it in the Python code of numba. At level 2 the loop of Iwan's law takes 10.1
-ms instead of 7.9 ms.
+The optimisation level is 3 with vector instructions. A module whose loops are too short for them sets IS_VECTORISED =
+False: the event-driven engine is then compiled 2 CPU seconds faster and runs as fast. The loop over many points takes
+twice as long without them.
 """
 
 import ast
@@ -24,20 +25,22 @@ import hashlib
 import os
 import platform
 import re
+import shutil
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 from threading import RLock
-from time import monotonic, process_time, sleep
+from time import monotonic, process_time, sleep, time
 
 from .. import cost_model
 from ..disk import user_cache
 from ..disk.installed import find_package_version
-from . import cache_limit, machine, prebuilt
+from . import machine
+from .portable import read_portable_codes
 
 # Names that other folders use, by module.
 PUBLIC = {
@@ -62,6 +65,12 @@ TUPLE_MODULES = (
     "points/law_rows.py",
     "points/march_rows.py",
 )
+CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
+# Largest number of folders of compiled code, 0.5 MB to 20 MB each, besides the one in use. Every edit of a kernel, every
+# release and every kind of CPU makes another one; several may share a home folder.
+MAX_OTHER_CACHE_FOLDERS = 8
+# Smallest time [s] since the last start of a process with a folder that is removed: a day.
+MIN_UNUSED_SECONDS = 86400.0
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
@@ -76,7 +85,7 @@ UNCACHED_FUNCTIONS = set()
 CODE_LOADING_LOCK = RLock()
 # Converter of the arguments of all functions, because several functions get the same tuples in turn.
 CONVERTER = machine.ArgumentConverter()
-_MESSAGE_CALLBACKS = []  # callbacks that receive a message when a function is compiled
+REPORT = [None]  # callback of the last run, which receives a message if numba compiles a function
 ARITHMETIC_OPERATORS = {
     ast.Add: add,
     ast.Sub: sub,
@@ -88,28 +97,26 @@ ARITHMETIC_OPERATORS = {
 }
 
 
-def hash_sources():
-    """Return the hash object of all kernels, of the tuples that they take and of their compiler."""
+def hash_kernels() -> str:
+    """Return the hash of all kernels, of the tuples that they take and of their compiler."""
+    compiler = ("integer_enums.py", "jit.py", "machine.py", "pass_by_reference.py")
+    sources = [PACKAGE_FOLDER / "compiled" / name for name in compiler]
+    sources += sorted(PACKAGE_FOLDER.rglob("*kernels.py"))
+    sources += sorted((PACKAGE_FOLDER / "hybrid" / "laws").glob("*.py"))
+    sources += [PACKAGE_FOLDER / name for name in TUPLE_MODULES]
     digest = hashlib.sha256()
-    for source in (
-        *(PACKAGE_FOLDER / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
-        *sorted(PACKAGE_FOLDER.rglob("*kernels.py")),
-        *sorted((PACKAGE_FOLDER / "hybrid" / "laws").glob("*.py")),
-        *(PACKAGE_FOLDER / name for name in TUPLE_MODULES),
-    ):
-        digest.update(
-            str(source.relative_to(PACKAGE_FOLDER)).encode() + b"\0" + source.read_bytes()
-        )
-    return digest
+    for source in sources:
+        name = source.relative_to(PACKAGE_FOLDER).as_posix()
+        digest.update(name.encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()
 
 
 def compute_kernel_key() -> str:
     """Return a hash of the kernels, the versions of numba and llvmlite, and the CPU."""
-    digest = hash_sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
     versions = f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.version_info[:2]} {checked}"
-    digest.update(f"{versions} {platform.machine()} {_describe_cpu()}".encode())
-    return digest.hexdigest()[:16]
+    text = f"{hash_kernels()} {versions} {platform.machine()} {_describe_cpu()}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _describe_cpu() -> str:
@@ -197,6 +204,11 @@ class KernelModule:
             file_prefix = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
             self._functions[name] = KernelFunction(self, name, file_prefix)
         return self._functions[name]
+
+    @property
+    def is_vectorised(self) -> bool:
+        """Whether loops of the module may become vector instructions; its constant IS_VECTORISED, by default True."""
+        return _read_names(self._source)[0].get("IS_VECTORISED", True)
 
     def load_module(self):
         """Import the module and return it."""
@@ -315,15 +327,14 @@ class KernelFunction:
         `words` are the arguments as machine words, one entry for each.
         """
         path = _prepare_cache() / "code" / self._make_file_name(type_codes)
-        function = machine.load_file(path) or _load_prebuilt(path)
+        function = machine.load_file(path)
         if function is None:
             with measure_compile_time():
                 function = self._build_machine_code(path, arguments)
         if function is None:
             with measure_compile_time(), pause_garbage_collection():
                 result = self.get_dispatcher()(*arguments)
-                if not machine.store_code(path, self.get_dispatcher(), arguments):
-                    UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
+            UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
             self.loaded_functions[type_codes] = False
             return result
         self.loaded_functions[type_codes] = function
@@ -332,16 +343,26 @@ class KernelFunction:
     def _build_machine_code(self, path: Path, arguments: tuple[object, ...]):
         """Compile code for arguments of these types into the file `path`, or load it from there.
 
-        It is there if another process has compiled it. Returns None if the function cannot be compiled in this way.
+        It is there if another process has compiled it. Portable code of the package needs no numba. Returns None if the
+        function cannot be compiled in this way.
         """
         with lock_exclusively(path.with_suffix(".lock")):
             function = machine.load_file(path)
             if function is None:
-                _report_compilation()
+                portable_code = list_portable_codes().get(path.name, b"")
+                function = machine.compile_for_this_cpu(path, portable_code)
+            if function is None:
+                if REPORT[0] is not None:
+                    _report_compilation(REPORT[0])
                 with pause_garbage_collection():
-                    compiler = import_module(f"{__name__}.jit").compile_optimised  # imports numba
-                    dispatcher = self.get_dispatcher()
-                    function = machine.compile_and_store(path, dispatcher, arguments, compiler)
+                    compiler = import_module(f"{__name__}.jit").compile_unoptimised  # imports numba
+                    function = machine.compile_function(
+                        path,
+                        self.get_dispatcher(),
+                        arguments,
+                        compiler,
+                        is_vectorised=self.module.is_vectorised,
+                    )
         return function
 
     def get_dispatcher(self):
@@ -416,7 +437,7 @@ def load_compiled_module(module: str, report=None):
     module : str
         Name of the module without that of the package, such as "points.march_kernels".
     report : callable or None
-        Callback that receives a message if the cache is empty, so the code must be compiled.
+        Callback that receives a message if numba compiles a function.
 
     Returns
     -------
@@ -461,7 +482,7 @@ def instantiate(
         Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
         or its name without that of the package. It must have the same functions.
     report : callable or None
-        Callback that receives a message if the cache is empty.
+        Callback that receives a message if numba compiles a function.
 
     Returns
     -------
@@ -505,7 +526,7 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
     text : str
         Source.
     report : callable or None
-        Callback that receives a message if the cache is empty.
+        Callback that receives a message if numba compiles a function.
     imported : sequence of KernelModule
         Modules that the source imports; they are imported before it.
 
@@ -535,16 +556,14 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
     return KernelModule(name, path if is_stored else text, import_written_module)
 
 
-def _list_code_folders(machine_folder: Path | None = None) -> list[Path]:
-    """List the folders of compiled code: that of this machine and, if any, that of the wheel."""
-    wheel_folder = prebuilt.find_folder(hash_sources)
-    return [machine_folder or _choose_folder_once()[0], *filter(None, [wheel_folder])]
+def list_portable_codes() -> dict[str, bytes]:
+    """Return the portable codes of the package for the present kernels by the names of their files of machine code.
 
-
-def _load_prebuilt(path: Path) -> machine.LoadedFunction | None:
-    """Load the code from the file in the wheel with the name of `path`, or return None if there is none."""
-    folder = prebuilt.find_folder(hash_sources)
-    return folder and machine.load_file(folder / "code" / path.name)
+    They check no index.
+    """
+    if os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0"):
+        return {}
+    return read_portable_codes(hash_kernels())
 
 
 def _read_bytes(path: Path) -> bytes | None:
@@ -558,12 +577,11 @@ def _read_bytes(path: Path) -> bytes | None:
 def _prepare_cache(report=None) -> Path:
     """Set the cache folder for numba too, and return it.
 
-    The callback `report` receives a message, once per process, if the folder is empty.
+    The callback `report` receives a message, once per process, if numba compiles a function.
     """
-    folder = _set_cache_folder()
     if report is not None:
-        _report_once(report)
-    return folder
+        REPORT[0] = report
+    return _set_cache_folder()
 
 
 @cache
@@ -573,23 +591,16 @@ def _set_cache_folder() -> Path:
     if reason:
         os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for child processes
     else:
-        cache_limit.mark_used(folder)
+        remove_old_folders(folder)
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
     return folder
 
 
-def _report_compilation() -> None:
-    for report in _MESSAGE_CALLBACKS:
-        _report_once(report)
-
-
 @cache
-def _report_once(report) -> None:
-    """Report, once per callback, that code is compiled because the cache folder is empty."""
-    if IS_JIT_DISABLED or _has_code_files():
-        return
+def _report_compilation(report) -> None:
+    """Report, once per callback, that numba compiles."""
     reason = _choose_folder_once()[1]
     duration = "which takes 10 to 30 s and is needed only once"
     if reason:
@@ -600,7 +611,22 @@ def _report_once(report) -> None:
     report(f"compiling the code of the simulation for this machine, {duration}")
 
 
-def _has_code_files() -> bool:
-    """Return whether a folder of compiled code contains a file of this package or of numba."""
-    folders = _list_code_folders(_set_cache_folder())
-    return any(any(folder.rglob(f"*.{end}")) for folder in folders for end in ("code", "nbi"))
+def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_CACHE_FOLDERS) -> None:
+    """Mark a folder of compiled code as used now; if it is new, remove the least recently used ones beside it.
+
+    The `max_others` most recently used ones and those used in the last day stay. A process that has used one of the
+    removed folders for longer goes on with the code that it has loaded. Folders that cannot be removed stay too.
+    """
+    with suppress(OSError):
+        is_new = not any(folder.iterdir())
+        os.utime(folder)
+        if not is_new:
+            return
+        others = {}
+        for entry in os.scandir(folder.parent):
+            is_code = CACHE_FOLDER_PATTERN.fullmatch(entry.name) and entry.name != folder.name
+            if is_code and entry.is_dir(follow_symlinks=False):
+                others[entry.path] = entry.stat().st_mtime
+        for other in sorted(others, key=others.get, reverse=True)[max_others:]:
+            if time() - others[other] > MIN_UNUSED_SECONDS:
+                shutil.rmtree(other, ignore_errors=True)

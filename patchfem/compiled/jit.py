@@ -2,8 +2,8 @@
 
 Numba optimises every function separately, adds wrappers for calls from Python and C and emits machine code, and repeats
 most of this work in every caller: the body of a nested call is compiled about once per level of the nesting. A function
-without `cache=True` skips these steps here. Its LLVM code is linked into its callers without optimisation, and each
-caller is optimised once with all that it calls. If Python calls such a function, it is compiled separately.
+without `cache=True` skips these steps here. Its LLVM code is linked into its callers without optimisation, and `machine`
+optimises each function that Python calls once, with all that it calls.
 """
 
 from functools import wraps
@@ -21,6 +21,7 @@ from numba.core.types.functions import BaseFunction
 
 from .cache_files import store_on_disk
 from .integer_enums import register_integer_enums
+from .machine import create_pass_builder, create_target_machine
 from .pass_by_reference import get_argument_type
 
 # Option of numba that omits the wrapper through which C calls a function.
@@ -172,10 +173,10 @@ class InlinedDispatcher(CPUDispatcher):
         return self._standalone
 
 
-def compile_optimised(function, arguments: tuple[object, ...]) -> tuple[BaseContext, CompileResult]:
-    """Compile a function to optimised LLVM code, but not to machine code.
-
-    This saves a tenth of the compile time.
+def compile_unoptimised(
+    function, arguments: tuple[object, ...]
+) -> tuple[BaseContext, CompileResult]:
+    """Compile a function to LLVM code that `machine` optimises, together with the entry function.
 
     Parameters
     ----------
@@ -199,23 +200,26 @@ def compile_optimised(function, arguments: tuple[object, ...]) -> tuple[BaseCont
             f"this version of numba lacks some of {', '.join(NUMBA_LIBRARY_METHODS)}"
         )
     options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
-    dispatcher = CPUDispatcher(function.py_func, function.locals, options, OptimisedCompiler)
+    dispatcher = CPUDispatcher(function.py_func, function.locals, options, UnoptimisedCompiler)
     argument_types = tuple(
         get_argument_type(dispatcher.typeof_pyval(argument)) for argument in arguments
     )
-    dispatcher.compile(argument_types)
+    # Numba optimises its own functions for this CPU, whose vector instructions do not belong into portable code.
+    is_vectorised = numba.config.LOOP_VECTORIZE
+    numba.config.LOOP_VECTORIZE = False
+    try:
+        dispatcher.compile(argument_types)
+    finally:
+        numba.config.LOOP_VECTORIZE = is_vectorised
     return dispatcher.targetctx, dispatcher.overloads[argument_types]
 
 
 class UnoptimisedCompiler(Compiler):
     """Compiler that stops at LLVM code without optimisation, which callers link in."""
 
-    # Class of the library that contains the LLVM code.
-    library_class = property(lambda self: UnoptimisedLibrary)
-
     def define_pipelines(self):
         """Return the passes of numba that the kernels need, which write into this library."""
-        self.state.library = self.library_class(
+        self.state.library = UnoptimisedLibrary(
             self.state.targetctx.codegen(), self.state.func_id.func_qualname
         )
         if not all(NUMBA_PASSES):
@@ -227,12 +231,6 @@ class UnoptimisedCompiler(Compiler):
         return [passes]
 
 
-class OptimisedCompiler(UnoptimisedCompiler):
-    """Compiler that stops at optimised LLVM code of a function and all that it calls."""
-
-    library_class = property(lambda self: OptimisedLibrary)
-
-
 class UnoptimisedLibrary(JITCodeLibrary):
     """LLVM code of a function before optimisation, which is linked into its callers."""
 
@@ -240,12 +238,15 @@ class UnoptimisedLibrary(JITCodeLibrary):
     codegen = SimpleNamespace(set_env=lambda name, environment: None)
 
     def _optimize_functions(self, module):
-        """Run the LLVM passes for single functions on every function of a module that has a body."""
+        """Run the LLVM passes for single functions on every function of a module that has a body.
+
+        They are those for any CPU, because the code becomes portable code of `machine`.
+        """
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
-                passes.run(function, builder)
+                builder = create_pass_builder(create_target_machine())
+                builder.getFunctionPassManager().run(function, builder)
 
     def _optimize_final_module(self):
         pass
@@ -258,12 +259,3 @@ class UnoptimisedLibrary(JITCodeLibrary):
         """Return 0 for the address of a function, whatever its name, because there is no machine code."""
         self._ensure_finalized()
         return 0
-
-
-class OptimisedLibrary(UnoptimisedLibrary):
-    """LLVM code of a function and of all that it calls; it is optimised but has no address."""
-
-    def _optimize_final_module(self):
-        """Run all LLVM passes, but not the preceding ones that numba needs for reference counting."""
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)

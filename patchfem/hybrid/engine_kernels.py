@@ -48,6 +48,7 @@ from .window_kernels import (
     write_samples,
 )
 
+IS_VECTORISED = False  # loops over modes and interfaces are short (`compiled`)
 MIN_CUT_SPEED = (
     1e-6  # speed, relative to the largest one, above which an interface does not reverse
 )
@@ -214,7 +215,7 @@ def advance(rig, state, record, t_end, cycle):
         first_seen += record.cycles[cycle - 1, Cycle.END]
     # The step error is that of the states before the first integral. On a bench it includes the integrals: besides the
     # friction work no state may depend on the path.
-    n_checked = find_integrals(rig, state.y)
+    n_checked = find_integrals(rig)
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]
     n_empty = 0
@@ -346,7 +347,7 @@ def advance_over_pieces(rig, state, record, t_end, cycle):
 def find_change(rig, state):
     """Return the largest change of the state since the last cycle, relative to the scales."""
     largest = 0.0
-    for k in range(find_integrals(rig, state.y)):
+    for k in range(find_integrals(rig)):
         change = abs(state.y[k] - state.rows[CYCLE, k]) / state.rows[SCALE, k]
         largest = max(largest, change)
     return largest
@@ -371,7 +372,7 @@ def repeat_row(rig, state, row, source, count):
     """
     copy_values(source, row)
     row[0] += count * rig.settings[Setting.PERIOD]
-    for k in range(find_integrals(rig, state.y), state.y.size):
+    for k in range(find_integrals(rig), state.y.size):
         row[1 + k] += count * (state.y[k] - state.rows[CYCLE, k])
 
 
@@ -428,7 +429,7 @@ def skip_cycles(rig, state, record, cycle, count):
                 repeat_row(rig, state, row, record.events[number], c)
             clock[Clock.N_EVENTS] += 1
 
-    for k in range(find_integrals(rig, state.y), state.y.size):
+    for k in range(find_integrals(rig), state.y.size):
         state.y[k] += count * (state.y[k] - state.rows[CYCLE, k])
     clock[Clock.EXCHANGED] += count * (clock[Clock.EXCHANGED] - clock[Clock.EXCHANGED_BEFORE])
     clock[Clock.TIME] = end
@@ -535,8 +536,6 @@ def run_cycles(rig, state, record):
         clock[Clock.EXCHANGED_BEFORE] = clock[Clock.EXCHANGED]
         if rig.faces.shape[0]:
             start = look(rig, state, 0, clock[Clock.TIME], state.y)
-        cosine = state.y[state.y.size - 2]
-        sine = state.y[state.y.size - 1]
 
         status = advance_over_pieces(rig, state, record, row[Cycle.END], cycle)
         for i in range(rig.faces.shape[0]):
@@ -545,8 +544,6 @@ def run_cycles(rig, state, record):
         if rig.faces.shape[0]:
             drop_cut_extremes(row, start)
             drop_cut_extremes(row, look(rig, state, 0, clock[Clock.TIME], state.y))
-        row[Cycle.COS] = state.y[state.y.size - 2] - cosine
-        row[Cycle.SIN] = state.y[state.y.size - 1] - sine
         clock[Clock.N_CYCLES] = cycle + 1
         if status != Status.DONE:
             return status

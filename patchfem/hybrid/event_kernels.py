@@ -128,7 +128,7 @@ def write_margins_inside(rig, state, x, row):
     row : int
         Row of `State.margins` that is written.
     """
-    y = state.rows[POINT]
+    y = state.rows[POINT, : find_integrals(rig)]
     read_curve(state, x, y)
     t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
     write_margins(rig, state, t, y, state.margins[row])
@@ -171,7 +171,7 @@ def write_probes(rig, state, t, y, probes):
             slowest = SAME_SPEED_TOL
 
     # Every interface; a law slips where the irreversible part of its velocity exceeds the elastic one.
-    integrals = find_integrals(rig, y)
+    integrals = find_integrals(rig)
     for i in range(rig.faces.shape[0]):
         point = look(rig, state, i, t, y)
         memory = state.memory[i]

@@ -46,7 +46,6 @@ from .records import (
     Mode,
     Setting,
     State,
-    Tail,
     Window,
 )
 from .runs import COARSE, COARSE_STEP, ERROR_FACTOR, ERROR_FLOOR, run_case
@@ -252,7 +251,7 @@ class FreeShooting(LoopShooting):
         # Half the range of the output, and the cosine part of its fundamental
         cycle = self.record.cycles[0]
         self.size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
-        cosine = 2 * omega / np.pi * end.y[Tail.COSINE]
+        cosine = 2 * omega / np.pi * cycle[Cycle.COS]
         gain = RATE_SCALE * omega * (self.size / self.amplitude - 1)
         end.y[self.extra] += omega * cosine / self.amplitude, gain
         return end

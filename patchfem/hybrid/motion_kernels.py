@@ -47,9 +47,12 @@ def project(row, vector):
 
 
 @njit(**NJIT_KERNEL)
-def find_integrals(rig, y):
-    """Return the index in the state y of the first integral over time of the first interface, its friction work."""
-    return y.size - N_INTEGRALS - N_FACE_INTEGRALS * rig.faces.shape[0]
+def find_integrals(rig):
+    """Return the index in a state of the first integral over time, the friction work of the first interface.
+
+    The entries before it are the states on which rates depend.
+    """
+    return rig.scales.size - N_INTEGRALS - N_FACE_INTEGRALS * rig.faces.shape[0]
 
 
 @njit(**NJIT_KERNEL)
@@ -102,6 +105,8 @@ def prescribed_load(face, t):
 
     It may be negative, as if the surfaces pulled.
     """
+    if face[Face.SWING] == 0:
+        return face[Face.MEAN], 0.0
     phase = face[Face.RATE] * t + face[Face.PHASE]
     return (
         face[Face.MEAN] + face[Face.SWING] * np.cos(phase),
@@ -209,12 +214,8 @@ def find_rates(rig, state, t, y, rates):
     if is_held:
         hold(rig, state, acceleration)
 
-    output = project(rig.modes[Mode.OUTPUT], y[:n])
-    phase = rig.settings[Setting.OMEGA] * t
     rates[Tail.WORK] = power
     rates[Tail.LOSS] = loss
-    rates[Tail.COSINE] = output * np.cos(phase)
-    rates[Tail.SINE] = output * np.sin(phase)
 
 
 @njit(**NJIT_KERNEL)
@@ -247,7 +248,7 @@ def add_friction(rig, state, i, t, y, rates):
     face = rig.faces[i]
     first = 2 * n + int(face[Face.FIRST_STATE])
     last = first + int(face[Face.N_STATES])
-    integral = find_integrals(rig, y) + N_FACE_INTEGRALS * i
+    integral = find_integrals(rig) + N_FACE_INTEGRALS * i
     for k in range(first, last):
         rates[k] = 0.0
     if rests(memory):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 N_FACE_INTEGRALS = 3  # work, slip and loss of every interface, near the end of a state
-N_INTEGRALS = 4  # number of integrals at the end of a state, see `Tail`
+N_INTEGRALS = 2  # number of integrals at the end of a state, see `Tail`
 N_NODES = 7  # points of a step at which the quantities of a window are evaluated
 WINDOW_START = 28  # row of `State.rows` with the state at the start of the window
 
@@ -17,10 +17,8 @@ WINDOW_START = 28  # row of `State.rows` with the state at the start of the wind
 class Tail(IntEnum):
     """Integrals of a motion over time, by their places from the end of a state (`State.y`)."""
 
-    WORK = -4  # work of the drive [J]
-    LOSS = -3  # energy that the dampers dissipate [J]
-    COSINE = -2  # output times the cosine of the phase of the drive [m s]
-    SINE = -1  # output times the sine of this phase [m s]
+    WORK = -2  # work of the drive [J]
+    LOSS = -1  # energy that the dampers dissipate [J]
 
 
 class Mode(IntEnum):
@@ -255,8 +253,7 @@ class State(NamedTuple):
     """A motion, which the engine updates in place.
 
     - y (n,): N modal coordinates, N velocities, states of the laws, then for every interface friction work [J], path of
-      slip [m] and dissipated energy [J], then work of the drive, loss of the dampers, and the integrals of the output
-      times cosine and sine of the cycle
+      slip [m] and dissipated energy [J], then work of the drive and loss of the dampers
     - memory (M, k): see `Memory`
     - clock (16,): see `Clock`
     - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)

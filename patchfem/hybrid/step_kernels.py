@@ -12,7 +12,7 @@ from scipy.integrate import DOP853
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .motion_kernels import copy_values, find_rates
+from .motion_kernels import find_integrals, find_rates
 from .records import Clock
 
 N_STAGES = 12  # stages of a step
@@ -58,15 +58,17 @@ def find_stages(rig, state, h, first, last, y):
     last : int
         Stage after the last one.
     y : (n,) array
-        State at the last stage, in the order of `State.y` (output).
+        State at the last stage, in the order of `State.y` (output); its integrals at the end of the step alone.
     """
+    n_states = find_integrals(rig)
     for stage in range(first, last):
-        copy_values(state.y, y)
-        for j in range(stage):
-            weight = h * A[stage, j]
-            if weight != 0:
-                for k in range(y.size):
-                    y[k] += weight * state.rows[j, k]
+        # No rate depends on the integrals, which are needed at the end of the step alone.
+        n = y.size if stage == N_STAGES else n_states
+        for k in range(n):
+            total = 0.0
+            for j in range(stage):
+                total += A[stage, j] * state.rows[j, k]
+            y[k] = state.y[k] + h * total
         find_rates(rig, state, state.clock[Clock.TIME] + C[stage] * h, y, state.rows[stage])
 
 

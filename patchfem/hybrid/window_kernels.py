@@ -151,9 +151,10 @@ def raise_extreme(rig, state, fraction, column, sign, known):
 
 @njit(**NJIT_KERNEL)
 def observe_cycle(rig, state, fraction, cycle):
-    """Add the extremes of the output in a part of a step to those of a cycle.
+    """Add the extremes and the first harmonic of the output in a part of a step to those of a cycle.
 
-    Steps are short against the cycle, so that an extreme lies where the velocity changes sign.
+    Steps are short against the cycle, so that an extreme lies where the velocity changes sign. The harmonic needs no
+    stages: the dense output has an error of order 8, so that its integral keeps the order of the step.
 
     Parameters
     ----------
@@ -168,6 +169,14 @@ def observe_cycle(rig, state, fraction, cycle):
     """
     n = rig.modes.shape[1]
     y = state.rows[POINT]
+    length = fraction * state.clock[Clock.LENGTH]
+    for node in range(N_NODES):
+        read_curve(state, fraction * NODES[node], y[:n])
+        phase = rig.settings[Setting.OMEGA] * (state.clock[Clock.TIME] + length * NODES[node])
+        value = length * WEIGHTS[node] * project(rig.modes[Mode.OUTPUT], y[:n])
+        cycle[Cycle.COS] += value * np.cos(phase)
+        cycle[Cycle.SIN] += value * np.sin(phase)
+
     before = project(rig.modes[Mode.OUTPUT], state.y[n : 2 * n])
     read_curve(state, fraction, y)
     add_output(rig, y, cycle)

@@ -65,6 +65,16 @@ def test_harmonics_of_block_in_two_stops_have_the_accuracy_of_its_motion():
     assert values["acceleration_distortion"] == pytest.approx(distortion, rel=1e-9)
 
 
+@pytest.mark.parametrize("rtol, error", [(1e-7, 1e-8), (1e-12, 1e-12)])
+def test_phasor_of_cycle_has_the_accuracy_of_its_motion(rtol, error):
+    """Without load, the phasor of the output at resonance is that of the linear oscillator, 1/(2 zeta).
+
+    It is the integral over a cycle by quadrature of the dense output, at a loose and at a tight tolerance of the step.
+    """
+    motion = runs.run_case(make_oscillator(coulomb(), load=0.0, zeta=0.5, cycles=60, rtol=rtol))
+    assert motion.phasors[-1] == pytest.approx(1.0, abs=error)
+
+
 def test_block_without_stops_after_200_cycles():
     """Friction of half the drive; peak at the end of 200 cycles from exact propagation between reversals."""
     motion = runs.run_case(make_oscillator(coulomb(), load=0.5, rtol=1e-12))
