@@ -61,6 +61,7 @@ def law_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("law")
     adding.copy_package(folder, PAGE)
     run = next(line for line in adding.find_commands(PAGE) if line.endswith("-o rig_dahl"))
+    run = run.replace("--set drive.cycles=800 ", "")
     lines = ["new rig -o rig.toml", run.replace("rig_dahl", f"dahl {SHORT} --no-page")]
     adding.run_commands(folder, lines, NUMBA_DISABLE_JIT="1")
     return folder

@@ -75,8 +75,8 @@ MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
 # Event that is the onset in a run with drive levels, by drive.onset
 ONSET_EVENTS = {
     "slip": "slip begins",
-    "distortion": "the third harmonic of the acceleration exceeds 3 % of the first one",
-    "gauge": "the motion at the output exceeds drive.onset_length",
+    "distortion": "the acceleration's distortion exceeds 3 %",
+    "gauge": "the output exceeds drive.onset_length",
 }
 
 
@@ -123,11 +123,16 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
             parts.append(part)
     if not parts:
         return ""
-    text = ", ".join(parts[:MAX_HEADLINE_PARTS])
+    # The onset in a drive of levels takes the place of other parts, that of no level has a longer sentence.
+    onset = _describe_onset(result, measures)
+    n_parts = MAX_HEADLINE_PARTS
+    if onset:
+        n_parts -= 1 + (measures["onset_level"].value is None)
+    text = ", ".join(parts[:n_parts])
     cycles = details.get("cycles")
     if cycles is not None and cycles < 1 - CYCLE_ROUND_OFF:
         text = f"in {cycles:.2g} of a cycle: {text}"
-    if onset := _describe_onset(result, measures):
+    if onset:
         text = f"{onset}; at the last level: {text}"
     return f"{text[0].upper()}{text[1:]}."
 

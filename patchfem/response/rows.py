@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import structure
 from ..core import MeasureDefinition, Response, add_interface_number, remove_interface_number
-from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance
+from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance, ratio_or_zero
 from . import stationary
 from .loops import (
     Reversal,
@@ -683,8 +683,7 @@ def subtracted_terms(name: str, values: Values):
         return amplitude
     if name == "secant_stiffness":
         force = np.abs(values.get("friction_force_peak", 0.0))
-        ratio = force / np.maximum(amplitude, np.finfo(float).tiny)
-        return np.where(amplitude > 0, ratio, 0.0)[()]
+        return ratio_or_zero(force, amplitude)
     return 0.0
 
 

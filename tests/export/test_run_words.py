@@ -134,7 +134,7 @@ def test_exact_spectra_agree_with_transfer_function():
     [
         (
             ["5 g", "7 g"],
-            r"The third harmonic of the acceleration exceeds 3 % of the first one at (\S+) ",
+            r"The acceleration's distortion exceeds 3 % at (\S+) ",
         ),
         (["1 g", "2 g"], r"No level of the increasing sequence has an acceleration"),
     ],

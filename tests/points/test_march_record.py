@@ -48,7 +48,7 @@ def make_compliant_contact():
     """Return bonds behind shear modes."""
     compliance, x = make_compliance(12, 1e-7)
     force = 60.0 * (1 + 0.8 * x) / 12
-    modes = shear_modes(compliance, 0.4 * force, 1e-6, 12)
+    modes = shear_modes(compliance, 0.4 * force, 12)
     return make_bond_contact(Bonds(0.4, 1e-6), force, ROW, modes)
 
 

@@ -46,12 +46,12 @@ def format_scene(**keys):
 @pytest.mark.parametrize("ratio, outcome", [(0.9, "stuck"), (0.999, "transient"), (1.001, "grows")])
 def test_exact_flutter_amplitude_separates_decay_and_growth(ratio, outcome):
     """A release below the flutter amplitude decays, one above it grows; the amplitude agrees with
-    the closed form within 1e-9."""
+    the closed form within its error of 1e-8."""
     result = pf.run(pf.load(format_scene(start=ratio * FLUTTER_AMPLITUDE)))
     assert result.outcome == outcome
     flutter_amplitude = result.measures["flutter_amplitude"]
     assert (
-        flutter_amplitude.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=1e-9)
+        abs(flutter_amplitude.value - 1e-3 * FLUTTER_AMPLITUDE) <= flutter_amplitude.error
         and flutter_amplitude.error <= 1e-8 * flutter_amplitude.value
     )
     if outcome != "stuck":

@@ -363,7 +363,7 @@ def list_elements(law: LawNumbers) -> tuple[np.ndarray, np.ndarray]:
     """Return stiffness [N/m] and increasing yield displacement [m] (t,) of the elements of a law of `from_elements`."""
     pieces = int(law.numbers[4])
     points = np.array(law.numbers[POINTS : POINTS + pieces + 1])
-    forces = np.array(law.numbers[POINTS + pieces + 1 :])
+    forces = np.array(law.numbers[POINTS + pieces + 1 : POINTS + 2 * (pieces + 1)])
     slopes = np.append(np.diff(forces) / np.diff(points), 0.0)
     return -np.diff(slopes), points[1:]
 
