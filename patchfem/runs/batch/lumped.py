@@ -21,11 +21,16 @@ from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
-from ...points.cases import CaseMarch, list_parameters, march_cases
+from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
 from ...response.errors import ERROR_MEASURES, absolute_change, total_error
-from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
+from ...response.outcome import (
+    AMPLITUDE_ROUND_OFF,
+    describe_ringing,
+    is_drifting,
+    is_ringing_visible,
+)
 from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
 from ...response.rows import (
     AMPLITUDE,
@@ -34,6 +39,7 @@ from ...response.rows import (
     STEADY_AMPLITUDE,
     error_floor,
     larger_term,
+    select_names,
 )
 from ...response.settling import (
     MOTION_CLASSES,
@@ -52,9 +58,19 @@ from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements
 
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
-# Steps per cycle of successive marches. No two of them have a step in common, whose error would not show in their
-# difference.
-BATCH_STEPS_PER_CYCLE = (20, 34, 54, 86, 138, 222, 354, 566, 906)
+# Longest steps per cycle of successive marches of smooth laws
+BATCH_STEPS_PER_CYCLE = (24, 48, 96, 192, 384, 768)
+EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
+# Error of the measures of exact steps relative to their values and to the terms of differences: twice the largest of
+# the random cases of a test
+EXACT_STEPS_ERROR = 5e-8
+# The same of measures that depend on the acceleration within a step, which is the rate of a polynomial
+POLYNOMIAL_ERROR = 1e-6
+DISTORTION = "acceleration_distortion"
+POLYNOMIAL_MEASURES = ("absolute_acceleration_peak", DISTORTION, "equivalent_stiffness")
+# Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
+# at which forced and free motion do not cancel to more than half the digits
+MIN_DETUNING = 1e-6
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
 MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
@@ -67,9 +83,10 @@ MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
 # Cases of a march that are marched again with REFERENCE_STEP_RATIO times as many steps, for the factor between changes and
-# errors. Fewer cases miss a kind of motion in a part of a sweep; more would cost half as much as a march of 48 cases.
+# errors. Fewer cases miss a kind of motion in a part of a sweep; more would cost as much as a march of 48 cases.
 N_REFERENCE_CASES = 16
-REFERENCE_STEP_RATIO = 4
+REFERENCE_STEP_RATIO = 2
+REFERENCE_ORDER = 2  # order of convergence of these marches; that of most laws is higher
 # Fraction of the measures of the reference cases whose error lies within the estimate
 REFERENCE_QUANTILE = 0.95
 # Largest effect of the other measures of a case on a change, relative to the median change of its measure; without a
@@ -197,7 +214,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     begin = process_time()
     cases, scales = collect_cases(models)
     results = CaseResults.blank(len(models))
-    is_alone = np.zeros(len(models), bool)
+    is_alone = np.ones(len(models), bool)
     for indices, refined in refine(cases, scales):
         part = cases.select(indices), _select(scales, indices), refined
         part_results = make_results(select_models(models, indices), *part)
@@ -275,17 +292,27 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     """March cases, and those that miss their tolerance again with more steps.
 
     Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
-    others. The errors follow from the march before, with fewer steps, and from a few cases with many more steps.
+    others. The errors follow from the march before, with fewer steps, and from a few cases with more steps. Exact steps
+    need a single march; cases without a closed form are left out.
     """
     remaining = np.arange(len(cases.parameters))
+    if is_linear_between_events(cases):
+        remaining = np.flatnonzero(has_closed_form(cases))
+        if remaining.size:
+            part = cases.select(remaining)
+            march = march_cases(part, EXACT_STEPS_PER_CYCLE)
+            errors = estimate_exact_errors(part, march)
+            is_met = np.ones(remaining.size, bool)
+            yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
+        return
+
     coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
     for count in BATCH_STEPS_PER_CYCLE[1:]:
         part_cases, part = cases.select(remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
 
-        # The steps of the reference have no ends in common with those of the march, except for whole cycles.
         chosen = choose_reference_cases(remaining.size)
-        reference = march_cases(part_cases.select(chosen), REFERENCE_STEP_RATIO * count + 1)
+        reference = march_cases(part_cases.select(chosen), REFERENCE_STEP_RATIO * count)
         errors = estimate_errors(
             fine.values, coarse.values, (chosen, reference.values), find_repeat_error(part_cases)
         )
@@ -361,8 +388,9 @@ def estimate_errors(
     is_known = np.isfinite(ratios) & (changes[:, chosen] > MEASURE_CHANGE_ROUND_OFF)
     factor = 1.0
     if is_known.any():
-        # The reference has an error as well; that of a march of first order is the largest.
-        factor = REFERENCE_STEP_RATIO / (REFERENCE_STEP_RATIO - 1)
+        # The reference has an error as well.
+        growth = REFERENCE_STEP_RATIO**REFERENCE_ORDER
+        factor = growth / (growth - 1)
         factor *= np.quantile(ratios[is_known], REFERENCE_QUANTILE, method="higher")
     errors = dict.fromkeys(fine, 0.0) | dict(zip(names, factor * changes * sizes))
     return {name: total_error(name, fine, [error], repeat_error) for name, error in errors.items()}
@@ -381,6 +409,49 @@ def find_reliable_changes(changes: np.ndarray) -> np.ndarray:
         of_case = np.nanmedian(known, axis=0, keepdims=True)
     least = np.fmax(of_measure, np.minimum(of_case, MAX_CASE_FACTOR * of_measure))
     return np.where(is_change, np.fmax(changes, least), changes)
+
+
+def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarray]:
+    """Return the errors (n,) by name of the measures of a march by exact steps.
+
+    The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
+    over the amplitude.
+    """
+    values = march.values
+    repeat_error = find_repeat_error(cases)
+    errors = {}
+    for name, value in values.items():
+        size = np.fmax(np.abs(value), larger_term(name, values))
+        relative = POLYNOMIAL_ERROR if name in POLYNOMIAL_MEASURES else EXACT_STEPS_ERROR
+        if name == DISTORTION:  # a ratio of harmonics, which have this error
+            size = np.fmax(size, 1.0)
+        errors[name] = total_error(name, values, [relative * size], repeat_error)
+
+    slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])
+    work = repeat_error * values["friction_force_peak"] * slide
+    errors["loop_area"] += work
+    for name in select_names("run"):
+        errors[name] += work * march.extremes.shape[1]
+    with np.errstate(all="ignore"):
+        ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
+        errors["equivalent_damping"] += ratio * work
+    return errors
+
+
+def has_closed_form(cases: Cases) -> np.ndarray:
+    """Return a mask (n,) of the cases whose mode vibrates, and that have a forced motion."""
+    columns = cases.parameters.T
+    damping = columns[Number.DAMPING]
+    square = columns[Number.OMEGA] ** 2
+    has = columns[Number.STIFFNESS] > damping**2 / 4
+    added = columns[Number.MOBILITY] * columns[Number.LOAD] * cases.numbers[1]
+    added = np.divide(
+        added, cases.numbers[2], where=cases.numbers[0] != 0, out=np.zeros_like(added)
+    )
+    for stiffness in (columns[Number.STIFFNESS], columns[Number.STIFFNESS] + added):
+        detuning = np.hypot(stiffness - square, damping * columns[Number.OMEGA])
+        has &= detuning > MIN_DETUNING * square
+    return has
 
 
 def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
@@ -432,11 +503,21 @@ def make_results(
     window = int(cases.parameters[0, Number.WINDOW])
     classes, steady = _judge_motions(cases, scales, refined)
     is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
-    outcomes = [
-        Outcome.STUCK if stuck else MOTION_CLASSES[number]
-        for number, stuck in zip(classes, is_stuck)
-    ]
-    results.outcome[:] = list(map(str, outcomes))
+
+    # A mode that vibrates freely above a sticking interface is not steady, nor is one whose mean stretch increases.
+    ringing = np.where(is_stuck, find_visible_ringing(cases, scales, refined), 0.0)
+    is_ringing = ringing > 0
+    force = np.diff(np.abs(refined.march.stretches), axis=1)[:, 0] * scales.stick_stiffness
+    is_loading = is_stuck & (force > scales.tolerance * values["friction_force_peak"])
+    is_changing = is_ringing | is_loading
+    classes = np.where(is_changing, MOTION_CLASSES.index(Outcome.TRANSIENT), classes)
+    names = np.array([*map(str, MOTION_CLASSES), str(Outcome.STUCK)], object)
+    results.outcome[:] = names[np.where(is_stuck & ~is_changing, len(MOTION_CLASSES), classes)]
+    period = 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    for case in np.flatnonzero(is_ringing):
+        limits = scales.tolerance[case], scales.decay[case] * period[case]
+        ratio = ringing[case] / values[AMPLITUDE][case]
+        results.warnings[case] = [describe_ringing(ratio, limits, refined.march.extremes.shape[1])]
 
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
@@ -444,6 +525,7 @@ def make_results(
         values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
             steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
         )
+        values[STEADY_AMPLITUDE] = np.where(is_loading, np.nan, values[STEADY_AMPLITUDE])
 
     # A growing motion has no limit, so that no error is stated for its values.
     grows = results.outcome == str(Outcome.GROWS)
@@ -547,6 +629,29 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
     )
 
 
+def find_visible_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.ndarray:
+    """Return the free vibrations (n,) [m] of the modes of n cases whose points stick; 0 where none is visible.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases.
+    """
+    window = int(cases.parameters[0, Number.WINDOW])
+    march = refined.march
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
+    amplitude = march.values[AMPLITUDE]
+    floor = find_floor(AMPLITUDE, march.values, scales)
+    sizes = amplitude, refined.errors[AMPLITUDE], floor
+    is_visible = is_ringing_visible(ringing, *sizes, scales.tolerance) & (amplitude > 0)
+    return np.where(is_visible, ringing, 0.0)
+
+
 def needs_single_run(
     cases: Cases, scales: Scales, refined: Refined, results: CaseResults
 ) -> np.ndarray:
@@ -569,16 +674,6 @@ def needs_single_run(
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
 
-    # A sticking interface may still vibrate freely, or carry a force that increases with its mean stretch.
-    window = int(cases.parameters[0, Number.WINDOW])
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
-    sizes = (values[AMPLITUDE], refined.errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
-    is_unsettled = is_ringing_visible(ringing, *sizes, scales.tolerance)
-    loading = np.abs(values["drift_per_cycle"]) * (window - 1) * scales.stick_stiffness
-    is_unsettled |= loading > scales.tolerance * values["friction_force_peak"]
-    is_alone |= (results.outcome == str(Outcome.STUCK)) & is_unsettled
-
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)
     return is_alone
@@ -588,8 +683,12 @@ def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
     """Store the warnings and notes that follow from the models alone in `results`, by case."""
     creeps = law_has_trait(models[0].friction.law, "creeps")
     for case, model in enumerate(models):
-        if warnings := [*model.source.remarks, *model.rig.structure.notes]:
-            results.warnings[case] = list(shorten_file_names(warnings, model.source.path))
+        texts = [*model.source.remarks, *model.rig.structure.notes]
+        if warnings := [
+            *shorten_file_names(texts, model.source.path),
+            *results.warnings.get(case, ()),
+        ]:
+            results.warnings[case] = warnings
         notes = [*model.source.notes, *(note_on_creep(model.friction) if creeps else ())]
         if notes:
             results.notes[case] = notes
