@@ -7,10 +7,10 @@ is computed by a single run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from time import process_time
 from types import SimpleNamespace
 from typing import NamedTuple
-from warnings import catch_warnings
 
 import numpy as np
 
@@ -22,9 +22,10 @@ from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
+from ...points.law_rows import Law
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import ERROR_MEASURES, absolute_change, total_error
+from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
 from ...response.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
@@ -60,6 +61,10 @@ from .case_results import CaseResults, has_unreadable_measurements
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Longest steps per cycle of successive marches of smooth laws
 BATCH_STEPS_PER_CYCLE = (24, 48, 96, 192, 384, 768)
+# Order of convergence of these marches: that of the steps is 4, that of extremes and instants between them is lower. The
+# law "lugre" is integrated along the path of a step with order 2.
+BATCH_ORDER = 3.0
+LUGRE_ORDER = 2.0
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
 # Error of the measures of exact steps relative to their values and to the terms of differences: twice the largest of
 # the random cases of a test
@@ -82,16 +87,6 @@ MAX_STICKING_SLIP_RATIO = 1e-3
 MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
-# Cases of a march that are marched again with REFERENCE_STEP_RATIO times as many steps, for the factor between changes and
-# errors. Fewer cases miss a kind of motion in a part of a sweep; more would cost as much as a march of 48 cases.
-N_REFERENCE_CASES = 16
-REFERENCE_STEP_RATIO = 2
-REFERENCE_ORDER = 2  # order of convergence of these marches; that of most laws is higher
-# Fraction of the measures of the reference cases whose error lies within the estimate
-REFERENCE_QUANTILE = 0.95
-# Largest effect of the other measures of a case on a change, relative to the median change of its measure; without a
-# limit the drift of a motion that repeats would have the errors of its amplitude
-MAX_CASE_FACTOR = 2.0
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
@@ -292,8 +287,8 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     """March cases, and those that miss their tolerance again with more steps.
 
     Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
-    others. The errors follow from the march before, with fewer steps, and from a few cases with more steps. Exact steps
-    need a single march; cases without a closed form are left out.
+    others. The errors follow from the march before, with fewer steps. Exact steps need a single march; cases without a
+    closed form are left out.
     """
     remaining = np.arange(len(cases.parameters))
     if is_linear_between_events(cases):
@@ -307,15 +302,10 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         return
 
     coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
-    for count in BATCH_STEPS_PER_CYCLE[1:]:
+    for fewer, count in pairwise(BATCH_STEPS_PER_CYCLE):
         part_cases, part = cases.select(remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
-
-        chosen = choose_reference_cases(remaining.size)
-        reference = march_cases(part_cases.select(chosen), REFERENCE_STEP_RATIO * count)
-        errors = estimate_errors(
-            fine.values, coarse.values, (chosen, reference.values), find_repeat_error(part_cases)
-        )
+        errors = estimate_errors(part_cases, fine.values, coarse.values, count / fewer)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -338,11 +328,6 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarse = _select(fine, ~is_done)
 
 
-def choose_reference_cases(n_cases: int) -> np.ndarray:
-    """Return the indices (k,) of the cases that are marched with many more steps, evenly spaced among `n_cases`."""
-    return np.linspace(0, n_cases - 1, min(n_cases, N_REFERENCE_CASES)).round().astype(int)
-
-
 def find_repeat_error(cases: Cases) -> np.ndarray:
     """Return the relative error (n,) of a motion that is not computed further because it repeats.
 
@@ -355,60 +340,35 @@ def find_repeat_error(cases: Cases) -> np.ndarray:
 
 
 def estimate_errors(
-    fine: dict[str, np.ndarray],
-    coarse: dict[str, np.ndarray],
-    reference: tuple[np.ndarray, dict[str, np.ndarray]],
-    repeat_error: np.ndarray,
+    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], ratio: float
 ) -> dict[str, np.ndarray]:
-    """Estimate the errors (n,) of measures by name from a march with fewer steps and from reference cases.
-
-    The error is proportional to the change from the march with fewer steps (`find_reliable_changes`). The factor is the
-    one that contains REFERENCE_QUANTILE of the errors of the reference cases, all measures together.
+    """Return the errors (n,) by name from the values of two marches.
 
     Parameters
     ----------
+    cases : Cases
+        The n cases.
     fine, coarse : dict
-        Values (n,) by name of the march and of that with fewer steps.
-    reference : ((k,) array of int, dict)
-        Indices of the reference cases, and their values (k,) by name with many more steps.
-    repeat_error : (n,) array
-        Relative error of motions that repeat, which is added.
+        Values (n,) by name.
+    ratio : float
+        Ratio of their numbers of steps per cycle.
     """
-    chosen, reference_values = reference
-    true_errors = absolute_change(_select(fine, chosen), reference_values)
-    names = [name for name in fine if name not in ERROR_MEASURES]
-    # Changes are relative to the value of a measure or to the terms of a difference.
-    sizes = np.array([np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in names])
-    sizes = np.maximum(sizes, np.finfo(float).tiny)
+    order = LUGRE_ORDER if cases.numbers[0, 0] == Law.LUGRE else BATCH_ORDER
+    repeat_error = find_repeat_error(cases)
     with np.errstate(all="ignore"):
-        all_changes = absolute_change(fine, coarse)
-        changes = find_reliable_changes(np.array([all_changes[name] for name in names]) / sizes)
-        ratios = np.array([true_errors[name] for name in names]) / (sizes * changes)[:, chosen]
-
-    is_known = np.isfinite(ratios) & (changes[:, chosen] > MEASURE_CHANGE_ROUND_OFF)
-    factor = 1.0
-    if is_known.any():
-        # The reference has an error as well.
-        growth = REFERENCE_STEP_RATIO**REFERENCE_ORDER
-        factor = growth / (growth - 1)
-        factor *= np.quantile(ratios[is_known], REFERENCE_QUANTILE, method="higher")
-    errors = dict.fromkeys(fine, 0.0) | dict(zip(names, factor * changes * sizes))
-    return {name: total_error(name, fine, [error], repeat_error) for name, error in errors.items()}
-
-
-def find_reliable_changes(changes: np.ndarray) -> np.ndarray:
-    """Return relative changes (m, n) of m measures of n cases without those that are small by accident.
-
-    A change counts as at least the median of its measure over the cases, and as the median of its case over the measures
-    up to MAX_CASE_FACTOR times that. A change that is round-off stays, as does a missing one (NaN).
-    """
-    is_change = changes > MEASURE_CHANGE_ROUND_OFF
-    known = np.where(is_change & (changes < 1), changes, np.nan)
-    with catch_warnings(action="ignore", category=RuntimeWarning):  # a measure without any change
-        of_measure = np.nanmedian(known, axis=1, keepdims=True)
-        of_case = np.nanmedian(known, axis=0, keepdims=True)
-    least = np.fmax(of_measure, np.minimum(of_case, MAX_CASE_FACTOR * of_measure))
-    return np.where(is_change, np.fmax(changes, least), changes)
+        errors = convergence_errors(fine, coarse, ratio=ratio, order=order)
+        # A change that is small by accident does not give an error far below those of the other measures, relative to
+        # the value of a measure or to the terms of a difference.
+        sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
+        relative = np.array([errors[name] / sizes[name] for name in errors])
+        is_change = (relative > MEASURE_CHANGE_ROUND_OFF) & (relative < 1)
+        relative = np.where(is_change, relative, np.nan)
+        relative[:, ~is_change.any(axis=0)] = 0.0
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_CONVERGENCE_ORDER
+        for name, error in errors.items():
+            least = typical * sizes[name] * (error > MEASURE_CHANGE_ROUND_OFF * sizes[name])
+            errors[name] = total_error(name, fine, [np.fmax(error, least)], repeat_error)
+    return errors
 
 
 def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarray]:
