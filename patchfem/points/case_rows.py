@@ -43,34 +43,29 @@ class Number(IntEnum):
 
 
 class Now(IntEnum):
-    """Columns of the state (c, 20) of c cases.
+    """Columns of the state (c, 15) of c cases.
 
     Kernels get the row of one case.
 
     - SLIDE, VELOCITY: at the end of the last step [m], [m/s]
-    - MEAN: friction force [N] as a mean over the path of the last step
-    - FORCE: friction force [N] at its end
+    - FORCE: friction force [N] there
     - SLIP: irreversible slide [m]
+    - DIRECTION: direction of slip of a point that is linear between events, 0 during stick
     - MIN, MAX: smallest and largest slide in the cycle [m]
     - COS, SIN: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) over the cycle [m s]
     - WORK_IN: work of the drive per mass since the start [J/kg]
-    - POWER: sum over the steps of the magnitude of this work [J/kg]
+    - POWER: integral of its magnitude [J/kg]
     - VISCOUS: loss of the damper per mass [J/kg]
     - FRICTION: friction work per mass [J/kg]
     - STORED: largest kinetic and elastic energy per mass so far [J/kg]
-    - EVENT: fraction of the last step at which the velocity changes its sign, or at which a rigid point stops or is
-      released, or -1 without such an event
     - ELASTIC: elastic energy of the friction law at the end of the run [J]
-    - TIME_MEAN: friction force [N] as a mean over the time of the last step
-    - SHARE_BEFORE, SHARE_AFTER: irreversible part of the motion just before and after `EVENT`
-    - TURN_FORCE: friction force [N] at `EVENT`, or NaN of a rigid point that stops
     """
 
     SLIDE = 0
     VELOCITY = 1
-    MEAN = 2
-    FORCE = 3
-    SLIP = 4
+    FORCE = 2
+    SLIP = 3
+    DIRECTION = 4
     MIN = 5
     MAX = 6
     COS = 7
@@ -80,16 +75,11 @@ class Now(IntEnum):
     VISCOUS = 11
     FRICTION = 12
     STORED = 13
-    EVENT = 14
-    ELASTIC = 15
-    TIME_MEAN = 16
-    SHARE_BEFORE = 17
-    SHARE_AFTER = 18
-    TURN_FORCE = 19
+    ELASTIC = 14
 
 
 class Seen(IntEnum):
-    """Columns of what is observed (c, 22) in the window of c cases.
+    """Columns of what is observed (c, 20) in the window of c cases.
 
     Kernels get the row of one case.
 
@@ -101,14 +91,13 @@ class Seen(IntEnum):
     - SLIP_START_PHASE_COS, SLIP_START_PHASE_SIN: sums of cosine and sine of twice the phases of the drive at these starts
     - SHARE: irreversible part of the motion at the end of the last step
     - COS_1, SIN_1: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) [m s]
-    - FORCE_COS_1, FORCE_SIN_1: the same of the friction force [N s]
+    - COS_3, SIN_3: the same with 3 OMEGA
     - WORK: friction work by the mean forces of the steps [J]
     - SAMPLED: friction work by the trapezoidal rule [J]
     - PASSED: sum over the steps of the magnitude of the friction work [J]
     - START_SLIDE, START_VELOCITY: at the start of the window [m], [m/s]
     - SPAN: duration [s]
     - SLIDE: integral of the slide over the present cycle [m s]
-    - FORCE_COS_3, FORCE_SIN_3: integrals of the friction force times cos(3 OMEGA t) and sin(3 OMEGA t) [N s]
     """
 
     MAX_ACCELERATION = 0
@@ -122,17 +111,15 @@ class Seen(IntEnum):
     SHARE = 8
     COS_1 = 9
     SIN_1 = 10
-    FORCE_COS_1 = 11
-    FORCE_SIN_1 = 12
+    COS_3 = 11
+    SIN_3 = 12
     WORK = 13
     SAMPLED = 14
     PASSED = 15
     START_SLIDE = 16
     START_VELOCITY = 17
     SPAN = 18
-    FORCE_COS_3 = 19
-    FORCE_SIN_3 = 20
-    SLIDE = 21
+    SLIDE = 19
 
 
 class Loop(IntEnum):

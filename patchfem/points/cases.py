@@ -13,9 +13,8 @@ from ..motion_measures import (
     measure_interface,
     ratio_or_zero,
 )
-from ..structure.exponentials import exponential
-from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Loop, Now, Number, Seen
+from .law_rows import Law
 
 
 class CaseMarch(NamedTuple):
@@ -23,11 +22,13 @@ class CaseMarch(NamedTuple):
 
     - values: measures (c,) by name; NaN where a case does not have the measure
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
+    - stretches (c, 2): mean slide beyond the irreversible slide at the end, in the first and the last measured cycle [m]
     """
 
     values: dict[str, np.ndarray]
     extremes: np.ndarray
     phasors: np.ndarray
+    stretches: np.ndarray
 
 
 def list_parameters(
@@ -83,10 +84,16 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     # The first row is for the cycles before the window.
     loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
-    compiled.load_compiled_module("points.case_kernels").march_cases(
-        steps, make_responses(columns, steps), cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history, loops,
-    )  # fmt: skip
+    outputs = now, seen, history, loops
+    if is_linear_between_events(cases):
+        linear = compiled.load_compiled_module("points.linear_cases_kernels")
+        angles = 2 * np.pi / linear.MAX_STEPS * np.arange(linear.MAX_STEPS + 1)
+        waves = np.column_stack([np.sin(angles), np.cos(angles)])
+        linear.march_cases(steps, waves, cases.parameters, cases.numbers, *outputs)
+    else:
+        smooth = compiled.load_compiled_module("points.smooth_cases_kernels")
+        memory = cases.memory.copy()
+        smooth.march_cases(steps, cases.parameters, cases.numbers, memory, *outputs)
 
     output = columns[Number.OUTPUT][:, None]
     phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
@@ -95,37 +102,34 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
             compute_measures(cases, now, seen, history, loops[:, 1:]),
             np.sort(history[..., :2] * output[..., None], axis=-1),
             phasors * output,
+            find_mean_stretches(cases, now, seen, loops),
         )
 
 
-def make_responses(columns, steps: int) -> np.ndarray:
-    """Return slide and velocity after a step of each case per unit of what moves it, for the march of cases.
+def find_mean_stretches(cases: Cases, now, seen, loops) -> np.ndarray:
+    """Return `CaseMarch.stretches`.
 
     Parameters
     ----------
-    columns : (12, c) array
-        Numbers of the cases, in the order of `Number`.
-    steps : int
-        Whole steps per cycle.
-
-    Returns
-    -------
-    (c, LEVELS + 1, 2, 5) array
-        Axis 1 is the number of halvings of the step. Axis 2 has slide and velocity at its end. Axis 3 has what moves
-        them: slide and velocity at the start, and accelerations 1, t and t^2/2.
+    cases : Cases
+        The c cases that were run.
+    now : (c, 15) array
+        States at the end, in the order of `case_rows.Now`.
+    seen : (c, 20) array
+        What was observed, in the order of `case_rows.Seen`.
+    loops : (c, 1 + w, 5) array
+        Cycles of the window, in the order of `case_rows.Loop`, after a row for those before it.
     """
-    n = columns.shape[1]
-    matrix = np.zeros((n, 5, 5))
-    matrix[:, range(4), range(1, 5)] = 1.0
-    matrix[:, 1, 0] = -columns[Number.STIFFNESS]
-    matrix[:, 1, 1] = -columns[Number.DAMPING]
-    shortest = 2 * np.pi / columns[Number.OMEGA] / steps / TICKS
-    whole = exponential(matrix, shortest, np.arange(5.0))
-    table = np.zeros((n, LEVELS + 1, 2, 5))
-    for level in range(LEVELS, -1, -1):
-        table[:, level] = whole[:, :2]
-        whole = whole @ whole
-    return table
+    omega = cases.parameters[:, Number.OMEGA]
+    n_measured = np.round(seen[:, Seen.SPAN] * omega / (2 * np.pi)).astype(int)
+    ends = np.column_stack([-n_measured, np.full(len(omega), -1)])
+    means = np.take_along_axis(loops[..., Loop.SLIDE], ends + loops.shape[1], axis=1)
+    return means * omega[:, None] / (2 * np.pi) - now[:, [Now.SLIP]]
+
+
+def is_linear_between_events(cases: Cases) -> bool:
+    """Return whether the law of the cases is linear between events, so that their march is exact with any steps."""
+    return cases.numbers[0, 0] in (Law.COULOMB, Law.JENKINS)
 
 
 def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.ndarray]:
@@ -135,9 +139,9 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
     ----------
     cases : Cases
         The cases that were run.
-    now : (c, 20) array
+    now : (c, 15) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 22) array
+    seen : (c, 20) array
         What was observed, in the order of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.
@@ -165,8 +169,7 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
     # The time of stick in place of the phase of the drive that passes during stick.
     stick = seen[:, Seen.STUCK : Seen.SLIP_START_PHASE_SIN + 1].T.copy()
     stick[0] /= omega
-    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
-    force = seen[:, Seen.FORCE_COS_1] - 1j * seen[:, Seen.FORCE_SIN_1]
+    harmonics = find_harmonics(cases, now, seen)
     observations = Observations(
         span=span,
         period=2 * np.pi / omega,
@@ -174,17 +177,17 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
         slip=seen[:, [Seen.MIN_SLIP, Seen.MAX_SLIP]],
         stick=stick,
         work=work,
-        harmonics=np.array([slide, force]),
+        harmonics=np.array([harmonics.slide, harmonics.force]),
         cycles=loops,
     )
     values |= measure_interface(observations, cases.reference)
-    return values | measure_acceleration(*_integrate_acceleration(cases, now, seen, slide), span)
+    return values | measure_acceleration(harmonics.acceleration, harmonics.third, span)
 
 
 def _compute_energies(cases: Cases, now) -> dict[str, np.ndarray]:
     """Return the energies (c,) [J] of the whole run by name, for the balance of `motion_measures`.
 
-    `now` (c, 20) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
+    `now` (c, 15) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
     parameters are per unit of the moving mass.
     """
     columns = cases.parameters.T
@@ -202,41 +205,54 @@ def _compute_energies(cases: Cases, now) -> dict[str, np.ndarray]:
     return {name: energy / columns[Number.MOBILITY] for name, energy in energies.items()}
 
 
-def _integrate_acceleration(cases: Cases, now, seen, slide) -> tuple[np.ndarray, np.ndarray]:
-    """Return the integrals (c,) [m/s] of the absolute acceleration times exp(-i omega t) and exp(-3 i omega t).
+class Harmonics(NamedTuple):
+    """Integrals (c,) over the window of c cases.
+
+    - slide, force, acceleration: slide [m s], friction force [N s] and absolute acceleration of the output [m/s] times
+      exp(-i omega t)
+    - third: this acceleration times exp(-3 i omega t)
+    """
+
+    slide: np.ndarray
+    force: np.ndarray
+    acceleration: np.ndarray
+    third: np.ndarray
+
+
+def find_harmonics(cases: Cases, now, seen) -> Harmonics:
+    """Return the `Harmonics` of cases by integration by parts from the slide.
 
     Over a window of whole cycles, the integral of q'' exp(-i w t) is [q'] + i w ([q] + i w Q) with the integral Q of
-    q exp(-i w t), where [x] is the change of x over the window (integration by parts). At w = 3 omega the drive has no part,
-    so that Q follows from the integral F of the force by the equation of motion q'' + c q' + k q = drive - mobility F:
-
-        Q (k + i w (i w + c)) = -mobility F - [q'] - (i w + c) [q].
-
-    The acceleration of the base, a sin(omega t), has the integral -i a span/2.
+    q exp(-i w t), where [x] is the change of x over the window. That of the friction force follows from the equation of
+    motion q'' + c q' + k q = d sin(omega t) - mobility F. A sine of amplitude a has the integral -i a span/2 at w = omega.
 
     Parameters
     ----------
     cases : Cases
         The c cases that were run.
-    now : (c, 20) array
+    now : (c, 15) array
         States at the end, in the order of `case_rows.Now`.
-    seen : (c, 22) array
+    seen : (c, 20) array
         What was observed, in the order of `case_rows.Seen`.
-    slide : (c,) array
-        Integral of the slide times exp(-i omega t) [m s].
     """
     columns = cases.parameters.T
-    omega = columns[Number.OMEGA]
-    ratio = columns[Number.OUTPUT]
     q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
     v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
-    first = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
-    base = -0.5j * seen[:, Seen.SPAN] * columns[Number.BASE]
+    sine = -0.5j * seen[:, Seen.SPAN]
 
-    # The third harmonic of the slide follows from that of the force.
-    w = 3j * omega
-    damping = columns[Number.DAMPING]
-    force = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
-    load = -columns[Number.MOBILITY] * force - v_jump - (w + damping) * q_jump
-    slide_3 = load / (columns[Number.STIFFNESS] + w * (w + damping))
-    third = v_jump + w * (q_jump + w * slide_3)
-    return ratio * first + base, ratio * third
+    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
+    w = 1j * columns[Number.OMEGA]
+    velocity = q_jump + w * slide
+    acceleration = v_jump + w * velocity
+    force = sine * columns[Number.DRIVE] - acceleration
+    force -= columns[Number.DAMPING] * velocity + columns[Number.STIFFNESS] * slide
+
+    slide_3 = seen[:, Seen.COS_3] - 1j * seen[:, Seen.SIN_3]
+    third = v_jump + 3 * w * (q_jump + 3 * w * slide_3)
+    ratio = columns[Number.OUTPUT]
+    return Harmonics(
+        slide,
+        force / columns[Number.MOBILITY],
+        ratio * acceleration + sine * columns[Number.BASE],
+        ratio * third,
+    )

@@ -137,14 +137,14 @@ def mean_force(numbers, memory, j, load, step):
     if law == Law.TANH:
         return _mean_tanh(numbers[1, j] * load, numbers[2, j], step)
     if law == Law.LUGRE:
-        relaxed = _mean_lugre(numbers, memory[0, j], j, load, step)
+        relaxed = mean_lugre(numbers, memory[0, j], j, load, step)
         force = relaxed.mean
-        last = _lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
+        last = lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
         # A change of the increment changes the velocity at the end by about twice the mean velocity.
         change = DIFFERENCE * (abs(dq) + numbers[1, j] / numbers[3, j])
         velocity = step.end_velocity + 2 * change / step.duration
         other = Step(dq + change, step.duration, step.start_velocity, velocity, step.mobility)
-        slope = (_mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
+        slope = (mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
         elastic = load * numbers[3, j] * (relaxed.end - memory[0, j])
         return MeanForce(force, slope, 0.0, last, elastic)
     if law == Law.CUBIC or law == Law.INTERLOCK:
@@ -235,7 +235,7 @@ def _mean_tanh(limit, speed, step):
 
 
 @njit(**NJIT_CALL)
-def _mean_lugre(numbers, stretch, j, load, step):
+def mean_lugre(numbers, stretch, j, load, step):
     """Return the stretch after a step, and the mean force of the LuGre law.
 
     The stretch z relaxes to the steady one, z_s = g(v)/k in the direction of slip, over a path x = integral of
@@ -280,10 +280,19 @@ def _mean_lugre(numbers, stretch, j, load, step):
 
 
 @njit(**NJIT_CALL)
-def _lugre_force(numbers, j, load, stretch, velocity):
-    """Return the force [N] of the LuGre law of point j at a stretch [m] and a velocity [m/s].
+def lugre_force(numbers, j, load, stretch, velocity):
+    """Return the force [N] of the LuGre law.
 
-    `numbers` (k, m) are those of the laws of m points, and `load` [N] is the normal load.
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    stretch, velocity : float
+        Stretch [m] and velocity [m/s].
     """
     return load * find_force(numbers[:, j], stretch, velocity)
 
@@ -534,8 +543,8 @@ def advance(numbers, memory, j, load, step):
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
-        memory[0, j] = _mean_lugre(numbers, memory[0, j], j, load, step).end
-        memory[1, j] = _lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
+        memory[0, j] = mean_lugre(numbers, memory[0, j], j, load, step).end
+        memory[1, j] = lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
     elif law == Law.MASING:
         _walk(numbers, memory, j, dq, True)
     elif law == Law.BOUC_WEN:

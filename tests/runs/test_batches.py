@@ -127,6 +127,25 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert n_compared >= 4
 
 
+def test_always_sticking_points_are_computed_together():
+    """Elastic-plastic cases need no single run, neither where a mode rings above a stuck point nor near the limit."""
+    cases = draw_points("elastic-plastic", 78, 24)
+    results = batches.solve_models(cases, n_study_cases=MANY)
+    assert all(one["engine"] == lumped.BATCH_ENGINE for one in results.numerics.values())
+    singles = one_by_one.solve(cases)
+    assert (results.outcome == singles.outcome).all() and results.reasons == singles.reasons
+    rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
+    assert np.mean([row.holds for row in rows]) >= 0.99
+    ringing = [
+        case
+        for case in range(24)
+        if any("free vibration" in w for w in singles.warnings.get(case, ()))
+    ]
+    assert ringing and all(
+        results.warnings[case][0] == singles.warnings[case][0] for case in ringing
+    )
+
+
 # Changes after which a rig is not one mode with one point under a sine, or has no motion.
 OTHER_KINDS = [
     "wear.coefficient=1e-14 m^2/N; wear.cycles=1000",

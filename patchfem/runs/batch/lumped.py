@@ -7,10 +7,10 @@ is computed by a single run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from time import process_time
 from types import SimpleNamespace
 from typing import NamedTuple
-from warnings import catch_warnings
 
 import numpy as np
 
@@ -21,11 +21,17 @@ from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
 from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
-from ...points.cases import CaseMarch, list_parameters, march_cases
+from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
+from ...points.law_rows import Law
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import ERROR_MEASURES, absolute_change, total_error
-from ...response.outcome import AMPLITUDE_ROUND_OFF, is_drifting, is_ringing_visible
+from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
+from ...response.outcome import (
+    AMPLITUDE_ROUND_OFF,
+    describe_ringing,
+    is_drifting,
+    is_ringing_visible,
+)
 from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
 from ...response.rows import (
     AMPLITUDE,
@@ -34,6 +40,7 @@ from ...response.rows import (
     STEADY_AMPLITUDE,
     error_floor,
     larger_term,
+    select_names,
 )
 from ...response.settling import (
     MOTION_CLASSES,
@@ -52,9 +59,23 @@ from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements
 
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
-# Steps per cycle of successive marches. No two of them have a step in common, whose error would not show in their
-# difference.
-BATCH_STEPS_PER_CYCLE = (20, 34, 54, 86, 138, 222, 354, 566, 906)
+# Longest steps per cycle of successive marches of smooth laws
+BATCH_STEPS_PER_CYCLE = (24, 48, 96, 192, 384, 768)
+# Order of convergence of these marches: that of the steps is 4, that of extremes and instants between them is lower. The
+# law "lugre" is integrated along the path of a step with order 2.
+BATCH_ORDER = 3.0
+LUGRE_ORDER = 2.0
+EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
+# Error of the measures of exact steps relative to their values and to the terms of differences: twice the largest of
+# the random cases of a test
+EXACT_STEPS_ERROR = 5e-8
+# The same of measures that depend on the acceleration within a step, which is the rate of a polynomial
+POLYNOMIAL_ERROR = 1e-6
+DISTORTION = "acceleration_distortion"
+POLYNOMIAL_MEASURES = ("absolute_acceleration_peak", DISTORTION, "equivalent_stiffness")
+# Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
+# at which forced and free motion do not cancel to more than half the digits
+MIN_DETUNING = 1e-6
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_BATCH_CYCLES = 20  # smallest number of cycles of a run
 MAX_BATCH_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
@@ -66,15 +87,6 @@ MAX_STICKING_SLIP_RATIO = 1e-3
 MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
-# Cases of a march that are marched again with REFERENCE_STEP_RATIO times as many steps, for the factor between changes and
-# errors. Fewer cases miss a kind of motion in a part of a sweep; more would cost half as much as a march of 48 cases.
-N_REFERENCE_CASES = 16
-REFERENCE_STEP_RATIO = 4
-# Fraction of the measures of the reference cases whose error lies within the estimate
-REFERENCE_QUANTILE = 0.95
-# Largest effect of the other measures of a case on a change, relative to the median change of its measure; without a
-# limit the drift of a motion that repeats would have the errors of its amplitude
-MAX_CASE_FACTOR = 2.0
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 
 
@@ -197,7 +209,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     begin = process_time()
     cases, scales = collect_cases(models)
     results = CaseResults.blank(len(models))
-    is_alone = np.zeros(len(models), bool)
+    is_alone = np.ones(len(models), bool)
     for indices, refined in refine(cases, scales):
         part = cases.select(indices), _select(scales, indices), refined
         part_results = make_results(select_models(models, indices), *part)
@@ -275,20 +287,25 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     """March cases, and those that miss their tolerance again with more steps.
 
     Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
-    others. The errors follow from the march before, with fewer steps, and from a few cases with many more steps.
+    others. The errors follow from the march before, with fewer steps. Exact steps need a single march; cases without a
+    closed form are left out.
     """
     remaining = np.arange(len(cases.parameters))
+    if is_linear_between_events(cases):
+        remaining = np.flatnonzero(has_closed_form(cases))
+        if remaining.size:
+            part = cases.select(remaining)
+            march = march_cases(part, EXACT_STEPS_PER_CYCLE)
+            errors = estimate_exact_errors(part, march)
+            is_met = np.ones(remaining.size, bool)
+            yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
+        return
+
     coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
-    for count in BATCH_STEPS_PER_CYCLE[1:]:
+    for fewer, count in pairwise(BATCH_STEPS_PER_CYCLE):
         part_cases, part = cases.select(remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
-
-        # The steps of the reference have no ends in common with those of the march, except for whole cycles.
-        chosen = choose_reference_cases(remaining.size)
-        reference = march_cases(part_cases.select(chosen), REFERENCE_STEP_RATIO * count + 1)
-        errors = estimate_errors(
-            fine.values, coarse.values, (chosen, reference.values), find_repeat_error(part_cases)
-        )
+        errors = estimate_errors(part_cases, fine.values, coarse.values, count / fewer)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -311,11 +328,6 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarse = _select(fine, ~is_done)
 
 
-def choose_reference_cases(n_cases: int) -> np.ndarray:
-    """Return the indices (k,) of the cases that are marched with many more steps, evenly spaced among `n_cases`."""
-    return np.linspace(0, n_cases - 1, min(n_cases, N_REFERENCE_CASES)).round().astype(int)
-
-
 def find_repeat_error(cases: Cases) -> np.ndarray:
     """Return the relative error (n,) of a motion that is not computed further because it repeats.
 
@@ -328,59 +340,78 @@ def find_repeat_error(cases: Cases) -> np.ndarray:
 
 
 def estimate_errors(
-    fine: dict[str, np.ndarray],
-    coarse: dict[str, np.ndarray],
-    reference: tuple[np.ndarray, dict[str, np.ndarray]],
-    repeat_error: np.ndarray,
+    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], ratio: float
 ) -> dict[str, np.ndarray]:
-    """Estimate the errors (n,) of measures by name from a march with fewer steps and from reference cases.
-
-    The error is proportional to the change from the march with fewer steps (`find_reliable_changes`). The factor is the
-    one that contains REFERENCE_QUANTILE of the errors of the reference cases, all measures together.
+    """Return the errors (n,) by name from the values of two marches.
 
     Parameters
     ----------
+    cases : Cases
+        The n cases.
     fine, coarse : dict
-        Values (n,) by name of the march and of that with fewer steps.
-    reference : ((k,) array of int, dict)
-        Indices of the reference cases, and their values (k,) by name with many more steps.
-    repeat_error : (n,) array
-        Relative error of motions that repeat, which is added.
+        Values (n,) by name.
+    ratio : float
+        Ratio of their numbers of steps per cycle.
     """
-    chosen, reference_values = reference
-    true_errors = absolute_change(_select(fine, chosen), reference_values)
-    names = [name for name in fine if name not in ERROR_MEASURES]
-    # Changes are relative to the value of a measure or to the terms of a difference.
-    sizes = np.array([np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in names])
-    sizes = np.maximum(sizes, np.finfo(float).tiny)
+    order = LUGRE_ORDER if cases.numbers[0, 0] == Law.LUGRE else BATCH_ORDER
+    repeat_error = find_repeat_error(cases)
     with np.errstate(all="ignore"):
-        all_changes = absolute_change(fine, coarse)
-        changes = find_reliable_changes(np.array([all_changes[name] for name in names]) / sizes)
-        ratios = np.array([true_errors[name] for name in names]) / (sizes * changes)[:, chosen]
+        errors = convergence_errors(fine, coarse, ratio=ratio, order=order)
+        # A change that is small by accident does not give an error far below those of the other measures, relative to
+        # the value of a measure or to the terms of a difference.
+        sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
+        relative = np.array([errors[name] / sizes[name] for name in errors])
+        is_change = (relative > MEASURE_CHANGE_ROUND_OFF) & (relative < 1)
+        relative = np.where(is_change, relative, np.nan)
+        relative[:, ~is_change.any(axis=0)] = 0.0
+        typical = np.nanmedian(relative, axis=0) / 2**MAX_CONVERGENCE_ORDER
+        for name, error in errors.items():
+            least = typical * sizes[name] * (error > MEASURE_CHANGE_ROUND_OFF * sizes[name])
+            errors[name] = total_error(name, fine, [np.fmax(error, least)], repeat_error)
+    return errors
 
-    is_known = np.isfinite(ratios) & (changes[:, chosen] > MEASURE_CHANGE_ROUND_OFF)
-    factor = 1.0
-    if is_known.any():
-        # The reference has an error as well; that of a march of first order is the largest.
-        factor = REFERENCE_STEP_RATIO / (REFERENCE_STEP_RATIO - 1)
-        factor *= np.quantile(ratios[is_known], REFERENCE_QUANTILE, method="higher")
-    errors = dict.fromkeys(fine, 0.0) | dict(zip(names, factor * changes * sizes))
-    return {name: total_error(name, fine, [error], repeat_error) for name, error in errors.items()}
 
+def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarray]:
+    """Return the errors (n,) by name of the measures of a march by exact steps.
 
-def find_reliable_changes(changes: np.ndarray) -> np.ndarray:
-    """Return relative changes (m, n) of m measures of n cases without those that are small by accident.
-
-    A change counts as at least the median of its measure over the cases, and as the median of its case over the measures
-    up to MAX_CASE_FACTOR times that. A change that is round-off stays, as does a missing one (NaN).
+    The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
+    over the amplitude.
     """
-    is_change = changes > MEASURE_CHANGE_ROUND_OFF
-    known = np.where(is_change & (changes < 1), changes, np.nan)
-    with catch_warnings(action="ignore", category=RuntimeWarning):  # a measure without any change
-        of_measure = np.nanmedian(known, axis=1, keepdims=True)
-        of_case = np.nanmedian(known, axis=0, keepdims=True)
-    least = np.fmax(of_measure, np.minimum(of_case, MAX_CASE_FACTOR * of_measure))
-    return np.where(is_change, np.fmax(changes, least), changes)
+    values = march.values
+    repeat_error = find_repeat_error(cases)
+    errors = {}
+    for name, value in values.items():
+        size = np.fmax(np.abs(value), larger_term(name, values))
+        relative = POLYNOMIAL_ERROR if name in POLYNOMIAL_MEASURES else EXACT_STEPS_ERROR
+        if name == DISTORTION:  # a ratio of harmonics, which have this error
+            size = np.fmax(size, 1.0)
+        errors[name] = total_error(name, values, [relative * size], repeat_error)
+
+    slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])
+    work = repeat_error * values["friction_force_peak"] * slide
+    errors["loop_area"] += work
+    for name in select_names("run"):
+        errors[name] += work * march.extremes.shape[1]
+    with np.errstate(all="ignore"):
+        ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
+        errors["equivalent_damping"] += ratio * work
+    return errors
+
+
+def has_closed_form(cases: Cases) -> np.ndarray:
+    """Return a mask (n,) of the cases whose mode vibrates, and that have a forced motion."""
+    columns = cases.parameters.T
+    damping = columns[Number.DAMPING]
+    square = columns[Number.OMEGA] ** 2
+    has = columns[Number.STIFFNESS] > damping**2 / 4
+    added = columns[Number.MOBILITY] * columns[Number.LOAD] * cases.numbers[1]
+    added = np.divide(
+        added, cases.numbers[2], where=cases.numbers[0] != 0, out=np.zeros_like(added)
+    )
+    for stiffness in (columns[Number.STIFFNESS], columns[Number.STIFFNESS] + added):
+        detuning = np.hypot(stiffness - square, damping * columns[Number.OMEGA])
+        has &= detuning > MIN_DETUNING * square
+    return has
 
 
 def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
@@ -432,11 +463,21 @@ def make_results(
     window = int(cases.parameters[0, Number.WINDOW])
     classes, steady = _judge_motions(cases, scales, refined)
     is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
-    outcomes = [
-        Outcome.STUCK if stuck else MOTION_CLASSES[number]
-        for number, stuck in zip(classes, is_stuck)
-    ]
-    results.outcome[:] = list(map(str, outcomes))
+
+    # A mode that vibrates freely above a sticking interface is not steady, nor is one whose mean stretch increases.
+    ringing = np.where(is_stuck, find_visible_ringing(cases, scales, refined), 0.0)
+    is_ringing = ringing > 0
+    force = np.diff(np.abs(refined.march.stretches), axis=1)[:, 0] * scales.stick_stiffness
+    is_loading = is_stuck & (force > scales.tolerance * values["friction_force_peak"])
+    is_changing = is_ringing | is_loading
+    classes = np.where(is_changing, MOTION_CLASSES.index(Outcome.TRANSIENT), classes)
+    names = np.array([*map(str, MOTION_CLASSES), str(Outcome.STUCK)], object)
+    results.outcome[:] = names[np.where(is_stuck & ~is_changing, len(MOTION_CLASSES), classes)]
+    period = 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    for case in np.flatnonzero(is_ringing):
+        limits = scales.tolerance[case], scales.decay[case] * period[case]
+        ratio = ringing[case] / values[AMPLITUDE][case]
+        results.warnings[case] = [describe_ringing(ratio, limits, refined.march.extremes.shape[1])]
 
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
@@ -444,6 +485,7 @@ def make_results(
         values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
             steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
         )
+        values[STEADY_AMPLITUDE] = np.where(is_loading, np.nan, values[STEADY_AMPLITUDE])
 
     # A growing motion has no limit, so that no error is stated for its values.
     grows = results.outcome == str(Outcome.GROWS)
@@ -547,6 +589,29 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
     )
 
 
+def find_visible_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.ndarray:
+    """Return the free vibrations (n,) [m] of the modes of n cases whose points stick; 0 where none is visible.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Tolerances and reference quantities of the cases.
+    refined : Refined
+        March of the cases.
+    """
+    window = int(cases.parameters[0, Number.WINDOW])
+    march = refined.march
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
+    amplitude = march.values[AMPLITUDE]
+    floor = find_floor(AMPLITUDE, march.values, scales)
+    sizes = amplitude, refined.errors[AMPLITUDE], floor
+    is_visible = is_ringing_visible(ringing, *sizes, scales.tolerance) & (amplitude > 0)
+    return np.where(is_visible, ringing, 0.0)
+
+
 def needs_single_run(
     cases: Cases, scales: Scales, refined: Refined, results: CaseResults
 ) -> np.ndarray:
@@ -569,16 +634,6 @@ def needs_single_run(
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
 
-    # A sticking interface may still vibrate freely, or carry a force that increases with its mean stretch.
-    window = int(cases.parameters[0, Number.WINDOW])
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
-    sizes = (values[AMPLITUDE], refined.errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
-    is_unsettled = is_ringing_visible(ringing, *sizes, scales.tolerance)
-    loading = np.abs(values["drift_per_cycle"]) * (window - 1) * scales.stick_stiffness
-    is_unsettled |= loading > scales.tolerance * values["friction_force_peak"]
-    is_alone |= (results.outcome == str(Outcome.STUCK)) & is_unsettled
-
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)
     return is_alone
@@ -588,8 +643,12 @@ def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
     """Store the warnings and notes that follow from the models alone in `results`, by case."""
     creeps = law_has_trait(models[0].friction.law, "creeps")
     for case, model in enumerate(models):
-        if warnings := [*model.source.remarks, *model.rig.structure.notes]:
-            results.warnings[case] = list(shorten_file_names(warnings, model.source.path))
+        texts = [*model.source.remarks, *model.rig.structure.notes]
+        if warnings := [
+            *shorten_file_names(texts, model.source.path),
+            *results.warnings.get(case, ()),
+        ]:
+            results.warnings[case] = warnings
         notes = [*model.source.notes, *(note_on_creep(model.friction) if creeps else ())]
         if notes:
             results.notes[case] = notes
