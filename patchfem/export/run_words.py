@@ -72,12 +72,6 @@ HEADLINE_PARTS = {
     ),
 }
 MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
-# Event that is the onset in a run with drive levels, by drive.onset
-ONSET_EVENTS = {
-    "slip": "slip begins",
-    "distortion": "the acceleration's distortion exceeds 3 %",
-    "gauge": "the output exceeds drive.onset_length",
-}
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
@@ -144,8 +138,13 @@ def _describe_onset(result: Result, measures: Quantities) -> str:
         return ""
     if onset.value is None:
         return onset.reason
+    event_by_kind = {
+        "slip": "slip begins",
+        "distortion": "the acceleration's distortion exceeds 3 %",
+        "gauge": "the output exceeds drive.onset_length",
+    }
     kind, _ = result.plan.model.rig.drive.levels.onset
-    return f"{ONSET_EVENTS[kind]} at {_format_measure('onset_level', measures)}"
+    return f"{event_by_kind[kind]} at {_format_measure('onset_level', measures)}"
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:

@@ -178,8 +178,12 @@ class _Recoverer:
     def load(self, sign: float, shear, normal) -> _LoadedPiece:
         """Return the piece with its displacement and stress under nodal forces [N/m].
 
-        `sign` is -1 for the lower and 1 for the upper piece. The forces `shear` and `normal` (1 + f, n) act on the nodes
-        of its face, and their first row is the pressed state.
+        Parameters
+        ----------
+        sign : float
+            -1 for the lower and 1 for the upper piece.
+        shear, normal : (1 + f, n) array
+            Forces on the nodes of its face [N/m]; the first row is the pressed state.
         """
         u = compute_displacement(self.piece, shear, normal)
         motion = u[:1] + u[1:]

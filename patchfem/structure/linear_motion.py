@@ -22,9 +22,9 @@ from .exponentials import exponential
 N_NODES = 8  # Gauss points of a step; the polynomial of a sine over a phase of .4 rad has an error of 1e-13
 BLOCK_STEPS = 2048  # steps that are computed together
 SAME_LENGTH_TOL = 1e-9  # relative difference of the lengths of steps that count as equal
-NODES, WEIGHTS = leggauss(N_NODES)
-NODES = (NODES + 1) / 2  # Gauss points as fractions of a step
-WEIGHTS = WEIGHTS / 2
+GAUSS_RULE = leggauss(N_NODES)  # points and weights between -1 and 1
+NODES = (GAUSS_RULE[0] + 1) / 2  # Gauss points as fractions of a step
+WEIGHTS = GAUSS_RULE[1] / 2  # weights of the Gauss points, whose sum is 1
 POINTS = np.concatenate([[0.0], NODES, [1.0]])  # start, Gauss points and end of a step
 
 

@@ -4,18 +4,20 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ... import friction
 from ...convergence import convergence_error
-from ...core import Outcome
+from ...core import Outcome, Response
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.errors import ERROR_MEASURES, absolute_change
-from ...response.events import is_all_stuck
+from ...response.events import Events, is_all_stuck
 from ...response.loops import reversal_force_rule
 from ...response.measures import Values, relative_gap
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures, find_definition
@@ -23,6 +25,36 @@ from ...structure.drive_sizes import is_sinusoidal
 from .levels import run_levels
 from .sample_times import LATE_SAMPLES_PER_CYCLE
 from .solution import Fields, Solution, first_interface_load, first_mode_stiffness
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EngineRun:
+    """Run of an engine that sums the measures over its steps, with its histories.
+
+    - values: measures of the last cycles by name.
+    - response, window: histories of the run and of its last cycles.
+    - extremes (c, 2), phasors (c,): minimum and maximum, and complex amplitude at the drive frequency, of the output [m]
+      in each of c cycles.
+    - ledger: energies [J] and counters by name.
+    - outcome, message: how the run ended, if it ended early.
+    - end: state at the end, from which another run can go on.
+    - cycles_done: number of cycles.
+    - log: events of the interfaces, or None.
+    - snapshots: states of the elements of a patch in the last cycle.
+    """
+
+    values: Values
+    response: Response
+    window: Response
+    extremes: np.ndarray
+    phasors: np.ndarray
+    ledger: Values
+    outcome: Outcome | None
+    message: str
+    end: Any
+    cycles_done: float
+    log: Events | None = None
+    snapshots: Sequence = ()
 
 
 class RunEvaluator:
@@ -159,21 +191,7 @@ class RunEvaluator:
         return is_all_stuck(run.window, self.stick_tolerance)
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
-        """Estimate the errors of the measures without coarse runs.
-
-        Parameters
-        ----------
-        run
-            Run of the engine.
-        drive
-            Drive of the run.
-        values : dict
-            Measures by name.
-        """
-        return {}
-
-    def estimate_errors_of_samples(self, run, drive, values: Values) -> Values:
-        """Estimate the errors of measures that follow from the samples of a random motion; {} for other drives.
+        """Estimate the errors of a run without coarse runs: those of the samples of a random motion; {} for other drives.
 
         They follow from the changes when every second sample of the window is removed, except for the last one.
 

@@ -4,7 +4,7 @@ In: a Model, its Numerics and its Patch. Out: a Solution whose measures the engi
 the histories are those of the last cycles, of equal distances before them, and of the events.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
 
@@ -25,13 +25,12 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import select_names
 from ...structure.drive_sizes import is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import engines, strips
-from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check
+from .evaluation import EngineRun, RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
 from .sample_times import (
     SampleTimes,
@@ -78,37 +77,6 @@ class ElementSnapshot(NamedTuple):
         return self.faces[0][1]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class LumpedRun:
-    """Run of the engine `hybrid`, in which each interface has a single relative displacement, with its histories.
-
-    - values: measures of the last cycles by name.
-    - response, window: histories of the run and of its last cycles.
-    - extremes (c, 2), phasors (c,): minimum and maximum, and complex amplitude at the drive frequency, of the output
-      [m]
-      in each of c cycles.
-    - ledger: energies [J] and counters by name.
-    - outcome, message: how the run ended, if it ended early.
-    - end: arrays of the engine at the end, from which another run can go on.
-    - cycles_done: number of cycles.
-    - log: events of the interfaces, or None.
-    - snapshots: states of the elements of a patch in the last cycle.
-    """
-
-    values: Values
-    response: Response
-    window: Response
-    extremes: np.ndarray
-    phasors: np.ndarray
-    ledger: Values
-    outcome: Outcome | None
-    message: str
-    end: State
-    cycles_done: float
-    log: Events | None = None
-    snapshots: list[ElementSnapshot] = field(default_factory=list)
-
-
 def run_from_event_to_event(
     model, numerics, patch, frames: int = 0, say=None, progress=None
 ) -> Solution:
@@ -149,8 +117,8 @@ class LumpedEvaluator(RunEvaluator):
         self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
 
     def integrate(
-        self, drive, cycles: float, before: LumpedRun | None, frames: int = 0, progress=None
-    ) -> LumpedRun:
+        self, drive, cycles: float, before: EngineRun | None, frames: int = 0, progress=None
+    ) -> EngineRun:
         """Integrate the motion under a drive from the end of another run.
 
         Parameters
@@ -159,7 +127,7 @@ class LumpedEvaluator(RunEvaluator):
             Acceleration of the base, or force over the modal mass.
         cycles : float
             Number of cycles of the drive.
-        before : LumpedRun or None
+        before : EngineRun or None
             Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the interface in the last cycle.
@@ -177,7 +145,7 @@ class LumpedEvaluator(RunEvaluator):
             progress(1.0)
         return run
 
-    def resume(self, drive, cycles: float, state: State | None, frames: int = 0) -> LumpedRun:
+    def resume(self, drive, cycles: float, state: State | None, frames: int = 0) -> EngineRun:
         """Integrate the motion under a drive.
 
         Parameters
@@ -248,7 +216,7 @@ class LumpedEvaluator(RunEvaluator):
 
     def _make_run(
         self, motion, drive, cycles: float, times: SampleTimes, start: State | None
-    ) -> LumpedRun:
+    ) -> EngineRun:
         """Return the histories, energies and events of a motion.
 
         `motion` is what the engine returned, with a row for each sample, and `cycles` the number of cycles of the drive.
@@ -272,7 +240,7 @@ class LumpedEvaluator(RunEvaluator):
             response = self._add_vertical_force(response, drive)
         window = response.select(response.time >= times.window_start * (1 - 1e-15))
 
-        run = LumpedRun(
+        run = EngineRun(
             values=dict(motion.values),
             response=response,
             window=window,
@@ -361,7 +329,7 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run : LumpedRun
+        run : EngineRun
             Run of the engine `hybrid`.
         drive
             Drive of this run, which may be a single level.
@@ -419,10 +387,6 @@ class LumpedEvaluator(RunEvaluator):
         if motion.time.size > 1:
             vibration = compute_stuck_vibration(rig.modes, springs, motion)
         return {"tail": select_strongest(vibration)} if vibration else {}
-
-    def estimate_run_errors(self, run: LumpedRun, drive, values: Values) -> Values:
-        """Estimate the errors of the samples of a random motion; {} for other drives."""
-        return self.estimate_errors_of_samples(run, drive, values)
 
 
 def _find_even_samples(window: Response) -> np.ndarray:

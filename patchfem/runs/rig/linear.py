@@ -4,7 +4,7 @@ In: a Model and its Numerics. Out: a Solution whose measures are sums and extrem
 `structure.linear_motion`. No code is compiled.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ...response.rows import select_names
 from ...structure.drive_sizes import find_drive_omega, is_sinusoidal
 from ...structure.histories import make_response
 from ...structure.linear_motion import POINTS, WEIGHTS, LinearRig, Steps, interpolate
-from .evaluation import RunEvaluator
+from .evaluation import EngineRun, RunEvaluator
 from .sample_times import choose_sample_times
 from .solution import Fields, Solution, describe_escape, find_travel
 
@@ -27,35 +27,6 @@ N_FINE = 32  # parts of a step whose ends are compared to find the extremes of i
 EXTREME_MARGIN = 0.02
 N_HALVINGS = 40  # halvings of a part of a step in the search for the end of the travel
 BORDER_TOL = 1e-9  # distance of two ends of steps that are one, in cycles
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class LinearRun:
-    """Run of a linear rig with its histories.
-
-    - values: measures of the last cycles by name.
-    - response, window: histories of the run and of its last cycles.
-    - extremes (c, 2), phasors (c,): minimum and maximum, and complex amplitude at the drive frequency, of the output [m]
-      in each of c cycles.
-    - ledger: energies [J] and counters by name.
-    - outcome, message: how the run ended, if it ended early.
-    - end: state at the end, from which another run can go on.
-    - cycles_done: number of cycles.
-    - log, snapshots: events and states of interfaces, of which there are none.
-    """
-
-    values: Values
-    response: Response
-    window: Response
-    extremes: np.ndarray
-    phasors: np.ndarray
-    ledger: Values
-    outcome: Outcome | None
-    message: str
-    end: InitialState
-    cycles_done: float
-    log: None = None
-    snapshots: list = field(default_factory=list)
 
 
 def run_linear(model, numerics, patch=None, frames: int = 0, say=None, progress=None) -> Solution:
@@ -79,8 +50,8 @@ class LinearEvaluator(RunEvaluator):
     """Evaluator that computes runs of a linear rig, and measures from the steps of their motions."""
 
     def integrate(
-        self, drive, cycles: float, before: LinearRun | None, frames: int = 0, progress=None
-    ) -> LinearRun:
+        self, drive, cycles: float, before: EngineRun | None, frames: int = 0, progress=None
+    ) -> EngineRun:
         """Integrate the motion under a drive from the end of another run.
 
         Parameters
@@ -89,7 +60,7 @@ class LinearEvaluator(RunEvaluator):
             Acceleration of the base, or force over the modal mass.
         cycles : float
             Number of cycles of the drive.
-        before : LinearRun or None
+        before : EngineRun or None
             Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Not used, because there is no interface.
@@ -117,7 +88,7 @@ class LinearEvaluator(RunEvaluator):
             progress(1.0)
         return run
 
-    def _run(self, drive, cycles: float, start: InitialState, travel: float) -> LinearRun:
+    def _run(self, drive, cycles: float, start: InitialState, travel: float) -> EngineRun:
         """Compute a run, which ends early where the magnitude of the output exceeds `travel` [m]."""
         modes = self.model.rig.modes
         times = choose_sample_times(self.numerics, drive, cycles)
@@ -138,7 +109,7 @@ class LinearEvaluator(RunEvaluator):
         response = self._make_response(drive, samples, np.concatenate([*rows, end[None]]))
         n = modes.omega.size
         window = response.select(response.time >= times.window_start * (1 - 1e-15))
-        return LinearRun(
+        return EngineRun(
             values=observer.compute_measures(),
             response=response,
             window=window,
@@ -170,12 +141,12 @@ class LinearEvaluator(RunEvaluator):
             extra,
         )
 
-    def describe_cycles(self, run: LinearRun, drive, *, stuck: bool) -> Fields:
+    def describe_cycles(self, run: EngineRun, drive, *, stuck: bool) -> Fields:
         """Return the measures that are sums and extremes over the steps.
 
         Parameters
         ----------
-        run : LinearRun
+        run : EngineRun
         drive
             Drive of this run, which may be a single level.
         stuck : bool
@@ -186,7 +157,7 @@ class LinearEvaluator(RunEvaluator):
             values |= dict.fromkeys(select_names("sine"))
         return {"integrated": values}
 
-    def collect_solution_fields(self, run: LinearRun, drive) -> Fields:
+    def collect_solution_fields(self, run: EngineRun, drive) -> Fields:
         """Return the free vibration after a release, by the name of its field in `Solution`; {} for other drives."""
         rig = self.model.rig
         if rig.drive.kind != "free" or run.response.time.size < 2:
@@ -195,16 +166,20 @@ class LinearEvaluator(RunEvaluator):
         vibration = compute_stuck_vibration(rig.modes, springs, run.response)
         return {"tail": select_strongest(vibration)} if vibration else {}
 
-    def estimate_run_errors(self, run: LinearRun, drive, values: Values) -> Values:
-        """Estimate the errors of the samples of a random motion; {} for other drives."""
-        return self.estimate_errors_of_samples(run, drive, values)
-
 
 def list_borders(drive, cycles: float, window_start: float) -> np.ndarray:
     """Return the times (m,) [s] between which the steps have equal lengths.
 
     They are the ends of the cycles, which are counted from the end of the run, the start of the window, and the instants at
     which the formula of the drive changes.
+
+    Parameters
+    ----------
+    drive : drives.DriveSignal
+    cycles : float
+        Number of cycles of the drive.
+    window_start : float
+        Start of the window [s].
     """
     end = cycles * drive.period
     breaks = [segment.start for segment in drive.segments]
@@ -296,8 +271,9 @@ class Observer:
         gauge = points[is_inside][..., :n] @ self.gauge
         same = np.zeros(len(gauge), int)
         for row, values in zip(self.extremes, (gauge, acceleration)):
-            (low, high), *_ = find_extremes(values, same)[1]
-            row[:] = min(row[0], low), max(row[1], high)
+            _, extremes = find_extremes(values, same)
+            row[0] = min(row[0], extremes[0, 0])
+            row[1] = max(row[1], extremes[0, 1])
         self.span += float(lengths[is_inside].sum())
         for k, order in enumerate((1, 3)):
             part = acceleration[:, 1:-1] * phase[is_inside] ** order
@@ -350,17 +326,14 @@ class Observer:
         """Return the measures of the window and of the whole motion by name; NaN without a value."""
         period = self.drive.period
         whole = 1.0 if self.span > period * (1 - 1e-6) else np.nan
-        return {
-            "relative_displacement_amplitude": float(np.ptp(self.extremes[0]) / 2),
-            "absolute_acceleration_peak": float(np.abs(self.extremes[1]).max()),
-            **{
-                name: float(value)
-                for name, value in measure_acceleration(
-                    *(whole * self.harmonics), self.span
-                ).items()
-            },
-            "energy_balance": float(energy_balance(self.energies)),
+        first, third = whole * self.harmonics
+        values = {
+            "relative_displacement_amplitude": np.ptp(self.extremes[0]) / 2,
+            "absolute_acceleration_peak": np.abs(self.extremes[1]).max(),
+            **measure_acceleration(first, third, self.span),
+            "energy_balance": energy_balance(self.energies),
         }
+        return {name: float(value) for name, value in values.items()}
 
 
 # Matrix from the values at the points of a step to those at the ends of N_FINE equal parts of it

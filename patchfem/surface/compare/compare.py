@@ -268,7 +268,8 @@ def _measure(
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
     if tracks and not _is_clear_track(tracks[0], depths, is_placed=is_placed):
         is_beyond_drift = is_placed and area > HALF_WIDTH_95 * error
-        code = "scar_or_drift" if is_beyond_drift else ("no_wear" if is_placed else "elsewhere")
+        unworn_code = "no_wear" if is_placed else "elsewhere"
+        code = "scar_or_drift" if is_beyond_drift else unworn_code
     # The subtracted parabola of a trace, 0 without one.
     bend = float(aligned.fit.state[-2]) if is_trace and is_placed else 0.0
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))

@@ -166,8 +166,8 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
 def solve_non_negative(columns, values) -> np.ndarray:
     """Solve a linear least-squares problem with non-negative factors, for few columns.
 
-    The solution is that of least squares for some subset of the columns, so all subsets are tried. SciPy's `nnls` would
-    import the whole of `scipy.optimize`, which takes longer than the comparison of two traces.
+    The solution is that of least squares for some subset of the columns, so all subsets are tried. The function of SciPy
+    would import the whole of scipy.optimize, which takes longer than the comparison of two traces.
 
     Parameters
     ----------

@@ -273,7 +273,7 @@ class ShootingFinder:
             Values of the measures by name.
         motion
             Periodic motion that was found, with its fixed point.
-        run : LumpedRun
+        run : EngineRun
             Run from which the values follow.
         drive
             Drive of the run.
