@@ -80,7 +80,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "2.0.1"
+__version__ = "2.1.0"
 __all__ = [
     "FitOptions",
     "Measure",
