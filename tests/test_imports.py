@@ -156,7 +156,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     ),
     "check": (rig_without_files(), ("check", "SCENE"), "", HEAVY),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
-    "help": ("", ("--help",), "", HEAVY),
+    "help": ("", ("--help",), "scene.lines", HEAVY + " pydantic"),
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),
@@ -173,7 +173,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
 }
 
 
-@pytest.mark.share(3, 5, 7, 8, 9)
+@pytest.mark.share(3, 5, 6, 7, 8, 9)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""

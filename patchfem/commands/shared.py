@@ -16,9 +16,8 @@ from ..export import folder as folders
 from ..export import page, runs, show, store
 from ..export.charts import axes
 from ..model import model
-from ..scene import scene
+from ..scene import lines, scene
 from ..scene.keys import quantities
-from ..scene.lines import split_assignment, split_key
 from .streams import make_printable
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def _require_different_keys(_, texts: tuple[str, ...] | None) -> None:
     """Raise UsageError if two of the assignments ``table.key=value`` of --set have the same key."""
     keys = set()
     for text in texts or ():
-        key = ".".join(split_key(split_assignment(text)[0]))
+        key = ".".join(lines.split_key(lines.split_assignment(text)[0]))
         if key in keys:
             raise UsageError(f"--set {text}: {key} is given twice; remove one of them")
         keys.add(key)
