@@ -4,6 +4,7 @@ In: a `Result` with a solved patch. Out: `Pieces`, plain arrays on the meshes of
 their interface.
 """
 
+from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
@@ -71,9 +72,10 @@ class _LoadedPiece(NamedTuple):
     - sign: -1 for the lower piece, whose y is then reversed, and 1 for the upper piece.
     - cells: its cells.
     - interface: node numbers of its face in order of x.
-    - u (1 + f, n, 2): displacement [m] in the pressed state, and what each frame adds to it.
-    - stress (f, t, 4): stress at the centres of the cells in each frame [Pa].
+    - u (1 + d, n, 2): displacement [m] in the pressed state, and what each of d load cases adds to it.
+    - stress (d, t, 4): stress at the centres of the cells in each load case [Pa].
     - error: estimated error of this stress.
+    - case (f,): number of the load case of each frame.
     """
 
     sign: float
@@ -82,6 +84,11 @@ class _LoadedPiece(NamedTuple):
     u: np.ndarray
     stress: np.ndarray
     error: recovery.StressError
+    case: np.ndarray
+
+    def add_up_frames(self, u: np.ndarray) -> np.ndarray:
+        """Return (f, ...) in each frame from the pressed state and what each load case adds to it, u (1 + d, ...)."""
+        return (u[:1] + u[1:])[self.case]
 
 
 def compute_pieces(result, pair=None) -> Pieces:
@@ -101,12 +108,17 @@ def compute_pieces(result, pair=None) -> Pieces:
     patch = result.patch
     fields = result.fields
     pair = pair or select_pair_for_stress(patch)
-    low_forces, high_forces = _nodal_forces(patch, fields, pair)
+    # While the whole contact slips in one direction, the stress is the same in all frames; it is computed once.
+    tractions = [fields[name] for name in ("shear_stress", "normal_stress") if name in fields]
+    case = number_distinct_frames(*tractions)
+    first = np.unique(case, return_index=True)[1]
+    cases = {name: values[first] for name, values in fields.items()}
+    low_forces, high_forces = _nodal_forces(patch, cases, pair)
     recover = _Recoverer(pair.piece)
-    low = recover.load(-1.0, *low_forces)
+    low = recover.load(-1.0, *low_forces, case)
     if pair.upper is not pair.piece:
         recover = _Recoverer(pair.upper)
-    high = recover.load(1.0, *high_forces)
+    high = recover.load(1.0, *high_forces, case)
     held = _holder_motion(patch, fields, high.cells.points)
     lower = _make_piece(low, high.error, 0.0)
     upper = _make_piece(high, low.error, held)
@@ -122,6 +134,19 @@ def compute_pieces(result, pair=None) -> Pieces:
     interface["holder_slide"] = np.repeat(slide, surface.x.size, axis=1)
     width = result.plan.model.patch.pieces.width
     return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
+
+
+def number_distinct_frames(*fields: np.ndarray) -> np.ndarray:
+    """Return a number (f,) for each frame of fields (f, ...), the same for frames in which all fields are equal.
+
+    The numbers are counted from 0 in the order of the frames.
+    """
+    numbers = {}
+    number_by_frame = []
+    for frame in zip(*fields):
+        digest = b"".join(sha256(values.tobytes()).digest() for values in frame)
+        number_by_frame.append(numbers.setdefault(digest, len(numbers)))
+    return np.array(number_by_frame)
 
 
 def _nodal_forces(patch, fields: Arrays, pair) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -175,21 +200,24 @@ class _Recoverer:
         self.fit = recovery.fit_recovery(self.cells)
         self.gauss_points = recovery.make_points(self.cells, "gauss")
 
-    def load(self, sign: float, shear, normal) -> _LoadedPiece:
+    def load(self, sign: float, shear, normal, case) -> _LoadedPiece:
         """Return the piece with its displacement and stress under nodal forces [N/m].
 
         Parameters
         ----------
         sign : float
             -1 for the lower and 1 for the upper piece.
-        shear, normal : (1 + f, n) array
+        shear, normal : (1 + d, n) array
             Forces on the nodes of its face [N/m]; the first row is the pressed state.
+        case : (f,) array
+            Number of the load case of each frame, from 0 to d - 1.
         """
         u = compute_displacement(self.piece, shear, normal)
         motion = u[:1] + u[1:]
         stress = recovery.compute_centre_stress(self.cells, motion)
         error = recovery.estimate_error(self.fit, motion, stress, self.gauss_points)
-        return _LoadedPiece(sign, self.cells, self.piece.mesh.pressure_nodes, u, stress, error)
+        nodes = self.piece.mesh.pressure_nodes
+        return _LoadedPiece(sign, self.cells, nodes, u, stress, error, case)
 
 
 def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
@@ -203,10 +231,10 @@ def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
         points=piece.cells.points * flip,
         blocks=tuple(block[:, :: int(piece.sign)] for block in piece.cells.blocks),
         is_coating=piece.cells.is_coating,
-        displacement=(piece.u[:1] + piece.u[1:]) * flip + held,
-        stress=piece.stress * [1.0, 1.0, 1.0, piece.sign],
-        von_mises=von_mises(piece.stress),
-        stress_error=piece.error.relative_error(other_error)[0],
+        displacement=piece.add_up_frames(piece.u) * flip + held,
+        stress=(piece.stress * [1.0, 1.0, 1.0, piece.sign])[piece.case],
+        von_mises=von_mises(piece.stress)[piece.case],
+        stress_error=piece.error.relative_error(other_error)[0][piece.case],
     )
 
 
@@ -219,7 +247,7 @@ def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
     traction = coating_traction.compute_coating_traction(piece.cells, piece.u)
     bonds = coating_traction.interpolate_coating_traction(piece.cells, traction, x)
     signs = {"normal_bond": 1.0, "shear_bond": -piece.sign}
-    return {f"{name}_{side}": signs[name] * (u[:1] + u[1:]) for name, u in bonds.items()}
+    return {f"{name}_{side}": signs[name] * piece.add_up_frames(u) for name, u in bonds.items()}
 
 
 def _holder_motion(patch, fields: Arrays, points) -> np.ndarray:

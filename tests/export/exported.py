@@ -11,11 +11,12 @@ from patchfem.runs import PieceFields, Pieces
 X = np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3])  # columns of nodes [m]
 
 
-def make_piece(sign: float, frames: int, rng) -> PieceFields:
+def make_piece(sign: float, order: np.ndarray, rng) -> PieceFields:
     """Return a piece of three columns of two quadrilaterals, one of them split into triangles.
 
-    The number of a node is 3 * column + row.
+    The number of a node is 3 * column + row. Frames of the same number in `order` (f,) are equal.
     """
+    frames = len(order)
     x, depth = np.meshgrid(X, [0.0, 1e-4, 1e-3], indexing="ij")
     node = np.arange(12).reshape(4, 3)
     corners = (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
@@ -25,18 +26,22 @@ def make_piece(sign: float, frames: int, rng) -> PieceFields:
         points=np.stack([x.ravel(), sign * depth.ravel()], axis=1),
         blocks=(triangles, np.delete(quads, 2, 0)),
         is_coating=np.arange(7) < 3,
-        displacement=rng.normal(size=(frames, 12, 2)) * 1e-6,
-        stress=rng.normal(size=(frames, 7, 4)) * 1e7,
-        von_mises=rng.random((frames, 7)) * 1e7,
-        stress_error=rng.random((frames, 7)),
+        displacement=rng.normal(size=(frames, 12, 2))[order] * 1e-6,
+        stress=rng.normal(size=(frames, 7, 4))[order] * 1e7,
+        von_mises=rng.random((frames, 7))[order] * 1e7,
+        stress_error=rng.random((frames, 7))[order],
     )
 
 
-def write_small_series(folder, frames: int = 3, times=None):
-    """Write a results folder with fields.vtkhdf alone; return the pieces and blocks that were written."""
+def write_small_series(folder, frames: int = 3, times=None, order=None):
+    """Write a results folder with fields.vtkhdf alone; return the pieces and blocks that were written.
+
+    Inside the pieces, frames of the same number in `order` (f,) are equal; by default all frames differ.
+    """
+    order = np.arange(frames) if order is None else np.array(order)
     rng = np.random.default_rng(0)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
-    lower, upper = (make_piece(sign, frames, rng) for sign in (-1.0, 1.0))
+    lower, upper = (make_piece(sign, order, rng) for sign in (-1.0, 1.0))
     interface = {
         "displacement": lower.displacement[:, ::3],
         "normal_stress": rng.random((frames, 4)) * 1e7,

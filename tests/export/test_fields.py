@@ -61,6 +61,20 @@ def test_exact_vtk_reads_pieces(tmp_path, capfd):
         )
 
 
+def test_exact_equal_frames_are_stored_once(tmp_path):
+    """A file has the different frames of each field, and is read in all frames, also the named fields alone."""
+    small = write_small_series(tmp_path / "out", 5, order=[0, 1, 0, 2, 1])
+    lower = small.blocks["lower"]
+    path = tmp_path / "out" / VTKHDF_FILE
+    with h5py.File(path) as file:
+        assert len(file["VTKHDF/lower/CellData/stress"]) == 3 * len(lower.cells)
+    read = read_frames(path, {"stress"}).blocks["lower"]
+    assert np.array_equal(read.cell_data["stress"], lower.cell_data["stress"])
+    assert read.cell_data.keys() == {"stress"} and not read.point_data
+    frames = [parts["lower"].cell_data["stress"] for _, parts in read_with_vtk(path)]
+    np.testing.assert_allclose(frames, lower.cell_data["stress"], MAX_ROUNDING)
+
+
 def test_exact_coating_carries_load_and_friction(bench_folder):
     """In every frame the stress below each coating carries the load and the friction force within 2e-6 of the load."""
     line = read_frames(bench_folder / VTKHDF_FILE).blocks["interface"]

@@ -1,5 +1,7 @@
 """Stress inside the pieces under a uniform load."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,21 @@ def test_exact_stress_on_a_coarser_mesh():
     motion = fine.interface["displacement"]
     atol = 5e-3 * np.abs(motion).max()
     np.testing.assert_allclose(coarse.interface["displacement"], motion, atol=atol)
+
+
+def test_exact_stress_of_equal_frames_is_that_of_each():
+    """Under full slip, where many frames have the same tractions, the fields of a frame are those of it alone."""
+    slip = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\namplitude = "9 um"\nfrequency = "9 Hz"\n'
+    result = pf.run(pf.load(UNIFORM + slip))
+    pieces = compute_pieces(result)
+    n_frames = len(result.fields["time"])
+    assert len(np.unique(pieces.upper.stress, axis=0)) < n_frames
+    for frame in (0, n_frames // 3, n_frames - 1):
+        fields = {name: values[frame : frame + 1] for name, values in result.fields.items()}
+        alone = compute_pieces(replace(result, fields=fields))
+        for name in ("displacement", "stress", "von_mises", "stress_error"):
+            values = getattr(pieces.upper, name)
+            atol = 1e-9 * np.abs(values).max()
+            np.testing.assert_allclose(getattr(alone.upper, name)[0], values[frame], 1e-9, atol)
+        for name, values in pieces.interface.items():
+            np.testing.assert_allclose(alone.interface[name][0], values[frame], 1e-9, 1e-12)

@@ -68,7 +68,7 @@ def make_stress_panels(path: Path) -> list[Panel]:
     PatchfemError
         If the file is damaged.
     """
-    frames = read_frames(path)
+    frames = read_frames(path, {"normal_stress", "von_mises"})
     cycle = last_frames(frames.times)
     count = min(MAX_FILM_FRAMES, cycle.size)
     numbers = cycle[np.linspace(0, cycle.size - 1, count).round().astype(int)]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import open_lossy, write_atomically
-from ...runs.pieces import add_yielding_notes, compute_pieces
+from ...runs.pieces import add_yielding_notes, compute_pieces, number_distinct_frames
 from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 
 VTKHDF_FILE = "fields.vtkhdf"  # name of the file in a results folder
@@ -95,8 +95,8 @@ def _create_group(parent, name: str) -> h5py.Group:
 def _write_block(group, block: Block, times) -> None:
     """Write a block of all frames into an HDF5 group, in the form of VTKHDF.
 
-    It consists of the mesh, the fields with the frames below each other, and the offset of each frame in every field.
-    `times` (f,) [s] are those of the frames.
+    It consists of the mesh, the fields with their different frames below each other, and the offset of each frame in every
+    field. `times` (f,) [s] are those of the frames.
     """
     connectivity, starts, types = block.vtk_cells()
     group.attrs["Version"] = VTKHDF_VERSION
@@ -124,8 +124,10 @@ def _write_block(group, block: Block, times) -> None:
         arrays = _create_group(group, kind)
         offsets = _create_group(steps, f"{kind}Offsets")
         for name, values in data.items():
-            _write_field(arrays, name, values)
-            offsets[name] = values.shape[1] * np.arange(count) * (len(values) > 1)
+            # Equal frames, such as those of full slip, are stored once and have the same offset.
+            number = number_distinct_frames(values)
+            _write_field(arrays, name, values[np.unique(number, return_index=True)[1]])
+            offsets[name] = values.shape[1] * np.broadcast_to(number, count)
 
 
 def _write_array(group, name: str, values: np.ndarray, chunks=True) -> h5py.Dataset:
@@ -173,8 +175,8 @@ def find_fields(folder: Path) -> Path:
     raise Missing(f"{folder}: it has no {VTKHDF_FILE}; {advice}")
 
 
-def read_frames(path: Path) -> Frames:
-    """Read a file of fields.
+def read_frames(path: Path, names: set[str] | None = None) -> Frames:
+    """Read the fields of these names from a file, by default all of them.
 
     PatchfemError is raised if it is damaged, or was written by an older version.
     """
@@ -182,11 +184,11 @@ def read_frames(path: Path) -> Frames:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            blocks = {part: _read_block(root[part], len(times)) for part in STORED_PARTS}
-        for part, names in REQUIRED_FIELDS.items():
-            present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
-            if not names <= present:
-                raise ValueError(f"{part} has no {', '.join(sorted(names - present))}")
+            for part, required in REQUIRED_FIELDS.items():
+                missing = required - {*root[part]["PointData"], *root[part]["CellData"]}
+                if missing:
+                    raise ValueError(f"{part} has no {', '.join(sorted(missing))}")
+            blocks = {part: _read_block(root[part], len(times), names) for part in STORED_PARTS}
     except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         raise PatchfemError(
@@ -195,8 +197,8 @@ def read_frames(path: Path) -> Frames:
     return Frames(Path(path), times, blocks)
 
 
-def _read_block(group, count: int) -> Block:
-    """Read the mesh of a block and its fields in `count` frames."""
+def _read_block(group, count: int, names: set[str] | None) -> Block:
+    """Read the mesh of a block and its fields of these names in `count` frames; None stands for all fields."""
     points = group["Points"][:].reshape(-1, 3)
     first, last = group["Offsets"][:-1], group["Offsets"][1:] - 1
     n_corners = 2 if (last - first).max() == 1 else 4
@@ -204,20 +206,24 @@ def _read_block(group, count: int) -> Block:
     cells = group["Connectivity"][:][corners]
     if not 0 <= cells.min() <= cells.max() < len(points):
         raise ValueError("a cell has a node that does not exist")
-    data = [
-        {name: _read_field(rows, name, size, count) for name, rows in group[kind].items()}
-        for kind, size in (("PointData", len(points)), ("CellData", len(cells)))
-    ]
+    data = []
+    for kind, size in (("PointData", len(points)), ("CellData", len(cells))):
+        fields = group[kind]
+        offsets = group[f"Steps/{kind}Offsets"]
+        wanted = [name for name in fields if names is None or name in names]
+        data.append(
+            {name: _read_field(fields[name], offsets[name][:], size, count) for name in wanted}
+        )
     return Block(points, cells, *data)
 
 
-def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
-    """Read a field (f, size, ...), where f is `count`, or 1 if it does not change.
+def _read_field(rows, offsets: np.ndarray, size: int, count: int) -> np.ndarray:
+    """Read a field (f, size, ...) in f = `count` frames.
 
-    `rows` is the HDF5 dataset of all frames below each other, `name` that of the field, and `size` the number of points
-    or cells in a frame.
+    `rows` is the HDF5 dataset of the different frames below each other, `offsets` (f,) the first row of each frame, and
+    `size` the number of points or cells in a frame.
     """
-    values = rows[:].reshape(-1, size, *VTK_FIELDS[name].shape)
-    if len(values) not in (1, count):
-        raise ValueError(f"{name} has {len(values)} frames")
-    return values
+    name = rows.name.rpartition("/")[2]
+    if len(offsets) != count:
+        raise ValueError(f"{name} has {len(offsets)} frames")
+    return rows[:].reshape(-1, size, *VTK_FIELDS[name].shape)[offsets // size]
