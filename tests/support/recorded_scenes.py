@@ -149,7 +149,10 @@ def read_results(folder: Path, name: str) -> dict:
 
 
 def read_arrays(path: Path, name: str) -> dict:
-    """Return the datasets of an HDF5 file as {name/key: array}, and its attributes as {name/key@attribute: value}."""
+    """Return the datasets of an HDF5 file as {name/key: array}, and its attributes as {name/key@attribute: value}.
+
+    The fields of a VTKHDF file are returned in all frames, however many of them refer to the same rows.
+    """
     out = {}
     with h5py.File(path) as data:
         data.visit((inside := ["/"]).append)
@@ -159,6 +162,13 @@ def read_arrays(path: Path, name: str) -> dict:
             for attribute, value in data[key].attrs.items():
                 if attribute not in REPEATED and not attribute.startswith("_"):
                     out[f"{name}/{key}@{attribute}"] = value
+    for key in [key for key in out if "DataOffsets/" in key]:
+        block, _, field = key.replace("Offsets", "").partition("/Steps/")
+        items = "Points" if field.startswith("PointData") else "Cells"
+        size = int(out[f"{block}/NumberOf{items}"][0])
+        rows = out[f"{block}/{field}"]
+        first_rows = out.pop(key)
+        out[f"{block}/{field}"] = np.concatenate([rows[row : row + size] for row in first_rows])
     return out
 
 
