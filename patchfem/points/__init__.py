@@ -17,7 +17,7 @@ A law is a number in `law_rows.Law` with a branch in each of five functions. Rea
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "case_rows": ("SAME_CASE_CYCLE", "Cases", "Number"),
+    "case_rows": ("SAME_CASE_CYCLE", "SAME_SMOOTH_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "is_linear_between_events", "list_parameters", "march_cases"),
     "checkpoint": ("CheckpointFiles", "store_checkpoints"),
     "contacts": (

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .case_rows import SAME_CASE_CYCLE, Loop, Now, Number, Seen
+from .case_rows import Loop, Now, Number, Seen
 
 N_ROOT_STEPS = 4  # Newton steps for an extreme of a polynomial, from that of a parabola
 N_READ = 2  # measured cycles of a motion that repeats
@@ -383,7 +383,7 @@ def end_cycle(case, now, seen, loop, history):
 
 
 @njit(**NJIT_KERNEL)
-def repeat_cycle(cycle, begin, sums, case, now, history):
+def repeat_cycle(cycle, same, begin, sums, case, now, history):
     """Return the number of cycles after one that ends as it began which repeat it, without being computed.
 
     The last N_READ cycles are computed, because the measures are taken over them.
@@ -392,6 +392,8 @@ def repeat_cycle(cycle, begin, sums, case, now, history):
     ----------
     cycle : int
         Number of cycles that are computed.
+    same : float
+        Change of the cycle relative to the range of the motion, below which it repeats.
     begin : tuple of float
         Slide [m], velocity [m/s] and force [N] at the start of the last cycle.
     sums : tuple of float
@@ -403,14 +405,14 @@ def repeat_cycle(cycle, begin, sums, case, now, history):
     history : (n, 4) array
         Extremes and phasor of every cycle (changed in place).
     """
-    size = SAME_CASE_CYCLE * (now[Now.MAX] - now[Now.MIN])
+    size = same * (now[Now.MAX] - now[Now.MIN])
     force = abs(case[Number.DRIVE]) / case[Number.MOBILITY]
     n_repeated = int(case[Number.CYCLES]) - N_READ - cycle
     if (
         n_repeated <= 0
         or abs(now[Now.SLIDE] - begin[0]) > size
         or abs(now[Now.VELOCITY] - begin[1]) > case[Number.OMEGA] * size
-        or abs(now[Now.FORCE] - begin[2]) > SAME_CASE_CYCLE * force
+        or abs(now[Now.FORCE] - begin[2]) > same * force
     ):
         return 0
     for k in range(cycle, cycle + n_repeated):

@@ -5,8 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Change between two cycles relative to the range of the motion, below which it repeats
+# Change between two cycles relative to the range of the motion, below which it repeats, of exact steps
 SAME_CASE_CYCLE = 1e-10
+# The same of smooth laws with one step per cycle: it decreases with the steps as their error, to 2e-9 with 48 steps
+SAME_SMOOTH_CYCLE = 2e-4
 
 
 class Number(IntEnum):

@@ -25,7 +25,7 @@ from .case_observers_kernels import (
     start_cycle,
     start_window,
 )
-from .case_rows import Now, Number, Seen
+from .case_rows import SAME_CASE_CYCLE, Now, Number, Seen
 from .law_rows import Law
 
 WINDOW_STEPS = 4  # steps of a measured cycle per step of another one
@@ -634,7 +634,9 @@ def march_cases(steps, waves, parameters, numbers, nows, seens, histories, loops
             end_cycle(case, now, seen, loop, histories[j, cycle])
             cycle += 1
             if not observes:
-                repeated = repeat_cycle(cycle, begin, sums, case, now, histories[j])
+                repeated = repeat_cycle(
+                    cycle, SAME_CASE_CYCLE, begin, sums, case, now, histories[j]
+                )
                 cycle += repeated
                 first = cycle if repeated > 0 else first
 

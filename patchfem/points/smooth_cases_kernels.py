@@ -14,26 +14,24 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
+from ..friction.bonds.point_kernels import shape_functions
+from ..friction.laws.lugre_kernels import LuGreNumber, relaxation_length
 from .case_observers_kernels import (
     Instant,
     add_piece,
     end_cycle,
-    find_turn,
     observe_piece,
     repeat_cycle,
     start_cycle,
     start_window,
 )
-from .case_rows import Now, Number, Seen
+from .case_rows import SAME_SMOOTH_CYCLE, Now, Number, Seen
 from .law_rows import Masing
 from .return_maps_kernels import (
     Law,
-    Relaxed,
     Step,
     advance,
-    lugre_force,
     mean_force,
-    mean_lugre,
     prepare,
     read,
     slip_share,
@@ -45,6 +43,7 @@ END_TOLERANCE = 1e-6
 CORNER_TOLERANCE = 1e-5  # smallest path to a corner relative to that of its branch
 # Steps per cycle at which the shortest step is a radian of the vibration above a stiff law, or the time of its relaxation
 REFERENCE_STEPS = 16.0
+MIN_HALF_PATH = 0.1  # shortest path of the bristles in half of a step, or in the other, relative to that of the step
 MAX_LEVEL_STEPS = (
     12  # steps of the Illinois method for the instant at which slip begins, ends or turns
 )
@@ -70,10 +69,27 @@ class Body(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """State at the end of a Runge-Kutta step, and its friction work [J]."""
+    """End of a Runge-Kutta step, without the force of the law there.
 
-    last: Instant
+    - sine, cosine: of the phase of the drive
+    - slide, velocity: [m], [m/s]
+    - acceleration: that of the last stage [m s-2]
+    - work: friction work of the step [J]
+    """
+
+    sine: float
+    cosine: float
+    slide: float
+    velocity: float
+    acceleration: float
     work: float
+
+
+class Bristles(NamedTuple):
+    """Stretch [m] and friction force [N] of the law "lugre"."""
+
+    stretch: float
+    force: float
 
 
 class Probe(NamedTuple):
@@ -102,25 +118,58 @@ def make_instant(sine, cosine, q, v, force, slip, case):
 
 
 @njit(**NJIT_CALL)
-def find_force(step, body):
-    """Return the friction force [N] of a body at the end of a `Step`, and its mean over the path, as `Relaxed`.
+def follow_bristles(step, body):
+    """Return the `Bristles` of the law "lugre" at the end of a `Step`.
 
-    The law "tanh" has no path; its mean is not used.
+    The stretch z relaxes to the steady one, d l(v) in the direction d of slip, as dz/dx = d l - z over a path x with dx =
+    |v|/l dt. The path is integrated by Simpson's rule. With l quadratic in it the relaxation is exact.
     """
+    numbers = body.numbers
+    j = body.column
+    law = numbers[:, j]
+    dt = step.duration
+    direction = 1.0 if step.increment > 0 else -1.0
+    first = step.start_velocity
+    last = step.end_velocity
+    # By Simpson's rule the velocities at both ends and in the middle have the mean increment / duration.
+    middle = 1.5 * step.increment / dt - 0.25 * (first + last)
+    begin = relaxation_length(law, first)
+    centre = relaxation_length(law, middle)
+    end = relaxation_length(law, last)
+    rates = abs(first) / begin, abs(middle) / centre, abs(last) / end
+    path = dt / 6 * (rates[0] + 4 * rates[1] + rates[2])
+    half = dt / 24 * (5 * rates[0] + 8 * rates[1] - rates[2])
+
+    # l = begin + tilt s + bend s^2 at the part s of the path; the middle of the time is at the part m.
+    change = end - begin
+    bend = 0.0
+    if MIN_HALF_PATH * path < half < (1 - MIN_HALF_PATH) * path:
+        m = half / path
+        bend = (change * m - (centre - begin)) / (m * (1 - m))
+    shapes = shape_functions(path)
+    steady = begin * (1 - shapes.decay) + (change - bend) * (1 - shapes.f1)
+    steady += bend * (1 - 2 * shapes.f2)
+    stretch = body.memory[0, j] * shapes.decay + direction * steady
+
+    sign = 1.0 if last > 0 else -1.0
+    damping = law[LuGreNumber.MICRO_DAMPING] * (1 - sign * stretch / end)
+    force = law[LuGreNumber.STIFFNESS] * stretch + (damping + law[LuGreNumber.VISCOUS]) * last
+    return Bristles(stretch, body.case[Number.LOAD] * force)
+
+
+@njit(**NJIT_CALL)
+def find_force(step, body):
+    """Return the friction force [N] of a body at the end of a `Step`."""
     case = body.case
     numbers = body.numbers
     memory = body.memory
     j = body.column
     load = case[Number.LOAD]
     if numbers[0, j] == Law.TANH:
-        force = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
-        return Relaxed(force, force)
+        return numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     if numbers[0, j] == Law.LUGRE:
-        relaxed = mean_lugre(numbers, memory[0, j], j, load, step)
-        force = lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
-        return Relaxed(force, relaxed.mean)
-    mean = mean_force(numbers, memory, j, load, step)
-    return Relaxed(mean.end, mean.force)
+        return follow_bristles(step, body).force
+    return mean_force(numbers, memory, j, load, step).end
 
 
 @njit(**NJIT_KERNEL)
@@ -159,30 +208,24 @@ def take_step(first, dt, half_turn, body):
     half = 0.5 * dt
     rise = half * v + 0.5 * half * half * a
     v_1 = v + half * a
-    force_1 = find_force(Step(rise, half, v, v_1, 0.0), body).end
+    force_1 = find_force(Step(rise, half, v, v_1, 0.0), body)
     a_1 = make_instant(sine, cosine, first.slide + rise, v_1, force_1, 0.0, case).acceleration
     v_2 = v + half * a_1
     force_2 = force_1
     if numbers[0, j] == Law.TANH or numbers[0, j] == Law.LUGRE:
-        force_2 = find_force(Step(rise, half, v, v_2, 0.0), body).end
+        force_2 = find_force(Step(rise, half, v, v_2, 0.0), body)
     a_2 = make_instant(sine, cosine, first.slide + rise, v_2, force_2, 0.0, case).acceleration
 
     # An estimate of the end, and the end
     rise = dt * v + half * dt * a_2
     v_3 = v + dt * a_2
-    force_3 = find_force(Step(rise, dt, v, v_3, 0.0), body).end
+    force_3 = find_force(Step(rise, dt, v, v_3, 0.0), body)
     q_3 = first.slide + rise
     a_3 = make_instant(last_sine, last_cosine, q_3, v_3, force_3, 0.0, case).acceleration
-    dq = dt * v + dt * dt / 6 * (a + a_1 + a_2)
-    end = v + dt / 6 * (a + 2 * a_1 + 2 * a_2 + a_3)
-
-    force = find_force(Step(dq, dt, v, end, 0.0), body)
-    work = force.mean * dq
-    if numbers[0, j] == Law.TANH:
-        work = first.force * v + 2 * force_1 * v_1 + 2 * force_2 * v_2 + force_3 * v_3
-        work *= dt / 6
-    last = make_instant(last_sine, last_cosine, first.slide + dq, end, force.end, first.slip, case)
-    return Taken(last, work)
+    slide = first.slide + dt * v + dt * dt / 6 * (a + a_1 + a_2)
+    velocity = v + dt / 6 * (a + 2 * a_1 + 2 * a_2 + a_3)
+    power = first.force * v + 2 * force_1 * v_1 + 2 * force_2 * v_2 + force_3 * v_3
+    return Taken(last_sine, last_cosine, slide, velocity, a_3, dt / 6 * power)
 
 
 @njit(**NJIT_KERNEL)
@@ -227,21 +270,19 @@ def locate_end(first, taken, dt, corner, turns, body):
     body : Body
     """
     case = body.case
-    change = abs(first.velocity - taken.last.velocity)
-    path = abs(taken.last.slide - first.slide)
-    time = dt * corner / path
+    change = abs(first.velocity - taken.velocity)
+    time = dt * corner / abs(taken.slide - first.slide)
     if turns:
-        time = dt * find_turn(first, taken.last, dt)
+        time = dt * abs(first.velocity) / change
     for _ in range(MAX_END_STEPS):
         taken = take_step(first, time, find_half_turn(time, case), body)
-        at = taken.last
         if turns:
-            miss = at.velocity
-            rate = at.acceleration
+            miss = taken.velocity
+            rate = taken.acceleration
             is_near = abs(miss) <= END_TOLERANCE * change
         else:
-            miss = abs(at.slide - first.slide) - (1 - END_TOLERANCE) * corner
-            rate = abs(at.velocity)
+            miss = abs(taken.slide - first.slide) - (1 - END_TOLERANCE) * corner
+            rate = abs(taken.velocity)
             is_near = abs(miss) <= 0.5 * END_TOLERANCE * corner
         if is_near or rate == 0:
             break
@@ -348,13 +389,18 @@ def commit(first, taken, dt, end, body):
     numbers = body.numbers
     memory = body.memory
     j = body.column
-    at = taken.last
-    dq = at.slide - first.slide
+    dq = taken.slide - first.slide
     load = case[Number.LOAD]
-    advance(numbers, memory, j, load, Step(dq, dt, first.velocity, end, 0.0))
+    step = Step(dq, dt, first.velocity, end, 0.0)
+    if numbers[0, j] == Law.LUGRE:
+        bristles = follow_bristles(step, body)
+        memory[0, j] = bristles.stretch
+        memory[1, j] = bristles.force
+    else:
+        advance(numbers, memory, j, load, step)
     state = read(numbers, memory, j, load)
-    slip = at.slide - state.stretch
-    return make_instant(at.sine, at.cosine, at.slide, end, state.force, slip, case)
+    slip = taken.slide - state.stretch
+    return make_instant(taken.sine, taken.cosine, taken.slide, end, state.force, slip, case)
 
 
 @njit(**NJIT_CALL)
@@ -378,7 +424,7 @@ def probe(first, dt, body):
     kept = memory[0, j], memory[1, j], memory[2, j], memory[3, j], memory[4, j], memory[5, j]
     stretch = memory[Masing.STRETCH, j] if has_stack else 0.0
     taken = take_step(first, dt, find_half_turn(dt, case), body)
-    last = commit(first, taken, dt, taken.last.velocity, body)
+    last = commit(first, taken, dt, taken.velocity, body)
     # At a turn the direction is that of the step.
     direction = first.velocity + last.velocity
     velocity = last.velocity if direction * last.velocity > 0 else TURN_SPEED * direction
@@ -578,16 +624,16 @@ def march_cycle(steps, observes, body, now, seen, loop):
             taken = take_step(first, dt, half_turn, body)
 
             # The step ends at a turn, after which the law is stiff again, or at the corner of the law before it.
-            turns = first.velocity * taken.last.velocity < 0
+            turns = first.velocity * taken.velocity < 0
             corner = find_corner(first, body)
-            passes = abs(taken.last.slide - first.slide) > corner
+            passes = abs(taken.slide - first.slide) > corner
             turns = turns and not passes
             if turns or passes:
                 dt, taken = locate_end(first, taken, dt, corner, turns, body)
             phase = omega * ((k + 1) * node - left)
             if observes:
                 observe_step(phase, first, taken, dt, body, seen)
-            end = 0.0 if turns else taken.last.velocity
+            end = 0.0 if turns else taken.velocity
             last = commit(first, taken, dt, end, body)
             add_piece(first, last, dt, taken.work, last.force, case, now, loop)
             if observes and (turns or passes):
@@ -635,6 +681,7 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, loop
         Cycles of the window, in the order of `case_rows.Loop`, after a row for those before it. Cycles that are not
         measured keep their values (output).
     """
+    same = SAME_SMOOTH_CYCLE / steps**3
     for j in range(parameters.shape[0]):
         case = parameters[j]
         now = nows[j]
@@ -667,7 +714,7 @@ def march_cases(steps, parameters, numbers, memory, nows, seens, histories, loop
             end_cycle(case, now, seen, loop, histories[j, cycle])
             cycle += 1
             if not observes:
-                repeated = repeat_cycle(cycle, begin, sums, case, now, histories[j])
+                repeated = repeat_cycle(cycle, same, begin, sums, case, now, histories[j])
                 cycle += repeated
                 first = cycle if repeated > 0 else first
 

@@ -102,7 +102,7 @@ def test_always_steps_converge(name):
         assert np.median(np.abs(fine[measure] - truth[measure]) / size) <= 1e-3
 
 
-@pytest.mark.parametrize("name", ["tanh", "bouc-wen", "iwan"])
+@pytest.mark.parametrize("name", ["tanh", "bouc-wen", "iwan", "lugre"])
 def test_exact_errors_decrease_down_to_round_off(name):
     """The amplitudes of six drives with 300 and with 1000 steps per cycle agree within 2e-7, which the residuals of the
     steps must not disturb."""

@@ -4,7 +4,7 @@ numbers: limit mu N [N], length eps [m], exponent n, shape s; memory: z. Over th
 follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - (1 - 2 s) |y|^n on unloading.
 """
 
-from math import exp, log1p
+from math import exp, expm1, log1p
 from typing import NamedTuple
 
 from ...compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
@@ -59,9 +59,29 @@ def _saturate(distance, power, path):
     return FollowedPath(end, fall / power * ratio / path)
 
 
+@njit(**NJIT_KERNEL)
+def _unload_linearly(y, unloading, path):
+    """Return y < 0 after a path, and its mean, by dy/dx = 1 + a y; the path ends where y = 0.
+
+    `unloading` is a = 1 - 2 s, and `path` is the longest one in lengths. The result has the path in place of the end.
+    """
+    rate = 1 + unloading * y
+    if abs(unloading) < SMALL_RATIO:
+        rest = -y * (1 - 0.5 * unloading * y * (1 - 2 / 3 * unloading * y))
+    else:
+        rest = -log1p(unloading * y) / unloading
+    piece = min(path, rest)
+    x = unloading * piece
+    if abs(x) < SMALL_RATIO:
+        growth = 0.5 * piece * (1 + x / 3 * (1 + 0.25 * x))
+    else:
+        growth = (expm1(x) / x - 1) / unloading
+    return FollowedPath(piece, y + rate * growth)
+
+
 @njit(**NJIT_CALL)
 def follow_path(y, path, power, shape):
-    """Return y after a path, by Runge-Kutta steps up to the neighbourhood of 1, where the solution is known.
+    """Return y after a path, by Runge-Kutta steps where the solution is not known.
 
     Parameters
     ----------
@@ -88,6 +108,16 @@ def follow_path(y, path, power, shape):
             area += left - left * rest.mean
             y = 1 - rest.end
             break
+
+        # Up to y = 0 it is known if the rate is linear in y.
+        if y < 0 and (power == 1.0 or unloading == 0):
+            slope = unloading if power == 1.0 else 0.0
+            moved = _unload_linearly(y, slope, left)
+            area += moved.end * moved.mean
+            reaches = moved.end < left
+            y = 0.0 if reaches else y + moved.end + slope * moved.end * moved.mean
+            left -= moved.end
+            continue
 
         # A piece ends where loading begins, at y = 0, beside which pieces for a fractional power grow with y.
         first = _find_rate(y, power, unloading)

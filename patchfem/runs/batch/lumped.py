@@ -20,9 +20,8 @@ from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import collect_columns, select_models
-from ...points.case_rows import SAME_CASE_CYCLE, Cases, Number
+from ...points.case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.law_rows import Law
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
 from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
@@ -61,10 +60,8 @@ from .case_results import CaseResults, has_unreadable_measurements
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Longest steps per cycle of successive marches of smooth laws
 BATCH_STEPS_PER_CYCLE = (24, 48, 96, 192, 384, 768)
-# Order of convergence of these marches: that of the steps is 4, that of extremes and instants between them is lower. The
-# law "lugre" is integrated along the path of a step with order 2.
+# Order of convergence of these marches: that of the steps is 4, that of extremes and instants between them is lower
 BATCH_ORDER = 3.0
-LUGRE_ORDER = 2.0
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
 # Error of the measures of exact steps relative to their values and to the terms of differences: twice the largest of
 # the random cases of a test
@@ -305,7 +302,7 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     for fewer, count in pairwise(BATCH_STEPS_PER_CYCLE):
         part_cases, part = cases.select(remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
-        errors = estimate_errors(part_cases, fine.values, coarse.values, count / fewer)
+        errors = estimate_errors(part_cases, fine.values, coarse.values, (count, fewer))
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -328,19 +325,19 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarse = _select(fine, ~is_done)
 
 
-def find_repeat_error(cases: Cases) -> np.ndarray:
+def find_repeat_error(cases: Cases, same: float) -> np.ndarray:
     """Return the relative error (n,) of a motion that is not computed further because it repeats.
 
-    A cycle differs from the one before by at most SAME_CASE_CYCLE. The differences of the cycles left out decrease at
-    least as fast as the mode rings down, so that their sum is that of a geometric series.
+    A cycle differs from the one before by at most `same`, relative to the range of the motion. The differences of the
+    cycles left out decrease at least as fast as the mode rings down, so that their sum is that of a geometric series.
     """
     columns = cases.parameters.T
     decrease = -np.expm1(-np.pi * columns[Number.DAMPING] / columns[Number.OMEGA])
-    return SAME_CASE_CYCLE / np.maximum(decrease, 1 / columns[Number.CYCLES])
+    return same / np.maximum(decrease, 1 / columns[Number.CYCLES])
 
 
 def estimate_errors(
-    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], ratio: float
+    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], steps: tuple[int, int]
 ) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name from the values of two marches.
 
@@ -350,13 +347,12 @@ def estimate_errors(
         The n cases.
     fine, coarse : dict
         Values (n,) by name.
-    ratio : float
-        Ratio of their numbers of steps per cycle.
+    steps : (int, int)
+        Their numbers of steps per cycle.
     """
-    order = LUGRE_ORDER if cases.numbers[0, 0] == Law.LUGRE else BATCH_ORDER
-    repeat_error = find_repeat_error(cases)
+    repeat_error = find_repeat_error(cases, SAME_SMOOTH_CYCLE / steps[0] ** 3)
     with np.errstate(all="ignore"):
-        errors = convergence_errors(fine, coarse, ratio=ratio, order=order)
+        errors = convergence_errors(fine, coarse, ratio=steps[0] / steps[1], order=BATCH_ORDER)
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
         sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
@@ -378,7 +374,7 @@ def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarra
     over the amplitude.
     """
     values = march.values
-    repeat_error = find_repeat_error(cases)
+    repeat_error = find_repeat_error(cases, SAME_CASE_CYCLE)
     errors = {}
     for name, value in values.items():
         size = np.fmax(np.abs(value), larger_term(name, values))
