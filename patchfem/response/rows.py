@@ -688,13 +688,12 @@ def subtracted_terms(name: str, values: Values):
 
 
 def _find_own_values(name: str, values: Values) -> Values:
-    """Return the values by name without a number; of several interfaces, those of the interface of a measure."""
+    """Return values by name, in which a name without a number is that of the interface of the measure `name`."""
     number = name[len(remove_interface_number(name)) :]
-    own_values = {}
-    for other_name, value in values.items():
-        base_name = remove_interface_number(other_name)
-        own_values[base_name] = values.get(base_name + number, value)
-    return own_values
+    if not number:
+        return values
+    numbered = {other: value for other, value in values.items() if other.endswith(number)}
+    return values | {remove_interface_number(other): value for other, value in numbered.items()}
 
 
 def set_final_floors(measures: Measures, tolerance: float) -> Measures:

@@ -7,7 +7,6 @@ from typing import Any
 from .keys.choices import find_choices, iterate_tables
 from .keys.tables import Tables
 from .keys.types import list_keys
-from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
 
 # File name extensions of universal files, by which every reader knows them
@@ -60,7 +59,7 @@ def require_files(scene: Any) -> Any:
     """
     absent = list_absent_files(scene, scene.path.parent)
     if absent:
-        draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})
+        draft = SceneDraft(str(scene.path), scene.text, {})
         draft.sets = {key for key, _ in absent if key not in draft.lines}
         for key, message in absent:
             draft.add_mistake(key, message)

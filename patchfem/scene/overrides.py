@@ -15,7 +15,7 @@ from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_ANGLE_BETWEEN_PIECES
 from .keys.types import KeyValue, Table
-from .lines import find_key_lines, find_scene_value
+from .lines import find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
@@ -69,10 +69,9 @@ class BaseScene:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._lines = find_key_lines(scene.text)
         values = tomllib.loads(scene.text)
         values.pop("sweep", None)
-        self._draft = SceneDraft(str(scene.path), self._lines, values)
+        self._draft = SceneDraft(str(scene.path), scene.text, values)
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         # Valid tables by name and plain values; equal tables of several scenes are the same object.
@@ -86,7 +85,7 @@ class BaseScene:
         """
         sets = tuple(sets)
         base = self.scene
-        draft = SceneDraft(str(base.path), self._lines, dict(self._draft.raw))
+        draft = SceneDraft(str(base.path), base.text, dict(self._draft.raw))
         draft.sets = set(self._draft.sets)
         for name in {key.partition(".")[0].strip() for key in sets} & draft.raw.keys():
             draft.raw[name] = deepcopy(draft.raw[name])

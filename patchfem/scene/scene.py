@@ -190,9 +190,9 @@ def _read_scene(
     prepare: Callable | None = None,
 ) -> Scene:
     """Read a scene from its text, with the parameters of `loads`, but without the scene as written."""
-    raw, lines = parse_text(text, path)
+    raw = parse_text(text, path)
     sets = tuple(sets)
-    draft = SceneDraft(str(path), lines, raw)
+    draft = SceneDraft(str(path), text, raw)
     swept = []
     if "sweep" in raw:
         fixed = {split_assignment(assignment)[0] for assignment in sets}
@@ -312,8 +312,8 @@ def read_sweep_axes(text: str, path: str | Path) -> tuple[list[assignments.Axis]
 
     An axis is a key with its values. `path` names the file in the lines.
     """
-    raw, lines = parse_text(text, path)
-    draft = SceneDraft(str(path), lines, raw)
+    raw = parse_text(text, path)
+    draft = SceneDraft(str(path), text, raw)
     swept = _read_axes(draft, raw["sweep"]) if "sweep" in raw else []
     return swept, draft.mistake_lines()
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
 from .keys.values import TomlTable
-from .lines import find_key_lines
 from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
@@ -29,13 +27,6 @@ _QUANTITY_OR_WORD_PATTERN = re.compile(
 )
 # Pattern of the position in an error message of tomllib
 _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-
-
-class ParsedText(NamedTuple):
-    """Values of a TOML text, with the line of every key."""
-
-    values: TomlTable
-    lines: dict[str, int]
 
 
 def read_text(path: str | Path) -> str:
@@ -69,14 +60,13 @@ def read_text(path: str | Path) -> str:
         ) from None
 
 
-def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the values of a TOML text and the lines of its keys.
+def parse_text(text: str, path: str | Path) -> TomlTable:
+    """Return the values of a TOML text.
 
     `path` names the file in the message of the SceneError that is raised if the text is not TOML.
     """
     try:
-        values = tomllib.loads(text)
-        return ParsedText(values, find_key_lines(text))
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError([_describe_syntax(error, text, path)]) from None
 

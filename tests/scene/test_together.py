@@ -44,7 +44,7 @@ def test_reports_each_row_at_its_first_key(condition):
             assert key == "kind" or known is not None, key
             assert known is None or not words or set(words.split("|")) <= {*known.allowed}, clause
 
-    draft = SceneDraft("a.toml", {}, write_plain_values(condition_of_contact))
+    draft = SceneDraft("a.toml", "", write_plain_values(condition_of_contact))
     draft.tables = build_table(Tables, {"contact": build_table(Contact, {})})
     together.check_together(draft, find_kind(draft))
     first = condition_of_contact.split(" & ")[0].lstrip("!").partition("=")[0]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from ...exceptions import PatchfemError
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import Table, build_table
 from ..keys.values import TomlTable, TomlValue
-from ..lines import find_line, number_items_from_one
+from ..lines import find_key_lines, find_line, number_items_from_one
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
@@ -41,8 +41,8 @@ class SceneDraft:
     ----------
     path : str
         Path of the file, as messages name it.
-    lines : dict
-        Dotted key -> line of the file.
+    text : str
+        Text of the file.
     raw : dict
         Plain values of the file. Values of --set are written into them.
 
@@ -53,9 +53,9 @@ class SceneDraft:
     - read_before: id of a plain table of `raw` -> the table that it gives, which need not be read again.
     """
 
-    def __init__(self, path: str, lines: dict[str, int], raw: TomlTable) -> None:
+    def __init__(self, path: str, text: str, raw: TomlTable) -> None:
         self.path = path
-        self.lines = dict(lines)
+        self.text = text
         self.raw = raw
         self.sets: set[str] = set()
         self.swept_key = ""
@@ -67,6 +67,11 @@ class SceneDraft:
         self.suggested_keys: set[str] = set()
         # Keys (order, line of text); a dict lists each mistake only once.
         self._mistakes: dict[tuple[int, str], None] = {}
+
+    @cached_property
+    def lines(self) -> dict[str, int]:
+        """Line of the file by dotted key, found when the first message needs it; a scene without mistakes needs none."""
+        return dict(find_key_lines(self.text))
 
     @property
     def values(self) -> TableView:
