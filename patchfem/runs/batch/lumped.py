@@ -371,7 +371,8 @@ def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarra
     """Return the errors (n,) by name of the measures of a march by exact steps.
 
     The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
-    over the amplitude.
+    over the amplitude. While a point sticks, the work of a cycle is the change of the energy of its spring, so that it may
+    be wrong only by the difference of two cycles.
     """
     values = march.values
     repeat_error = find_repeat_error(cases, SAME_CASE_CYCLE)
@@ -384,7 +385,8 @@ def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarra
         errors[name] = total_error(name, values, [relative * size], repeat_error)
 
     slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])
-    work = repeat_error * values["friction_force_peak"] * slide
+    difference = np.where(values["slip_amplitude"] > 0, repeat_error, SAME_CASE_CYCLE)
+    work = difference * values["friction_force_peak"] * slide
     errors["loop_area"] += work
     for name in select_names("run"):
         errors[name] += work * march.extremes.shape[1]
