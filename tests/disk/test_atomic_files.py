@@ -26,6 +26,8 @@ N_SIGNALLED_WRITES = 40
 SIGNALLED_WRITES = """\
 import json, os, signal, sys
 from pathlib import Path
+# a test run in the background of a shell ignores SIGINT
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import patchfem.__main__
 from patchfem.disk.atomic_write import LossyFile
 from patchfem.export.fields.vtkhdf import read_frames, write_blocks
