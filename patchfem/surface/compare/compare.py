@@ -19,7 +19,7 @@ from ..profile import Profile, measure_step, robust_deviation
 from ..quantity import HALF_WIDTH_95, Quantity
 from . import waves
 from .alignment import CALIBRATED_GAIN_DEVIATION, SURE_SIGNIFICANCE, Aligned, align
-from .changes import find_changed, find_detection_limit
+from .changes import MAX_DEPTH_DEVIATIONS, find_changed, find_detection_limit
 from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
@@ -52,6 +52,8 @@ MIN_SCAR_FRACTION = 0.9
 MIN_BOW_TO_WAVES_RATIO = 1.0
 # Area of a bow relative to the worn area, from which on the verdict depends on whether the bow is a scar
 MIN_BOW_TO_WORN_RATIO = 0.5
+# Fraction of the depths of a trace that a step of the datum must explain within the noise; the others may be spikes
+MIN_STEP_FRACTION = 0.9
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_WORN_TRACK_FRACTION = 0.6
@@ -514,6 +516,10 @@ def _find_step(depths: DepthMap, *, at_end: bool) -> float:
     gain = np.cumsum((depth * height - height**2 / 2)[::-1])
     residual = depth.copy()
     residual[depth.size - 1 - int(np.argmax(gain)) :] -= height
+    # Where half of the heights changed, as by the loss of all tops, the scatter of the depths hides single changes.
+    is_noise = np.abs(residual) <= MAX_DEPTH_DEVIATIONS[1] * noise
+    if is_noise.mean() < MIN_STEP_FRACTION:
+        return 0.0
     has_other_change = find_changed(residual, noise).any() or find_changed(-residual, noise).any()
     return 0.0 if has_other_change else height
 

@@ -315,6 +315,26 @@ def test_always_step_to_the_end_of_a_trace_may_be_a_jump_of_the_datum(depth):
     assert found.values["worn_depth_mean"].reason == "scar_or_step" and not found.tracks
 
 
+def test_always_loss_of_all_tops_is_no_step():
+    """Tops that are lost over the whole trace are worn: no step of the datum explains depths from 0 to their height."""
+    x = 2 * UM * np.arange(1000)
+    random = np.random.default_rng(1985)
+    lengths, phases = random.uniform(60, 110, 40), random.uniform(0, 2 * np.pi, 40)
+
+    def find_heights(x):
+        """Return the heights [m] of 40 waves of 60 to 110 um."""
+        return 0.1 * UM * np.sin(2 * np.pi * x[:, None] / UM / lengths + phases).sum(axis=1)
+
+    plateau = np.quantile(find_heights(x), 0.6)
+    worn = np.minimum(find_heights(x + 30 * UM), plateau) + 0.002 * x
+    traces = [z + 5 * NM * random.normal(size=x.size) for z in (find_heights(x), worn)]
+    found = compare_surfaces(Profile(x, traces[0], "before"), Profile(x, traces[1], "after"))
+    assert found.verdict.code == "worn"
+    common = find_heights(x[x >= 30 * UM])
+    mean = found.values["worn_depth_mean"]
+    assert mean.low <= np.maximum(common - plateau, 0.0).mean() <= mean.high
+
+
 def test_exact_spikes_and_dropouts_are_left_out():
     """Spikes, saturated dropouts and missing heights do not count, and the removed heights are counted."""
     before, after = make_pair(make_parabola(UM, 1500, 2500))
