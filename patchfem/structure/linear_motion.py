@@ -173,7 +173,7 @@ class LinearRig:
             yield steps
 
     def _take_steps(self, drive, state, times, lengths) -> Steps:
-        """Return the steps from a state (2n,) between times (k + 1,) [s], with their lengths (k,) [s]."""
+        """Follow the motion from a state (2n,) over steps between times (k + 1,) [s], of lengths (k,) [s]."""
         rounded = lengths[0] * np.round(lengths / lengths[0] / SAME_LENGTH_TOL) * SAME_LENGTH_TOL
         different, kind = np.unique(rounded, return_inverse=True)
         maps = self._find_maps(tuple(different.tolist()))

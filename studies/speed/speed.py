@@ -283,11 +283,23 @@ def measure_dop853() -> Row:
 format_number = partial(np.format_float_positional, precision=3, fractional=False, trim="-")
 
 
-def format_tables(rows: list[Row], earlier: dict[str, float]) -> str:
-    """Return the rows as Markdown tables, with a column of the earlier values by kind and name if there are any."""
+def format_tables(rows: list[Row], earlier: dict[str, float], share: float) -> str:
+    """Return the rows as Markdown tables, with a column of the earlier values by kind and name if there are any.
+
+    Parameters
+    ----------
+    rows : list of Row
+        What was measured.
+    earlier : dict of str to float
+        Values of an earlier release by kind and name; {} without one.
+    share : float
+        Number of cases of the sweeps / default number. A share below 1 is stated, because a sweep of few cases computes
+        fewer in a second.
+    """
+    part = f"; sweeps with {100 * share:.3g} % of their cases" * (share < 1)
     lines = [
         f"Measured with {pf.__version__} at a load average of {os.getloadavg()[1]:.1f} on "
-        f"{os.cpu_count()} cores."
+        f"{os.cpu_count()} cores{part}."
     ]
     n_columns = 3 + bool(earlier)
     for kind, headings in HEADINGS.items():
@@ -338,7 +350,7 @@ def main(
     (folder / "speed.json").write_text(json.dumps(rows), "utf-8")
 
     earlier = measure_beside(beside.resolve(), folder / "earlier", share) if beside else {}
-    tables = format_tables(rows, earlier)
+    tables = format_tables(rows, earlier, share)
     (folder / "speed.md").write_text(tables, "utf-8")
     print(tables)
     if write:

@@ -191,7 +191,7 @@ class RunEvaluator:
         return is_all_stuck(run.window, self.stick_tolerance)
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
-        """Estimate the errors of a run without coarse runs: those of the samples of a random motion; {} for other drives.
+        """Estimate the sampling errors of the measures of a random motion; {} for other drives.
 
         They follow from the changes when every second sample of the window is removed, except for the last one.
 

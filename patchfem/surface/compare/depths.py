@@ -313,7 +313,8 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     common = HALF_WIDTH_95 * float(np.hypot(level, depths.errors.gain * value))
     low = value - float(np.hypot(common, value - max(lowest)))
 
-    # A bottom that is not flat has fewer places as deep than are near; at least the root of their number is.
+    # Where the bottom is not flat, fewer samples are as deep as the deepest than lie near it, but at least the root of their
+    # number.
     crest = single.value - single.find_noise(0.5, single.n_places)
     noise_above = single.value - single.find_noise(0.025, np.sqrt(single.n_places)) - crest
     high = max(crest + float(np.hypot(common, noise_above)), value + common)
