@@ -202,7 +202,8 @@ class Answer:
         arrays become objects and lists, as in `to_plain`.
     origin : dict
         Where the answer comes from: `patchfem` (version), `scene` (text as written), `resolved` (scene with all defaults),
-        `command` (how to repeat it) and `versions` (package -> version), as far as they exist.
+        `command` (how to repeat it) and `versions` (package -> version), as far as they exist. `source`, the
+        `model.Source` of the scene, is not stored.
     """
 
     kind: str
