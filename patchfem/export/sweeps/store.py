@@ -2,8 +2,8 @@
 
 A file has the dimensions `measure` and `case`: `values` (float64), `errors` and `floors` (float32) in SI; `name`, a hash
 that identifies a case in any sweep of its scene; `outcome` as CF flags; and the attributes `measures` (JSON: unit of each
-measure) and `messages` (JSON: message of each failed case by its place in the file). A file that cannot be read holds no
-cases.
+measure), `messages` and `findings` (JSON: why a case failed, and why it did not settle or misses its tolerance, by its
+place in the file). A file that cannot be read holds no cases.
 """
 
 import json
@@ -44,7 +44,8 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
         data[part] = Variable(("measure", "case"), np.array(columns, kind), "")
     attributes = {
         "measures": json.dumps(results.units),
-        "messages": json.dumps(results.messages, ensure_ascii=False),
+        "messages": json.dumps(dict(results.messages), ensure_ascii=False),
+        "findings": json.dumps(dict(results.findings), ensure_ascii=False),
         "faults": json.dumps(results.faults, ensure_ascii=False),
     }
     path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{CHUNK_FILE_ENDING}"
@@ -61,8 +62,9 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         words = [word.replace(" ", "_") for word in outcome.meanings]
         results = CaseResults(np.array(words, object)[outcome.values])
         results.units.update(json.loads(attributes["measures"]))
-        messages = json.loads(attributes["messages"])
-        results.messages.update({int(case): text for case, text in messages.items()})
+        for part in ("messages", "findings"):
+            texts = json.loads(attributes[part])
+            getattr(results, part).update({int(case): text for case, text in texts.items()})
         results.faults += json.loads(attributes["faults"])
         for part in CHUNK_NUMBER_TYPES if results.units else ():
             columns = zip(results.units, data[part].values, strict=True)

@@ -6,7 +6,7 @@ is computed by a single run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from time import process_time
 from types import SimpleNamespace
@@ -19,7 +19,7 @@ from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...model.model import Model
-from ...model.similar_models import collect_columns, select_models
+from ...model.similar_models import SimilarModels, collect_columns, select_models
 from ...points.case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
 from ...points.law_rows import Law
@@ -56,7 +56,7 @@ from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
 from ..rig.motion_warnings import note_on_creep
 from . import one_by_one
-from .case_results import CaseResults, has_unreadable_measurements
+from .case_results import CaseResults, CodedColumn, has_unreadable_measurements
 
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Longest steps per cycle of successive marches of smooth laws
@@ -88,6 +88,7 @@ MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
+CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
 
 class Scales(NamedTuple):
@@ -514,17 +515,23 @@ def make_results(
             results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
         )
 
-    # Measures that a case lacks get the reasons that a single run states.
+    # Measures that a case lacks get the reasons that a single run states. They are the same for cases that lack the same
+    # measures and stick alike.
     drive = first.rig.drive.signal
     last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
-    for case in range(len(results)):
-        known = {
-            name: column[case] for name, column in results.values.items() if results.has(name, case)
-        }
-        for name, measure in find_missing(known, last_cycles, drive, True).items():
-            results.fill(case, {name: measure})
-    numerics = {"engine": BATCH_ENGINE, "steps_per_cycle": refined.steps, "window_cycles": window}
-    results.numerics.update(dict.fromkeys(range(len(results)), numerics))
+    sticking = values["stick_fraction"]
+    patterns = np.vstack([results.find_known(), sticking == 1, sticking > 0])
+    _, firsts, places = np.unique(patterns, axis=1, return_index=True, return_inverse=True)
+    for pattern, case in enumerate(firsts):
+        names = [name for name in results.values if results.has(name, case)]
+        known = {name: results.values[name][case] for name in names}
+        alike = np.flatnonzero(places.ravel() == pattern)
+        results.fill(alike, find_missing(known, last_cycles, drive, True))
+    results.numerics[:] = {
+        "engine": BATCH_ENGINE,
+        "steps_per_cycle": refined.steps,
+        "window_cycles": window,
+    }
     return results
 
 
@@ -539,7 +546,7 @@ def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str)
     for column in (results.values[name], results.errors[name]):
         column[cases] = np.nan
     results.floors[name][cases] = MOTION_TABLE[name].floor
-    results.reasons.setdefault(name, {}).update(dict.fromkeys(cases.tolist(), reason))
+    results.reasons.setdefault(name, CodedColumn(len(results)))[cases] = reason
 
 
 def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
@@ -642,15 +649,24 @@ def needs_single_run(
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
-    """Store the warnings and notes that follow from the models alone in `results`, by case."""
+    """Store the warnings and notes that follow from the models alone in `results`, by case.
+
+    Similar models have them in common, except for a note on creep with the speed of each case.
+    """
     creeps = law_has_trait(models[0].friction.law, "creeps")
-    for case, model in enumerate(models):
+    groups: Iterable[tuple] = enumerate(models)
+    if isinstance(models, SimilarModels):
+        has_own_notes = creeps and CREEP_KEY in models.plain_numbers.limits
+        groups = groups if has_own_notes else [(slice(None), models.first)]
+
+    own_warnings = dict(results.warnings)
+    for cases, model in groups:
         texts = [*model.source.remarks, *model.rig.structure.notes]
-        if warnings := [
-            *shorten_file_names(texts, model.source.path),
-            *results.warnings.get(case, ()),
-        ]:
-            results.warnings[case] = warnings
         notes = [*model.source.notes, *(note_on_creep(model.friction) if creeps else ())]
+        if texts:
+            results.warnings[cases] = shorten_file_names(texts, model.source.path)
         if notes:
-            results.notes[case] = notes
+            results.notes[cases] = notes
+    for case, texts in own_warnings.items():
+        shared = results.warnings[case]
+        results.warnings[case] = shared if shared == texts else [*shared, *texts]

@@ -10,7 +10,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import Outcome, PatchfemError
 from ...model.model import Model
 from ...model.similar_models import select_models
 from ..plan import plan
@@ -59,6 +59,11 @@ def solve(
         else:
             results.put(case, result.outcome, result.measures, 0.0)
             results.numerics[case] = collect_used_settings(result)
+            findings = [finding.sentence for finding in result.findings]
+            if result.outcome is Outcome.NOT_CONVERGED:
+                findings = result.warnings
+            if findings:
+                results.findings[case] = " ".join(findings)
             if result.warnings:
                 results.warnings[case] = list(result.warnings)
             if result.notes:
