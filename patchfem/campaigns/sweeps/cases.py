@@ -1,6 +1,7 @@
 """Cases of a sweep: all combinations of the values of its keys, or the rows of a table."""
 
 import json
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -108,18 +109,43 @@ class Cases:
         grid = np.meshgrid(*(np.rint(place).astype(int) for place in places), indexing="ij")
         return np.ravel_multi_index(grid, self.shape).ravel().tolist()
 
-    def sort_by_pieces(self, numbers: Sequence[int]) -> list[int]:
-        """Sort case numbers so that cases whose pieces have the same shape and material are consecutive.
+    def sort_by_groups(self, numbers: Sequence[int], plain_keys: Sequence[str]) -> np.ndarray:
+        """Sort case numbers so that cases with most computations in common are consecutive.
 
-        Such cases have most computations in common. Cases with equal patches are consecutive, too.
+        First come the keys that are not plain, of these the keys on which the pieces depend, and then the plain keys of the
+        contact, so that cases with equal patches are consecutive, too.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Numbers of the cases.
+        plain_keys : sequence of str
+            Keys with numbers in which similar models differ.
         """
-        contact_axes = [k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")]
-        if not contact_axes:
-            return list(numbers)
-        contact_axes.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
-        columns = self.make_columns(numbers)
-        order = np.lexsort([columns[k] for k in reversed(contact_axes)])
-        return np.asarray(numbers)[order].tolist()
+        ranked = []
+        for axis, column in zip(self.axes, self.make_columns(numbers)):
+            is_contact = axis.key.startswith("contact.")
+            is_plain = axis.key in plain_keys
+            if is_contact or not is_plain:
+                rank = (is_plain, not axis.key.startswith(PIECE_KEYS), not is_contact)
+                ranked.append((rank, column))
+        if not ranked:
+            return np.asarray(numbers)
+        columns = [column for _, column in sorted(ranked, key=lambda pair: pair[0])]
+        return np.asarray(numbers)[np.lexsort(columns[::-1])]
+
+    def split_into_groups(
+        self, numbers: Sequence[int], plain_keys: Sequence[str]
+    ) -> list[np.ndarray]:
+        """Return the places in `numbers` of the cases of each group, whose cases differ in `plain_keys` alone."""
+        codes = np.zeros(len(numbers), int)
+        for axis, column in zip(self.axes, self.make_columns(numbers)):
+            if axis.key not in plain_keys:
+                distinct, places = np.unique(column, return_inverse=True)
+                codes = np.unique(codes * len(distinct) + places, return_inverse=True)[1]
+        order = np.argsort(codes, kind="stable")
+        ends = np.flatnonzero(np.diff(codes[order])) + 1
+        return np.split(order, ends)
 
     def compute_hashes(self, sweep_scene: SweepScene) -> np.ndarray:
         """Return hashes (n,) uint64 of the cases, which identify them in any sweep of the scene.
@@ -162,10 +188,11 @@ def _hash_to_integer(content: bytes) -> int:
 
 def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
     """Return a swept key, an axis, with the values at some indices."""
+    values = [axis.values[index] for index in indices]
     return replace(
         axis,
         texts=tuple(axis.texts[index] for index in indices),
-        values=tuple(axis.values[index] for index in indices),
+        values=array("d", values) if isinstance(axis.values, array) else tuple(values),
     )
 
 

@@ -26,6 +26,8 @@ from .cases import Cases
 # with a sweep.
 TARGET_CHUNK_SECONDS = 1.0
 MAX_CASES_PER_CHUNK = 1024  # Largest number of cases in a chunk.
+MIN_SIMILAR_CASES = 2  # Smallest number of cases whose models are derived from one of them.
+MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
 MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
 
@@ -48,6 +50,9 @@ class WorkerData:
         keep(number, Result) is called after each run.
     meshes : SharedMeshes or None
         Meshes common to all cases, from `choose_shared_meshes`.
+    plain_keys : tuple of str
+        Swept keys whose numbers no check depends on, from `find_plain_keys`; cases that differ only in them have similar
+        models.
     """
 
     sweep_scene: SweepScene
@@ -55,6 +60,7 @@ class WorkerData:
     extract: Callable | None = None
     keep: Callable | None = None
     meshes: SharedMeshes | None = None
+    plain_keys: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,45 +92,59 @@ def compute_chunk(
         Elapsed time [s] without compilation, and a tuple of CaseResults and a list of the data that
         `work.extract` returns for each case.
     """
-    # Cases that differ in numbers alone share what the numbers do not change. The batch numbers its cases from 0.
+    # The cases are computed in groups, of which each may have its own engine. A batch numbers its cases from 0.
     begin = perf_counter() - compiled.COMPILE_SECONDS[0]
-    models = _build_similar_models(work, numbers)
-    if models is None:
-        models = [_build_case_model(work, number) for number in numbers]
-    keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    results = batches.solve_models(models, keep, say, True, len(work.cases))
-    extras = []
-    if work.extract is not None:
-        for case, (number, model) in enumerate(zip(numbers, models)):
-            extras.append(work.extract(number, model, results, case))
+    numbers = np.asarray(numbers, int)
+    results = CaseResults.blank(len(numbers))
+    extras = [None] * len(numbers)
+    for places, models in _group_models(work, numbers):
+        keep = work.keep and (lambda case, result: work.keep(numbers[places[case]], result))
+        part = batches.solve_models(models, keep, say, True, len(work.cases))
+        results.insert(places, part)
+        for case, place in enumerate(places.tolist()) if work.extract is not None else ():
+            # The title and the effects of similar models are the same.
+            model = models.first if isinstance(models, SimilarModels) else models[case]
+            extras[place] = work.extract(int(numbers[place]), model, part, case)
     seconds = perf_counter() - compiled.COMPILE_SECONDS[0] - begin
-    return seconds, (results, extras)
+    return seconds, (results, extras if work.extract is not None else [])
 
 
-def _build_similar_models(work: WorkerData, numbers: Sequence[int]) -> SimilarModels | None:
-    """Return the models of cases that differ only in numbers that no check depends on; None for other cases.
+def _group_models(
+    work: WorkerData, numbers: np.ndarray
+) -> Iterator[tuple[np.ndarray, Sequence[Model | PatchfemError]]]:
+    """Yield the places in `numbers` of the cases of each group, and their models, or the errors of their scenes.
 
-    It is also None for patches in motion, and if `work.keep` is called with the result of each run.
+    Cases of a group differ in plain numbers alone, so that their models are similar; all other cases are the last group.
+    `work` is the data of the sweep.
     """
-    columns = work.cases.make_columns(numbers)
-    if work.keep is not None or any(column.dtype.kind != "f" for column in columns):
-        return None
-    try:
-        models = work.sweep_scene.make_similar_models(
-            [axis.key for axis in work.cases.axes],
-            np.array(columns).T,
-            work.cases.assignments,
-            np.asarray(numbers),
+    cases = work.cases
+    is_single = np.ones(len(numbers), bool)
+    keys = () if work.keep is not None else work.plain_keys
+    columns = dict(zip([axis.key for axis in cases.axes], cases.make_columns(numbers)))
+    for places in cases.split_into_groups(numbers, keys) if keys else ():
+        if len(places) < MIN_SIMILAR_CASES:
+            continue
+        base = None
+        for place in places[[len(places) // 2, 0, -1]].tolist():
+            sets = cases.assignments(int(numbers[place]))
+            base = base or work.sweep_scene.build_similar_base(keys, sets)
+        if base is None or (base.model.patch is not None and base.model.kind != "patch"):
+            continue
+        model = base.model if work.meshes is None else work.meshes.with_shared_meshes(base.model)
+        values = np.array([columns[key][places] for key in keys]).T
+        is_plain = base.plain_numbers.are_plain(values)
+        places = places[is_plain]
+        is_single[places] = False
+        yield (
+            places,
+            SimilarModels(
+                base.plain_numbers, model, values[is_plain], cases.assignments, numbers[places]
+            ),
         )
-    except PatchfemError:  # The first case has no model.
-        return None
-    if models is None or models.first.patch is None:
-        return models
-    if models.first.kind != "patch":
-        return None
-    if work.meshes is None:
-        return models
-    return replace(models, first=work.meshes.with_shared_meshes(models.first))
+
+    places = np.flatnonzero(is_single)
+    if places.size:
+        yield places, [_build_case_model(work, int(number)) for number in numbers[places]]
 
 
 def _build_case_model(work: WorkerData, number: int):
@@ -139,20 +159,26 @@ def _build_case_model(work: WorkerData, number: int):
     return model if work.meshes is None else work.meshes.with_shared_meshes(model)
 
 
-def choose_shared_meshes(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep, `work`, with meshes that are chosen for all its cases together.
+def prepare_work(work: WorkerData) -> WorkerData:
+    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys and shared meshes.
 
-    All cases of the sweep count, also those that are already computed. Without a patch the data are unchanged.
+    All cases of the sweep count, also those that are already computed. Without a patch no meshes are chosen.
     """
-    if work.meshes is not None:
-        return work
-    numbers = work.cases.spread_case_numbers(MAX_MESH_CASES)
+    cases = work.cases
+    keys = [axis.key for axis in cases.axes]
+    plain_keys: tuple[str, ...] = ()
+    for number in cases.spread_case_numbers(MAX_CASES_TRIED):
+        plain_keys = plain_keys or work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
+    work = replace(work, plain_keys=plain_keys)
+
+    numbers = cases.spread_case_numbers(MAX_MESH_CASES)
     models = []
-    for number in numbers:
-        models.append(_build_case_model(work, number))
-        if isinstance(models[-1], Model) and models[-1].patch is None:
-            return work
-    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(work.cases)))
+    for _, group in _group_models(replace(work, keep=None), np.array(numbers)):
+        for model in group:
+            models.append(model)
+            if isinstance(model, Model) and model.patch is None:
+                return work
+    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(cases)))
 
 
 def _find_min_chunk_size(work: WorkerData) -> int:
@@ -248,11 +274,12 @@ def iterate_chunks(
     """
     if not len(numbers):
         return
-    work = choose_shared_meshes(work)
+    work = prepare_work(work)
     # With several workers, this process does not import the code that runs a case, which
     # `_find_min_chunk_size` needs.
     min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
-    chunks = ChunkQueue(work.cases.sort_by_pieces(numbers), executor.workers, min_size)
+    numbers = work.cases.sort_by_groups(numbers, work.plain_keys).tolist()
+    chunks = ChunkQueue(numbers, executor.workers, min_size)
     for chunk, seconds, answer in executor.run(work, chunks.take_chunk, say):
         if not isinstance(answer, WorkerDeath):
             chunks.seconds_per_case = seconds / len(chunk)

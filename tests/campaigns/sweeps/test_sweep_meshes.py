@@ -9,7 +9,7 @@ from scene_texts import PATCH
 from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
+from patchfem.campaigns.sweeps.sweep import prepare_work
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
@@ -28,8 +28,7 @@ def test_exact_meshes_are_chosen_once_for_all_cases():
     sizes = []
     for tolerance in (1e-3, 4e-3):
         scene = SweepScene(Path("a.toml"), f"{PATCH}[accuracy]\ntolerance = {tolerance}\n")
-        work = choose_shared_meshes(WorkerData(scene, WORK.cases))
-        assert choose_shared_meshes(work) is work
+        work = prepare_work(WorkerData(scene, WORK.cases))
         ((finest, *_),) = work.meshes.meshes.values()
         sizes.append(finest[0].x.size)
     assert sizes[0] / sizes[1] == pytest.approx(2, rel=0.1)
