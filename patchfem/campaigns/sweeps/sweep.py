@@ -97,8 +97,9 @@ def compute_chunk(
     numbers = np.asarray(numbers, int)
     results = CaseResults.blank(len(numbers))
     extras = [None] * len(numbers)
+    # Cases whose results are kept are single runs, and so the only group.
+    keep = work.keep and (lambda case, result: work.keep(int(numbers[case]), result))
     for places, models in _group_models(work, numbers):
-        keep = work.keep and (lambda case, result: work.keep(numbers[places[case]], result))
         part = batches.solve_models(models, keep, say, True, len(work.cases))
         results.insert(places, part)
         for case, place in enumerate(places.tolist()) if work.extract is not None else ():

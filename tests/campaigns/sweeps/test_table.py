@@ -25,7 +25,7 @@ def test_exact_units_in_header_or_cells_are_read(tmp_path):
     assert cases.texts(0) == ("26 lbf", "1 mrad", "0.3", "coulomb")
     load, tilt, static, law = cases.axes
     assert tuple(load.values) == (115.653761996773, 44.482216152605) and load.unit == "N"
-    assert tilt.values == (1e-3, 2e-3)
+    assert tuple(tilt.values) == (1e-3, 2e-3)
     assert static.values == (0.3, 0.3)
     assert law.values == ("coulomb", "tanh")
 
