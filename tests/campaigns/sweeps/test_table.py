@@ -26,7 +26,7 @@ def test_exact_units_in_header_or_cells_are_read(tmp_path):
     load, tilt, static, law = cases.axes
     assert tuple(load.values) == (115.653761996773, 44.482216152605) and load.unit == "N"
     assert tuple(tilt.values) == (1e-3, 2e-3)
-    assert static.values == (0.3, 0.3)
+    assert tuple(static.values) == (0.3, 0.3)
     assert law.values == ("coulomb", "tanh")
 
 
