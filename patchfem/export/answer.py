@@ -190,7 +190,7 @@ class Answer:
     title : str
         Heading of the page and first line on the screen.
     verdict : tuple of str
-        At most four sentences; the first one is the headline, with at most 30 words.
+        At most four sentences; the first one is the headline, with at most 30 words, of a sweep 30 for each main measure.
     quantities : dict of str to Quantity
         Measures by name.
     data : dict of str to Variable
