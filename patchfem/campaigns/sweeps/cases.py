@@ -158,10 +158,10 @@ class Cases:
         order = np.argsort([axis.key for axis in self.axes], kind="stable")
         texts = [_describe_values(axis, sweep_scene.path.parent) for axis in self.axes]
         common_text = sweep_scene.hash_common_data()
+        indices = self.axis_indices(np.arange(len(self)))
+        columns = [map(texts[axis].__getitem__, indices[axis].tolist()) for axis in order]
         hashes = np.empty(len(self), np.uint64)
-        for number in range(len(self)):
-            indices = self.axis_indices(number)
-            values = [texts[axis][int(indices[axis])] for axis in order]
+        for number, values in enumerate(zip(*columns)):
             hashes[number] = _hash_to_integer("\n".join([common_text, *values]).encode())
         if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
             hashes ^= np.uint64(_hash_to_integer(np.sort(hashes).tobytes()))

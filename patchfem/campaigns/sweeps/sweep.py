@@ -25,7 +25,7 @@ from .cases import Cases
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 TARGET_CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 1024  # Largest number of cases in a chunk.
+MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
 MIN_SIMILAR_CASES = 2  # Smallest number of cases whose models are derived from one of them.
 MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
 MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.

@@ -173,9 +173,11 @@ class CaseResults:
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
         self.faults += part.faults
-        for name, unit in part.units.items():
-            self.add_measure(name, unit)
+        self.units |= part.units
         for columns, part_columns in zip(self._result_columns, part._result_columns):
+            for name, column in part_columns.items():
+                if name not in columns:
+                    columns[name] = np.full(len(self), np.nan, column.dtype)
             for name, column in columns.items():
                 column[indices] = part_columns.get(name, np.nan)
 
