@@ -1,7 +1,7 @@
 """Results of all cases of a study.
 
-In: a sequence of models. Out: `CaseResults`. Lumped cases of large studies are computed together (`lumped`), all others
-one by one.
+In: a sequence of models. Out: `CaseResults`. Lumped cases of large studies are computed together (`lumped`), and so are
+patches that differ in numbers alone (`static`); all others one by one.
 """
 
 from __future__ import annotations
@@ -12,19 +12,22 @@ from functools import partial
 from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
-from . import lumped, one_by_one
+from . import lumped, one_by_one, static
 from .case_results import CaseResults
 
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
 MIN_CASES_TO_GROUP = 32
 MIN_CHUNK_CASES = 256
+STATIC_GROUP = "static"  # key of patches that are solved together
 
 
 def find_group(model: Model, n_study_cases: int) -> Hashable | None:
     """Return a key that is equal for all models that are computed together; None for a model that a single run computes.
 
-    `n_study_cases` is the number of cases of the study; small studies are computed one by one.
+    `n_study_cases` is the number of cases of the study; rigs of small studies are computed one by one.
     """
+    if model.kind == "patch":
+        return STATIC_GROUP if static.can_solve(model) else None
     if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
@@ -70,13 +73,15 @@ def solve_models(
             groups[group] = cases
             cases = range(0)
 
-    # Cases of one group are computed together; with a callback each case needs a run of its own.
+    # Cases of one group are computed together; with a callback each case needs a run of its own. Patches are so only as
+    # similar models.
     for case in cases:
         model = models[case]
         if isinstance(model, PatchfemError):
             results.fail(case, str(model))
             continue
-        group = find_group(model, n_study_cases) if on_result is None else None
+        is_grouped = on_result is None and model.kind != "patch"
+        group = find_group(model, n_study_cases) if is_grouped else None
         groups.setdefault(group, []).append(case)
 
     # Each group falls back to single runs if its common computation fails.
@@ -121,7 +126,7 @@ def _solve_group(
     faults = []
     if group is not None:
         try:
-            return lumped.solve(models, report)
+            return static.solve(models) if group == STATIC_GROUP else lumped.solve(models, report)
         except one_by_one.FAILED_CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
