@@ -5,7 +5,8 @@ prescribed, or the load sum f = N. Under a load the rotation theta is prescribed
 sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
 
 `solve` measures the gap from the rest position of a rigid piece and uses the primal-dual active-set method, for a patch
-on a table of contact sets (`press_cases`); where that cycles, conjugate gradients and the primal active-set method follow. `compute_residuals` checks every solution again and
+on a table of contact sets (`press_cases`); where that cycles, conjugate gradients and the primal active-set method
+follow. `compute_residuals` checks every solution again and
 shares no intermediate result with the solver.
 """
 
