@@ -278,6 +278,7 @@ def find_pressure_edges(x, pressure, threshold) -> ContactEdges:
             threshold
         )
         fraction = height[rows, node] / (height[rows, node] - height[rows, node + side])
+    fraction = np.where(side != 0, fraction, 0.5)
     position = x[node] + fraction * (x[node + side] - x[node])
     return ContactEdges(node, side, fraction, position)
 

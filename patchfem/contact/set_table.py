@@ -150,6 +150,9 @@ def solve_set(compliance, active, columns) -> SetSolution:
 
 def _quadratic_form(matrices, vectors) -> np.ndarray:
     """Return v M^-1 v (e, q) for matrices (e, b, b) and vectors (q, e, b)."""
+    # For a single degree of freedom this takes a tenth of the time of numpy.linalg.solve
+    if matrices.shape[1] == 1:
+        return (vectors[..., 0] ** 2 / matrices[:, 0, 0]).T
     by_end = np.moveaxis(vectors, 0, -1)
     return (by_end * np.linalg.solve(matrices, by_end)).sum(axis=1)
 

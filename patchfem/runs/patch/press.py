@@ -23,12 +23,15 @@ from ...contact.press import (
     press_strips,
     split_into_strips,
 )
+from ...contact.press_cases import press_cases
 from ...contact.set_table import SetTable
 from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel, PatchStrips
 from ..results.patch_rows import Arrays, Measures, Values
+from .cases import Cases, make_cases, make_gap_shapes
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -158,10 +161,11 @@ class Level:
             SetTable(shear, self.shear_column, self.x.size),
         )
 
-    def forget_sets(self) -> None:
-        """Discard all contact sets; the memory of many cases with sets of their own is large."""
-        for table in self.tables:
-            table.forget()
+    def limit_sets(self, max_sets: int) -> None:
+        """Discard the contact sets if there are more than `max_sets`, because many cases with own sets need much memory."""
+        for table in () if self.is_smooth else self.tables:
+            if table.n_sets > max_sets:
+                table.forget()
 
 
 class HolderPositions(NamedTuple):
@@ -578,6 +582,112 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
     )
 
 
+def make_level(patch_model, pair: CondensedPair) -> Level:
+    """Return the pieces and the gap shapes of a group of cases on a mesh.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases.
+    pair : CondensedPair
+        Pieces, condensed on the mesh.
+    """
+    x = pair.compliance.interface.x
+    return Level(patch_model, pair, make_gap_shapes(patch_model, x, pair.end_gap))
+
+
+def press_on_level(
+    level: Level, cases: Cases, start
+) -> tuple[PressedCases, dict[int, PatchfemError]]:
+    """Press the cases of a group without strips on a mesh.
+
+    Cases whose contact set is not found on the table, and those with a smooth asperity layer, are pressed one by one.
+
+    Parameters
+    ----------
+    level : Level
+        Pieces on the mesh, with the gap shapes of the group.
+    cases : Cases
+        n cases.
+    start : (n, m) bool ndarray
+        Contact sets from which the search starts.
+
+    Returns
+    -------
+    PressedCases
+    errors : dict
+        Error of each case that cannot be pressed, by its number.
+    """
+    with use_one_blas_thread():
+        pressed, errors = _press_gaps(level, cases, start)
+        # A step between two nodes, as on a mesh that the scene prescribes, has no variants
+        variants = []
+        has_step_node = cases.half_steps is not None and level.shapes[-1].any()
+        for side, moved in cases.variants if has_step_node else ():
+            node = int(np.argmax(level.shapes[-1]))
+            part, more_errors = _press_gaps(level, moved, pressed.active)
+            errors = more_errors | errors
+            shift = compute_step_weight_shift(pressed, node)
+            variants.append((0.5 - side * shift, part))
+    return replace(pressed, variants=tuple(variants)), errors
+
+
+def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[int, PatchfemError]]:
+    """Press the cases of a group on a mesh, with the nodes at steps at the heights that the amplitudes give.
+
+    The parameters and results are those of `press_on_level`.
+    """
+    shape = (cases.n_cases, 1, level.x.size)
+    holders = cases.holders
+    unloaded_gap = np.broadcast_to((cases.amplitudes @ level.shapes)[:, None], shape)
+    force = np.zeros(shape)
+    gap = unloaded_gap.copy()
+    layer = None
+    if level.has_layer:
+        own = 1.0 if level.is_smooth else level.linear_layer
+        layer = np.broadcast_to(own, shape).copy()
+    approach = np.zeros(cases.n_cases)
+    turn = np.zeros(cases.n_cases)
+    alone = np.arange(cases.n_cases)
+
+    if not level.is_smooth:
+        table = level.tables[0]
+        sets = press_cases(table, holders, cases.amplitudes, start)
+        solved = np.flatnonzero(sets.is_solved)
+        slots = sets.slot[solved]
+        unknown = table.combine(slots, sets.closing[solved])
+        active = table.active[slots]
+        force[solved, 0] = np.where(active, unknown, 0.0)
+        gap[solved, 0] = np.where(active, 0.0, np.maximum(unknown, 0.0))
+        approach[solved] = sets.closing[solved, 0]
+        turn[solved] = -sets.closing[solved, 1]
+        alone = np.flatnonzero(~sets.is_solved)
+
+    errors = {}
+    for case in alone:
+        try:
+            state = press_pieces(
+                level.model,
+                level.pair.compliance,
+                unloaded_gap[case],
+                holder=_make_holder(level.model, cases, case),
+            )
+        except PatchfemError as error:
+            errors[int(case)] = error
+            continue
+        force[case] = state.force
+        gap[case] = state.gap
+        approach[case] = state.position.delta
+        turn[case] = state.position.theta - cases.rotation[case]
+        if layer is not None:
+            layer[case] = compute_layer_compliance(level.model.interface.skin, state)
+
+    holder = HolderPositions(
+        approach, cases.rotation + turn, turn, holders.can_rotate, roll=np.zeros(cases.n_cases)
+    )
+    return PressedCases(level, force, gap, unloaded_gap, holder, layer), errors
+
+
 def nodal_areas(patch_model, interface) -> np.ndarray:
     """Return the nodal areas (m,) [m2] of an interface; (s, m) for a patch in strips."""
     if patch_model.interface.strips is None:
@@ -609,7 +719,9 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     return compute_forces
 
 
-def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -> StripsState:
+def press_pieces(
+    patch_model, pieces: Compliance, gap, added=None, start=None, holder: Holder | None = None
+) -> StripsState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
@@ -627,13 +739,14 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
         What each strip adds to the diagonal of its compliance [m/N].
     start : (s, m) ndarray of bool, optional
         Nodes in contact of a similar solution, from which the search starts.
+    holder : Holder, optional
+        Load and prescribed motions in place of those of the model.
 
     Returns
     -------
     StripsState
     """
-    loading = patch_model.loading
-    count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
+    count, _, _ = patch_model.interface.strips or PatchStrips(1, 0.0, None)
     strip = split_into_strips(pieces, count)
     offsets = compute_strip_offsets(patch_model.pieces.width, count)
 
@@ -643,17 +756,26 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
         None if patch_model.interface.skin is None else make_skin_law(patch_model),
     )
 
+    holder = holder or _make_holder(patch_model, make_cases(patch_model, 1), 0)
+    return press_strips(strips, gap, holder, start)
+
+
+def _make_holder(patch_model, cases: Cases, case: int) -> Holder:
+    """Return load and prescribed motions of one case; `patch_model` has the strips."""
+    _, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
+    load, approach, moment, spring = (
+        None if np.isnan(column[case]) else float(column[case]) for column in cases.holders
+    )
     # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
-    holder = Holder(
-        load=loading.load,
-        approach=loading.approach,
-        moment=loading.moment,
-        roll_moment=None if offset is None else loading.load * offset,
-        spring=loading.rotational_stiffness,
-        rotation=patch_model.gap.angle,
+    return Holder(
+        load=load,
+        approach=approach,
+        moment=moment,
+        roll_moment=None if offset is None else load * offset,
+        spring=spring,
+        rotation=float(cases.rotation[case]),
         roll=roll,
     )
-    return press_strips(strips, gap, holder, start)
 
 
 def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:

@@ -257,7 +257,8 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
             None if layer is None else layer / np.diag(table.compliance),
         )
         unknown = np.where(active, pressed.flatten(pressed.force), pressed.flatten(pressed.gap))
-        rate = table.unknown[table.find_slots(active), 0]
+        slots = table.find_slots(active)
+        rate = table.unknown[slots, 0]
         row_edges = edges.find_edges(x, active, unknown, rate, cells)
 
     # An edge next to a step of the gap lies on the step.
