@@ -129,7 +129,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
             limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             warnings.append(words.format(strain) + limit)
 
-    if contact_reaches_steep_end(patch):
+    if contact_reaches_steep_end(patch.pressed).any():
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
