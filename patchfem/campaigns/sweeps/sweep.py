@@ -163,7 +163,8 @@ def _build_case_model(work: WorkerData, number: int):
 def prepare_work(work: WorkerData) -> WorkerData:
     """Return the data of a sweep, `work`, with what all its cases determine together: plain keys and shared meshes.
 
-    All cases of the sweep count, also those that are already computed. Without a patch no meshes are chosen.
+    All cases of the sweep count, also those that are already computed. No meshes are chosen without a patch, or for
+    patches that are solved in blocks, each of which has its own meshes.
     """
     cases = work.cases
     keys = [axis.key for axis in cases.axes]
@@ -171,6 +172,8 @@ def prepare_work(work: WorkerData) -> WorkerData:
     for number in cases.spread_case_numbers(MAX_CASES_TRIED):
         plain_keys = plain_keys or work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
     work = replace(work, plain_keys=plain_keys)
+    if _has_blocks(work):
+        return work
 
     numbers = cases.spread_case_numbers(MAX_MESH_CASES)
     models = []
@@ -180,6 +183,35 @@ def prepare_work(work: WorkerData) -> WorkerData:
             if isinstance(model, Model) and model.patch is None:
                 return work
     return replace(work, meshes=SharedMeshes(models, len(numbers) == len(cases)))
+
+
+def _has_blocks(work: WorkerData) -> bool:
+    """Return whether the cases of a sweep are static patches that are solved together in fixed blocks."""
+    if work.keep is not None or not work.plain_keys:
+        return False
+    for number in work.cases.spread_case_numbers(MAX_CASES_TRIED):
+        model = _build_case_model(work, number)
+        if isinstance(model, Model):
+            return model.kind == "patch" and batches.static.can_solve(model)
+    return False
+
+
+def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:
+    """Return the blocks of a sweep of static patches that contain some of the given cases.
+
+    A block is a range of the cases of a group. It does not depend on the cases that are already computed, nor on the number
+    of workers, so that an interrupted sweep ends with the same numbers.
+    """
+    is_requested = np.zeros(len(work.cases), bool)
+    is_requested[np.asarray(numbers, int)] = True
+    ordered = work.cases.sort_by_groups(np.arange(len(work.cases)), work.plain_keys)
+    blocks = []
+    for places in work.cases.split_into_groups(ordered, work.plain_keys):
+        n_blocks = -(-len(places) // batches.static.CASES_PER_BLOCK)
+        for block in np.array_split(ordered[places], n_blocks):
+            if is_requested[block].any():
+                blocks.append(block.tolist())
+    return blocks
 
 
 def _find_min_chunk_size(work: WorkerData) -> int:
@@ -207,11 +239,20 @@ class ChunkQueue:
         Number of workers that take chunks.
     min_size : int
         Smallest number of cases per chunk, used with a single worker.
+    blocks : sequence of list of int
+        Chunks with given cases, which come first.
     """
 
-    def __init__(self, numbers: Sequence[int], workers: int, min_size: int = 1):
+    def __init__(
+        self,
+        numbers: Sequence[int],
+        workers: int,
+        min_size: int = 1,
+        blocks: Sequence[list[int]] = (),
+    ):
         self.min_size = min_size
         self.remaining = deque(numbers)
+        self.blocks = deque(blocks)
         self.suspects: deque[int] = deque()
         self.repeated: set[int] = set()
         self.workers = max(workers, 1)
@@ -224,6 +265,8 @@ class ChunkQueue:
         Cases of failed chunks are repeated last and one by one, only if `is_idle`, that is, if no other chunk is being
         computed, so that a case that kills its worker then has done it itself.
         """
+        if self.blocks:
+            return self.blocks.popleft()
         n_remaining = len(self.remaining)
         if not n_remaining:
             if not (self.suspects and is_idle):
@@ -276,11 +319,14 @@ def iterate_chunks(
     if not len(numbers):
         return
     work = prepare_work(work)
-    # With several workers, this process does not import the code that runs a case, which
-    # `_find_min_chunk_size` needs.
-    min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
-    numbers = work.cases.sort_by_groups(numbers, work.plain_keys).tolist()
-    chunks = ChunkQueue(numbers, executor.workers, min_size)
+    if _has_blocks(work):
+        chunks = ChunkQueue((), executor.workers, blocks=_list_blocks(work, numbers))
+    else:
+        # With several workers, this process does not import the code that runs a case, which
+        # `_find_min_chunk_size` needs.
+        min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
+        numbers = work.cases.sort_by_groups(numbers, work.plain_keys).tolist()
+        chunks = ChunkQueue(numbers, executor.workers, min_size)
     for chunk, seconds, answer in executor.run(work, chunks.take_chunk, say):
         if not isinstance(answer, WorkerDeath):
             chunks.seconds_per_case = seconds / len(chunk)

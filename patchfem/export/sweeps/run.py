@@ -121,7 +121,8 @@ def sweep_into(
                 else:
                     writer.put(chunk, results, texts)
                 folder.remove_tables()  # they are outdated once a case is computed
-                n_done += len(chunk)
+                # The cases of a block that are already stored are computed again.
+                n_done = min(n_done + len(chunk), requested.size)
                 report_progress(n_done, requested.size)
         except (KeyboardInterrupt, PatchfemError):
             if not is_shard:

@@ -12,6 +12,7 @@ import numpy as np
 from ...core import Outcome, compute_allowed_error
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
+from .. import findings
 from ..patch.case_meshes import solve_cases
 from ..patch.cases import Batch, OutcomeCode
 from ..results.patch_rows import PATCH_TABLE
@@ -81,7 +82,10 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
         error = results.errors[name][case]
         size = abs(results.values[name][case])
         share = f"{error / size:.2g} of its value" if error < size else "at least its value"
+        advice = f"a finer mesh does not reduce it or is too expensive; {findings.USE_ERROR_ADVICE}"
+        if batch.excess[case] <= 1:
+            finer = findings.PROPOSED_TOLERANCE_RATIO * tolerance
+            advice = f"set accuracy.tolerance = {finer:.3g} for a finer mesh"
         results.findings[case] = (
-            f"{name} has an estimated error of {share}; the tolerance is {tolerance:g}; a finer mesh does not reduce it or "
-            "is too expensive; use the value with its stated error"
+            f"{name} has an estimated error of {share}; the tolerance is {tolerance:g}; {advice}"
         )

@@ -13,6 +13,8 @@ from patchfem.campaigns.sweeps.sweep import prepare_work
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
+# Strips, which are not solved together in blocks
+STRIPS = "[contact.strips]\ncount = 2\n"
 WORK = WorkerData(
     SweepScene(Path("a.toml"), PATCH),
     Cases(
@@ -27,7 +29,7 @@ def test_exact_meshes_are_chosen_once_for_all_cases():
     """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
     sizes = []
     for tolerance in (1e-3, 4e-3):
-        scene = SweepScene(Path("a.toml"), f"{PATCH}[accuracy]\ntolerance = {tolerance}\n")
+        scene = SweepScene(Path("a.toml"), f"{PATCH}{STRIPS}[accuracy]\ntolerance = {tolerance}\n")
         work = prepare_work(WorkerData(scene, WORK.cases))
         ((finest, *_),) = work.meshes.meshes.values()
         sizes.append(finest[0].x.size)
