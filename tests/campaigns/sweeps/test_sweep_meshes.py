@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import PATCH
+from scene_texts import COULOMB, DRIVE, MODE, PATCH
 
 from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
@@ -13,8 +13,7 @@ from patchfem.campaigns.sweeps.sweep import prepare_work
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
-# Strips, which are not solved together in blocks
-STRIPS = "[contact.strips]\ncount = 2\n"
+MOTION = COULOMB + MODE + DRIVE
 WORK = WorkerData(
     SweepScene(Path("a.toml"), PATCH),
     Cases(
@@ -29,7 +28,7 @@ def test_exact_meshes_are_chosen_once_for_all_cases():
     """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
     sizes = []
     for tolerance in (1e-3, 4e-3):
-        scene = SweepScene(Path("a.toml"), f"{PATCH}{STRIPS}[accuracy]\ntolerance = {tolerance}\n")
+        scene = SweepScene(Path("a.toml"), f"{PATCH}{MOTION}[accuracy]\ntolerance = {tolerance}\n")
         work = prepare_work(WorkerData(scene, WORK.cases))
         ((finest, *_),) = work.meshes.meshes.values()
         sizes.append(finest[0].x.size)
