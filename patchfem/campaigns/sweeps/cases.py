@@ -109,11 +109,13 @@ class Cases:
         grid = np.meshgrid(*(np.rint(place).astype(int) for place in places), indexing="ij")
         return np.ravel_multi_index(grid, self.shape).ravel().tolist()
 
-    def sort_by_groups(self, numbers: Sequence[int], plain_keys: Sequence[str]) -> np.ndarray:
-        """Sort case numbers so that cases with most computations in common are consecutive.
+    def split_into_groups(
+        self, numbers: Sequence[int], plain_keys: Sequence[str]
+    ) -> list[np.ndarray]:
+        """Return the places in `numbers` of the cases of each group, whose cases differ in plain keys alone.
 
-        First come the keys that are not plain, of these the keys on which the pieces depend, and then the plain keys of the
-        contact, so that cases with equal patches are consecutive, too.
+        Groups with the same pieces are consecutive, and so are cases of a group with equal patches, because they have most
+        computations in common.
 
         Parameters
         ----------
@@ -124,28 +126,17 @@ class Cases:
         """
         ranked = []
         for axis, column in zip(self.axes, self.make_columns(numbers)):
-            is_contact = axis.key.startswith("contact.")
             is_plain = axis.key in plain_keys
+            is_contact = axis.key.startswith("contact.")
+            rank = (is_plain, not axis.key.startswith(PIECE_KEYS), not is_contact)
             if is_contact or not is_plain:
-                rank = (is_plain, not axis.key.startswith(PIECE_KEYS), not is_contact)
-                ranked.append((rank, column))
-        if not ranked:
-            return np.asarray(numbers)
-        columns = [column for _, column in sorted(ranked, key=lambda pair: pair[0])]
-        return np.asarray(numbers)[np.lexsort(columns[::-1])]
-
-    def split_into_groups(
-        self, numbers: Sequence[int], plain_keys: Sequence[str]
-    ) -> list[np.ndarray]:
-        """Return the places in `numbers` of the cases of each group, whose cases differ in `plain_keys` alone."""
-        codes = np.zeros(len(numbers), int)
-        for axis, column in zip(self.axes, self.make_columns(numbers)):
-            if axis.key not in plain_keys:
-                distinct, places = np.unique(column, return_inverse=True)
-                codes = np.unique(codes * len(distinct) + places, return_inverse=True)[1]
-        order = np.argsort(codes, kind="stable")
-        ends = np.flatnonzero(np.diff(codes[order])) + 1
-        return np.split(order, ends)
+                ranked.append((rank, np.unique(column, return_inverse=True)[1]))
+        ranked.sort(key=lambda pair: pair[0])
+        codes = np.array([column for _, column in ranked], int).reshape(len(ranked), len(numbers))
+        order = np.lexsort(codes[::-1]) if ranked else np.arange(len(numbers))
+        n_shared = sum(not is_plain for (is_plain, *_), _ in ranked)
+        is_next = np.diff(codes[:n_shared, order]).any(axis=0)
+        return np.split(order, np.flatnonzero(is_next) + 1)
 
     def compute_hashes(self, sweep_scene: SweepScene) -> np.ndarray:
         """Return hashes (n,) uint64 of the cases, which identify them in any sweep of the scene.

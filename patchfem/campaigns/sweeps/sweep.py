@@ -6,8 +6,9 @@ In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by 
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from time import perf_counter
 
 import numpy as np
@@ -53,6 +54,8 @@ class WorkerData:
     plain_keys : tuple of str
         Swept keys whose numbers no check depends on, from `find_plain_keys`; cases that differ only in them have similar
         models.
+    group : hashable or None
+        Key of the engine that computes similar cases together, from `batches.find_group`.
     """
 
     sweep_scene: SweepScene
@@ -61,6 +64,12 @@ class WorkerData:
     keep: Callable | None = None
     meshes: SharedMeshes | None = None
     plain_keys: tuple[str, ...] = ()
+    group: Hashable | None = None
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether the cases are static patches that are solved together in fixed blocks."""
+        return bool(self.plain_keys) and self.group == batches.STATIC_GROUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +129,7 @@ def _group_models(
     """
     cases = work.cases
     is_single = np.ones(len(numbers), bool)
-    keys = () if work.keep is not None else work.plain_keys
+    keys = work.plain_keys
     columns = dict(zip([axis.key for axis in cases.axes], cases.make_columns(numbers)))
     for places in cases.split_into_groups(numbers, keys) if keys else ():
         if len(places) < MIN_SIMILAR_CASES:
@@ -161,39 +170,27 @@ def _build_case_model(work: WorkerData, number: int):
 
 
 def prepare_work(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys and shared meshes.
+    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys, engine and meshes.
 
     All cases of the sweep count, also those that are already computed. No meshes are chosen without a patch, or for
     patches that are solved in blocks, each of which has its own meshes.
     """
     cases = work.cases
     keys = [axis.key for axis in cases.axes]
-    plain_keys: tuple[str, ...] = ()
     for number in cases.spread_case_numbers(MAX_CASES_TRIED):
-        plain_keys = plain_keys or work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
-    work = replace(work, plain_keys=plain_keys)
-    if _has_blocks(work):
+        first = _build_case_model(work, number)
+        if isinstance(first, Model):
+            break
+    else:  # the run of each case reports its error
         return work
-
+    if work.keep is None:
+        plain_keys = work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
+        work = replace(work, plain_keys=plain_keys, group=batches.find_group(first, len(cases)))
+    if first.patch is None or work.has_blocks:
+        return work
     numbers = cases.spread_case_numbers(MAX_MESH_CASES)
-    models = []
-    for _, group in _group_models(replace(work, keep=None), np.array(numbers)):
-        for model in group:
-            models.append(model)
-            if isinstance(model, Model) and model.patch is None:
-                return work
+    models = chain.from_iterable(group for _, group in _group_models(work, np.array(numbers)))
     return replace(work, meshes=SharedMeshes(models, len(numbers) == len(cases)))
-
-
-def _has_blocks(work: WorkerData) -> bool:
-    """Return whether the cases of a sweep are static patches that are solved together in fixed blocks."""
-    if work.keep is not None or not work.plain_keys:
-        return False
-    for number in work.cases.spread_case_numbers(MAX_CASES_TRIED):
-        model = _build_case_model(work, number)
-        if isinstance(model, Model):
-            return model.kind == "patch" and batches.static.can_solve(model)
-    return False
 
 
 def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:
@@ -204,28 +201,12 @@ def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:
     """
     is_requested = np.zeros(len(work.cases), bool)
     is_requested[np.asarray(numbers, int)] = True
-    ordered = work.cases.sort_by_groups(np.arange(len(work.cases)), work.plain_keys)
     blocks = []
-    for places in work.cases.split_into_groups(ordered, work.plain_keys):
-        n_blocks = -(-len(places) // batches.static.CASES_PER_BLOCK)
-        for block in np.array_split(ordered[places], n_blocks):
+    for group in work.cases.split_into_groups(range(len(work.cases)), work.plain_keys):
+        for block in np.array_split(group, -(-len(group) // batches.static.CASES_PER_BLOCK)):
             if is_requested[block].any():
                 blocks.append(block.tolist())
     return blocks
-
-
-def _find_min_chunk_size(work: WorkerData) -> int:
-    """Return the smallest number of cases per chunk.
-
-    It is 1, or more for cases that one call of a kernel computes together; the time of a smaller chunk would not
-    predict that of a large one. `work` is the data of the sweep.
-    """
-    model = _build_case_model(work, 0)
-    if work.keep is not None or not isinstance(
-        model, Model
-    ):  # The run of the case reports its error.
-        return 1
-    return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)) else 1
 
 
 class ChunkQueue:
@@ -319,14 +300,13 @@ def iterate_chunks(
     if not len(numbers):
         return
     work = prepare_work(work)
-    if _has_blocks(work):
+    if work.has_blocks:
         chunks = ChunkQueue((), executor.workers, blocks=_list_blocks(work, numbers))
     else:
-        # With several workers, this process does not import the code that runs a case, which
-        # `_find_min_chunk_size` needs.
-        min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
-        numbers = work.cases.sort_by_groups(numbers, work.plain_keys).tolist()
-        chunks = ChunkQueue(numbers, executor.workers, min_size)
+        # The time of a small chunk would not predict that of a large one whose cases a kernel computes together.
+        min_size = batches.MIN_CHUNK_CASES if work.group and executor.workers == 1 else 1
+        order = np.concatenate(work.cases.split_into_groups(numbers, work.plain_keys))
+        chunks = ChunkQueue(np.asarray(numbers)[order].tolist(), executor.workers, min_size)
     for chunk, seconds, answer in executor.run(work, chunks.take_chunk, say):
         if not isinstance(answer, WorkerDeath):
             chunks.seconds_per_case = seconds / len(chunk)
