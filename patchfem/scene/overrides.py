@@ -19,6 +19,7 @@ from .keys.types import KeyValue, Table
 from .lines import find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
+from .rules.outlines import find_flat_length
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.together import holds
@@ -37,6 +38,7 @@ PLAIN_KEYS = {
     "contact.tilt.angle": (-MAX_ANGLE_BETWEEN_PIECES, MAX_ANGLE_BETWEEN_PIECES),
     "contact.crown.radius": (0, inf),
     "contact.step.height": (-inf, inf),
+    "contact.holder.rotational_stiffness": (0, inf),
     "friction.static": (0, inf),
     "friction.bond_length": (0, inf),
     "friction.reference_speed": (0, inf),
@@ -52,16 +54,15 @@ PLAIN_KEYS = {
 
 # Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a pressed patch, alone or in a rig, or a rig with one
 # contact point. The rig has modes and a sinusoidal base motion.
-_PRESSED_PATCH = (
-    "!wear & contact & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
-)
+_PRESSED_PATCH = "!wear & contact & !contact.load_line.moment & !contact.strips & !contact.grooves"
+_HELD_PATCH = "contact.load & !contact.load_line & !contact.holder"
 _MOVED_BASE = (
     "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
     "!drive.duration & !friction.temperature & !friction.spread"
 )
 PLAIN_SCENES = (
     f"kind=patch & {_PRESSED_PATCH}",
-    f"{_MOVED_BASE} & {_PRESSED_PATCH} & contact.load & !structure.bonded",
+    f"{_MOVED_BASE} & {_PRESSED_PATCH} & {_HELD_PATCH} & !structure.bonded",
     f"{_MOVED_BASE} & normal & !normal.grooves",
 )
 
@@ -135,6 +136,9 @@ class BaseScene:
             interval = PLAIN_KEYS.get(re.sub(r"\.\d+", "", place))
             if key == "contact.load":
                 interval = (0, find_max_load(TableView(scene.contact)))
+            elif key == "contact.load_line.offset":
+                half_length = find_flat_length(TableView(scene.contact)) / 2
+                interval = (-half_length, half_length)
             has_own_kinetic = key == "friction.static" and "kinetic" in draft.raw["friction"]
             if interval is None or has_own_kinetic or value is None:
                 continue
