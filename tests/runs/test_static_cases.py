@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.runs.patch import mesh_levels
 from patchfem.runs.patch.case_meshes import solve_cases
-from patchfem.runs.patch.cases import OutcomeCode, Reason, split_columns, take_patch
+from patchfem.runs.patch.cases import OutcomeCode, Reason, take_patch
 
 TOLERANCE = 1e-3
 TILT = '[contact.tilt]\nangle = "0.02 mrad"\n'
@@ -49,7 +49,7 @@ def list_single_runs(group) -> list:
 def test_always_cases_agree_with_single_runs_within_errors(extra):
     """Values differ by less than both errors, and every case meets the tolerance."""
     group = make_group(BLOCK + COATING + extra)
-    batch = solve_cases(split_columns(group, LOADS.size), TOLERANCE)
+    batch = solve_cases(group, LOADS.size, TOLERANCE)
     assert batch.outcome.tolist() == [OutcomeCode.DONE] * LOADS.size
     assert batch.reason.tolist() == [Reason.NONE] * LOADS.size
     assert batch.excess.max() <= 1
@@ -67,7 +67,7 @@ def test_always_cases_agree_with_single_runs_within_errors(extra):
 def test_exact_cases_agree_with_single_runs_on_the_same_mesh(extra):
     """On a mesh that the scene prescribes, values, errors and floors are those of single runs to 1e-9."""
     group = make_group(BLOCK + COATING + extra).with_element_size(0.15e-3)
-    batch = solve_cases(split_columns(group, LOADS.size), TOLERANCE)
+    batch = solve_cases(group, LOADS.size, TOLERANCE)
     for case, measures in enumerate(list_single_runs(group)):
         for name, measure in measures.items():
             value = np.nan if measure.value is None else measure.value
@@ -87,7 +87,7 @@ def test_always_failed_case_does_not_stop_the_others():
     loads = LOADS.copy()
     loads[1] = 1e-250
     loads[2] = 0.0
-    batch = solve_cases(split_columns(group.with_loading(load=loads), LOADS.size), TOLERANCE)
+    batch = solve_cases(group.with_loading(load=loads), LOADS.size, TOLERANCE)
     expected = [OutcomeCode.DONE, OutcomeCode.FAILED, OutcomeCode.NO_CONTACT, OutcomeCode.DONE]
     assert batch.outcome.tolist() == expected
     assert batch.reason[1] == Reason.REFUSED and isinstance(batch.messages[1], PatchfemError)

@@ -12,7 +12,7 @@ from functools import partial
 from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
-from . import lumped, one_by_one, static
+from . import lumped, one_by_one
 from .case_results import CaseResults
 
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
@@ -25,8 +25,6 @@ def find_group(model: Model, n_study_cases: int) -> Hashable | None:
 
     `n_study_cases` is the number of cases of the study; small studies are computed one by one.
     """
-    if model.kind == "patch" and n_study_cases > 1 and not static.refusal_reason(model):
-        return static.make_group_key(model)
     if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
@@ -123,8 +121,7 @@ def _solve_group(
     faults = []
     if group is not None:
         try:
-            engine = static if models[0].kind == "patch" else lumped
-            return engine.solve(models, report)
+            return lumped.solve(models, report)
         except one_by_one.FAILED_CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:

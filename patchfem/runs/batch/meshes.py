@@ -10,8 +10,7 @@ from dataclasses import replace
 
 from ...core import PatchfemError
 from ...model.model import Model
-from ..patch import cases, sweep_meshes
-from . import static
+from ..patch import sweep_meshes
 
 
 class SharedMeshes:
@@ -64,16 +63,13 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list[Model | 
 def _may_share_meshes(model: Model | PatchfemError) -> bool:
     """Return whether a model has a patch without a common mesh.
 
-    The patch of a bolted joint keeps its own mesh, so that a case is equal to a single run, and static patches that are
-    solved together get their meshes then.
+    The patch of a bolted joint keeps its own mesh, so that a case is equal to a single run.
     """
     if not isinstance(model, Model) or model.patch is None or model.has_bolted_patch:
-        return False
-    if not static.refusal_reason(model):
         return False
     return model.patch.mesh.shared is None
 
 
 def _mesh_key(model: Model) -> tuple[Hashable, float]:
     """Return the hashable key of a model's common mesh: patch geometry and tolerance."""
-    return cases.geometry_key(model.patch), model.accuracy.tolerance
+    return sweep_meshes.geometry_key(model.patch), model.accuracy.tolerance

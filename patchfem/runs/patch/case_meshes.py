@@ -1,6 +1,6 @@
 """Static measures of many cases of a patch, on meshes that the cases share.
 
-In: a `PatchGroup` and a tolerance. Out: a `Batch`. The cases are pressed
+In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
 together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
 are divided by the size of their contacts, and each part gets meshes that are graded to its own contacts. A case
 that is alone has the meshes of a single run, which ends with its tolerance or with the limit of the mesh.
@@ -13,7 +13,7 @@ import numpy as np
 from ...contact.press_cases import MAX_CHUNK_VALUES
 from ...core import PatchfemError
 from . import grids, mesh_levels
-from .cases import Batch, CaseMeasures, PatchGroup
+from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
 from .condensed import CondensedPair, condense
 from .measures import (
     MeshValues,
@@ -80,15 +80,17 @@ def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
     return ContactPlaces(np.concatenate([part.begins for part in parts]), np.concatenate(padded))
 
 
-def solve_cases(group: PatchGroup, tolerance: float) -> Batch:
+def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     """Compute the static measures of all cases of a group, with errors within the tolerance if possible.
 
     A case that cannot be solved, or misses the tolerance, has a reason (`cases.Reason`); it never stops the others.
 
     Parameters
     ----------
-    group : PatchGroup
-        n patches, from `cases.split_columns` or `cases.stack_patches`.
+    patch_model : PatchModel
+        Patch of all cases; numbers of its loading and of its gap shapes may be arrays (n,), except the position of a step.
+    count : int
+        Number n of cases.
     tolerance : float
         Relative error that the static measures have to meet.
 
@@ -96,12 +98,11 @@ def solve_cases(group: PatchGroup, tolerance: float) -> Batch:
     -------
     Batch
     """
-    solver = _CaseSolver(group, tolerance)
-    count = group.cases.n_cases
-    if count == 1 or group.shared.interface.strips is not None:
+    solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
+    if count == 1 or patch_model.interface.strips is not None:
         for number in range(count):
             solver.solve_alone(number)
-    elif group.shared.mesh.is_automatic:
+    elif patch_model.mesh.is_automatic:
         solver.solve(np.arange(count))
     else:
         solver.solve_on_given_meshes()
@@ -113,18 +114,19 @@ class _CaseSolver:
 
     Parameters
     ----------
-    group : PatchGroup
-        n patches.
+    patch_model : PatchModel
+        Patch of all cases, whose numbers may be arrays.
+    cases : Cases
+        The same cases as columns.
     tolerance : float
         Relative error of the static measures.
     """
 
-    def __init__(self, group: PatchGroup, tolerance: float):
-        self.group = group
-        self.patch_model = group.shared
-        self.cases = group.cases
+    def __init__(self, patch_model, cases: Cases, tolerance: float):
+        self.patch_model = patch_model
+        self.cases = cases
         self.tolerance = tolerance
-        self.batch = Batch.blank(group.cases.n_cases)
+        self.batch = Batch.blank(cases.n_cases)
 
     def solve(self, numbers: np.ndarray) -> None:
         """Solve some cases (k,) on common meshes, and those that miss the tolerance on meshes of their own."""
@@ -141,7 +143,9 @@ class _CaseSolver:
     def solve_alone(self, number: int) -> None:
         """Solve one case like a single run."""
         try:
-            fine, *_ = mesh_levels.solve_with_coarser(self.group.take(number), self.tolerance)
+            fine, *_ = mesh_levels.solve_with_coarser(
+                take_patch(self.patch_model, number), self.tolerance
+            )
         except PatchfemError as error:
             self.batch.fail(number, error)
             return
@@ -158,7 +162,7 @@ class _CaseSolver:
 
         Each further mesh halves the cells for the cases that miss the tolerance on the one before.
         """
-        search = _ContactSearch(self.group, numbers)
+        search = _ContactSearch(self.patch_model, self.cases.take(numbers), numbers)
         layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
         # Nothing is loaded, or no case can be pressed; the single runs tell why
         if contact is None:
@@ -280,16 +284,17 @@ class _ContactSearch:
 
     Parameters
     ----------
-    group : PatchGroup
-        Patches of a group.
+    patch_model : PatchModel
+        Patch of all cases.
+    cases : Cases
+        n cases, of which MAX_SEARCHED_CASES are pressed: equally spaced ones in the order of their columns, and those with
+        extreme columns.
     numbers : (n,) ndarray
-        Numbers of the cases, of which MAX_SEARCHED_CASES are pressed: equally spaced ones in the order of their columns, and
-        those with extreme columns.
+        Numbers of the cases in the model.
     """
 
-    def __init__(self, group: PatchGroup, numbers: np.ndarray):
-        self.group = group
-        cases = group.cases.take(numbers)
+    def __init__(self, patch_model, cases: Cases, numbers: np.ndarray):
+        self.patch_model = patch_model
         self.columns = np.nan_to_num(np.column_stack([*cases.holders, cases.amplitudes]))
         order = np.lexsort(self.columns.T[::-1])
         even = np.linspace(0, cases.n_cases - 1, min(cases.n_cases, MAX_SEARCHED_CASES))
@@ -301,7 +306,7 @@ class _ContactSearch:
 
     def find_contacts(self, pair: CondensedPair) -> list[grids.SolvedContact]:
         """Return the contacts for which the next grid is graded, from the pieces on a grid."""
-        level = make_level(self.group.shared, pair)
+        level = make_level(self.patch_model, pair)
         start = np.zeros((self.cases.n_cases, level.x.size), bool)
         if self.places is not None:
             start = self.places.find_sets(level.x)
@@ -311,7 +316,7 @@ class _ContactSearch:
         is_loaded[list(errors)] = False
         contacts = []
         for row in _spread_contacts(pressed.active, np.flatnonzero(is_loaded)):
-            model = self.group.take(int(self.numbers[row]))
+            model = take_patch(self.patch_model, self.numbers[row])
             extent = grids.find_contact_extent(pressed, row)
             contacts.append(grids.SolvedContact(model, [extent]))
         return contacts

@@ -7,10 +7,9 @@ alone in its group is a single run.
 Letters of array shapes: n cases, p gap shapes, m interface nodes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,6 @@ from ...model.gap import Gap
 from ...model.patch import PatchModel
 from ...scene.keys.types import Table
 from ..results.patch_rows import POSITIVE_MESH_MEASURES, Arrays
-from .store import Key
 
 
 class Reason(IntEnum):
@@ -163,81 +161,17 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
     )
 
 
-class PatchGroup(NamedTuple):
-    """Patches with equal `group_key`s: what they share, their columns, and the model of each of them.
-
-    - shared: PatchModel whose pieces, layer and mesh settings all patches have.
-    - cases: columns of the patches.
-    - take: function of the number of a case that returns its PatchModel.
-    """
-
-    shared: PatchModel
-    cases: Cases
-    take: Callable[[int], PatchModel]
-
-
-def split_columns(patch_model: PatchModel, count: int) -> PatchGroup:
-    """Return the group of a patch model in which numbers of the loading and of the gap shapes may be arrays (n,).
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch of all cases. The position of a step is no array.
-    count : int
-        Number n of cases.
-    """
-    return PatchGroup(patch_model, make_cases(patch_model, count), partial(take_patch, patch_model))
-
-
-def stack_patches(patches: Sequence[PatchModel]) -> PatchGroup:
-    """Return the group of patch models with equal keys."""
+def stack_patches(patches: Sequence[PatchModel]) -> Cases:
+    """Return the cases of patch models with the same pieces, layer, mesh settings and kinds of shapes."""
     parts = [make_cases(patch, 1) for patch in patches]
     half_steps = None
     if parts[0].half_steps is not None:
         half_steps = np.concatenate([part.half_steps for part in parts])
-    cases = Cases(
+    return Cases(
         HolderCases(*map(np.concatenate, zip(*(part.holders for part in parts)))),
         np.concatenate([part.rotation for part in parts]),
         np.concatenate([part.amplitudes for part in parts]),
         half_steps,
-    )
-    return PatchGroup(patches[0], cases, patches.__getitem__)
-
-
-def group_key(patch_model: PatchModel) -> Key:
-    """Return a hashable key of all that patches of a group have in common, without loads and amplitudes of shapes."""
-    interface = patch_model.interface
-    split = _split_gap(patch_model)
-    return (
-        geometry_key(patch_model),
-        interface.skin and tuple(interface.skin),
-        interface.strips,
-        tuple((name, keys.on) for name, keys, _ in split.scaled),
-        tuple((name, tuple(keys)) for name, keys in split.rest.shapes),
-    )
-
-
-def geometry_key(patch_model: PatchModel) -> Key:
-    """Return a hashable key of everything on which the meshes and the compliance depend.
-
-    Patches that may share meshes have equal keys; load and surface shapes do not matter.
-    """
-    mesh = patch_model.mesh
-    gap = patch_model.gap
-    file = mesh.file
-    modification_time = (
-        file.path.stat().st_mtime_ns if file is not None and file.path.exists() else 0
-    )
-    return (
-        patch_model.pieces,
-        mesh.element_size,
-        mesh.is_fine,
-        mesh.edge_motion,
-        file,
-        modification_time,
-        gap.step_edges,
-        gap.profile,
-        gap.average,
     )
 
 

@@ -18,6 +18,7 @@ from ...model.patch import PatchModel
 from . import grids, mesh_levels
 from .condensed import CondensedPair, condense_once
 from .measures import max_mesh_error_ratio
+from .store import Key
 
 # Number of cases that determine the mesh, besides those with extreme numbers, if there are more.
 MAX_SPREAD_LAYOUT_CASES = 48
@@ -28,6 +29,30 @@ MAX_INTERFACE_NODES = 500
 SINGLE_CASE_CELLS_TOL = 1e-3
 N_FINER_MESHES_FOR_SLIP = 1  # Number of further meshes for cases that slip partially under a slide.
 MAX_CELL_LENGTH_FACTOR = 4.0  # Largest factor on the cell lengths.
+
+
+def geometry_key(patch_model) -> Key:
+    """Return a hashable key of everything on which the meshes and the compliance depend.
+
+    Patches that may share meshes have equal keys; load and surface shapes do not matter.
+    """
+    mesh = patch_model.mesh
+    gap = patch_model.gap
+    file = mesh.file
+    modification_time = (
+        file.path.stat().st_mtime_ns if file is not None and file.path.exists() else 0
+    )
+    return (
+        patch_model.pieces,
+        mesh.element_size,
+        mesh.is_fine,
+        mesh.edge_motion,
+        file,
+        modification_time,
+        gap.step_edges,
+        gap.profile,
+        gap.average,
+    )
 
 
 def choose_shared_meshes(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, PATCH, SLIDE
+from scene_texts import PATCH
 
 from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
@@ -13,9 +13,8 @@ from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
-BENCH = PATCH + COULOMB + SLIDE
 WORK = WorkerData(
-    SweepScene(Path("a.toml"), BENCH),
+    SweepScene(Path("a.toml"), PATCH),
     Cases(
         tuple(
             read_assignments(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0]
@@ -28,7 +27,7 @@ def test_exact_meshes_are_chosen_once_for_all_cases():
     """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
     sizes = []
     for tolerance in (1e-3, 4e-3):
-        scene = SweepScene(Path("a.toml"), f"{BENCH}[accuracy]\ntolerance = {tolerance}\n")
+        scene = SweepScene(Path("a.toml"), f"{PATCH}[accuracy]\ntolerance = {tolerance}\n")
         work = choose_shared_meshes(WorkerData(scene, WORK.cases))
         assert choose_shared_meshes(work) is work
         ((finest, *_),) = work.meshes.meshes.values()
