@@ -69,7 +69,7 @@ class SetSolution(NamedTuple):
     loss: np.ndarray
 
 
-def solve_set(compliance, active, columns) -> SetSolution:
+def solve_set(compliance, active, columns, *, with_ends: bool = True) -> SetSolution:
     """Solve for the forces on one contact set that cause each column of displacements.
 
     A node more at an end adds r S^-1 r to the stiffness of a column, with its opening r and the Schur complement S of its
@@ -84,6 +84,8 @@ def solve_set(compliance, active, columns) -> SetSolution:
         Nodes in contact.
     columns : (q, b m) ndarray
         Displacements.
+    with_ends : bool
+        Whether to compute gain and loss at the ends; without them e is 0.
 
     Returns
     -------
@@ -97,7 +99,7 @@ def solve_set(compliance, active, columns) -> SetSolution:
     n_nodes = active.size
     n_dofs = len(compliance) // n_nodes
     n_columns = len(columns)
-    ends = find_set_ends(active[None])
+    ends = find_set_ends(active[None] if with_ends else np.zeros((1, n_nodes), bool))
     n_ends = ends.node.shape[1]
     force = np.zeros(columns.shape)
     nodes = np.flatnonzero(active)
@@ -168,6 +170,8 @@ class SetTable:
         Columns of which the closings of all cases are combinations.
     n_nodes : int
         Number of nodes m.
+    has_ends : bool
+        Whether the sets have gains and losses of stiffness at their ends.
 
     Attributes
     ----------
@@ -181,10 +185,11 @@ class SetTable:
         Largest opening [m] that is left in contact, per unit of each column.
     """
 
-    def __init__(self, compliance, columns, n_nodes: int):
+    def __init__(self, compliance, columns, n_nodes: int, *, has_ends: bool = True):
         self.compliance = compliance
         self.columns = columns
         self.n_nodes = n_nodes
+        self.has_ends = has_ends
         self.forget()
 
     def forget(self) -> None:
@@ -211,7 +216,7 @@ class SetTable:
     def _add(self, active: np.ndarray) -> int:
         """Solve a set (m,) for all columns and store it; return its number."""
         try:
-            solution = solve_set(self.compliance, active, self.columns)
+            solution = solve_set(self.compliance, active, self.columns, with_ends=self.has_ends)
         except np.linalg.LinAlgError:
             return -1
         slot = self.n_sets

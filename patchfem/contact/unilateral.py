@@ -172,7 +172,7 @@ def _solve_as_one_case(
     own = compliance.common
     if compliance.added is not None:
         own = own + np.diag(compliance.added[0])
-    table = SetTable(own, columns, problem.gap.size)
+    table = SetTable(own, columns, problem.gap.size, has_ends=False)
 
     # A prescribed approach is contained in the gap
     load, moment = np.append(problem.target, [np.nan, np.nan])[:2]

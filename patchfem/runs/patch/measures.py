@@ -444,29 +444,38 @@ def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:
     return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
 
 
-def _find_unbounded_pressure(pressed: PressedCases) -> dict[str, np.ndarray]:
-    """Return the cases (n,) whose peak pressure diverges under mesh refinement, as masks by reason.
+def list_unbounded_pressure_reasons(patch_model) -> list[str]:
+    """Return why the peak pressure of a patch may diverge under mesh refinement; [] if it cannot.
 
     A contact that ends at the edge of a step has the pressure singularity of a flat punch; a
     contact that extends over a closed step has a stronger one. An asperity layer (skin) bounds the
-    pressure.
+    pressure. A reason due to the ends of the interface comes first, then one for each step.
     """
-    level = pressed.level
-    masks = {}
-    if level.has_layer:
-        return masks
+    reasons = []
+    if patch_model.interface.skin is not None:
+        return reasons
+    if patch_model.has_singular_ends:
+        reasons.append(
+            "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
+        )
+    for jump in patch_model.gap.step_edges:
+        reasons.append(
+            f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
+        )
+    return reasons
+
+
+def _find_unbounded_pressure(pressed: PressedCases) -> dict[str, np.ndarray]:
+    """Return the cases (n,) whose peak pressure diverges under mesh refinement, as masks by reason."""
+    patch_model = pressed.level.model
     x = pressed.x
     cells = np.diff(x)
     is_loaded = pressed.loaded.any(axis=1)
-    if level.model.has_singular_ends:
-        masks[
-            "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
-        ] = is_loaded[:, [0, -1]].any(axis=1)
-    for jump in level.model.gap.step_edges:
+    masks = [is_loaded[:, [0, -1]].any(axis=1)] if patch_model.has_singular_ends else []
+    for jump in patch_model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
-        text = f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
-        masks[text] = is_loaded[:, np.abs(x - jump) <= 1.5 * cell].any(axis=1)
-    return masks
+        masks.append(is_loaded[:, np.abs(x - jump) <= 1.5 * cell].any(axis=1))
+    return dict(zip(list_unbounded_pressure_reasons(patch_model), masks))
 
 
 def are_cells_halved(fine, coarse) -> bool:
@@ -664,27 +673,34 @@ def _wedge_indentation_pressure(pressed: PressedCases) -> np.ndarray:
     return np.where(is_end, slopes, 0.0).max(axis=1) / flexibility
 
 
-def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
-    """Return a list with a note on the model error due to assuming plane strain or plane stress.
+def describe_assumed_plane_state(pieces) -> str:
+    """Describe the assumption of plane strain or plane stress for the `PatchPieces` of a patch; "" if it is beyond doubt.
 
-    The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
-    stress that is far taller than wide. No mesh refinement reduces this error.
+    It is for a piece in plane strain that is far wider than tall, and for one in plane stress that is far taller than wide.
     """
-    pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
-        other_plane = "stress"
         is_certain = ratio >= MIN_PLANE_STRAIN_WIDTH_RATIO
     else:
-        other_plane = "strain"
         is_certain = ratio <= 1 / MIN_PLANE_STRAIN_WIDTH_RATIO
     if is_certain:
-        return []
-
-    assumption = (
+        return ""
+    return (
         f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
         "the true state lies between plane strain and plane stress"
     )
+
+
+def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
+    """Return a list with a note on the model error due to assuming plane strain or plane stress.
+
+    The list is empty if the state is beyond doubt. No mesh refinement reduces this error.
+    """
+    pieces = patch_model.pieces
+    assumption = describe_assumed_plane_state(pieces)
+    if not assumption:
+        return []
+    other_plane = "stress" if pieces.plane == "strain" else "strain"
 
     # The change between the two plane states bounds the error, because the true state lies between
     # them.
