@@ -1,6 +1,7 @@
 """Static patches that differ in numbers alone, solved together.
 
-In: `SimilarModels` of a pressed patch. Out: `CaseResults`, without the notes that only a single run makes.
+In: `SimilarModels` of a pressed patch. Out: `CaseResults`, as from single runs, without the change between plane strain
+and plane stress.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Outcome, compute_allowed_error
+from ...core import Measure, Outcome, compute_allowed_error
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from .. import findings
-from ..patch.case_meshes import solve_cases
+from ..patch import case_meshes, measures, result, strength
 from ..patch.cases import Batch, OutcomeCode
 from ..results.patch_rows import PATCH_TABLE
 from ..results.result import shorten_file_names
@@ -30,12 +31,21 @@ OUTCOMES = {
 
 
 def can_solve(model: Model) -> bool:
-    """Return whether similar models of `model` are solved together: those of a pressed patch without a measured profile."""
+    """Return whether similar models of `model` are solved together.
+
+    Single runs treat strips, measured profiles and mesh files, and state what they neglect between unlike pieces, at
+    rounded ends and for the asperities of a trace.
+    """
+    if model.kind != "patch" or has_unreadable_measurements(model):
+        return False
+    patch = model.patch
     return (
-        model.kind == "patch"
-        and model.patch.interface.strips is None
-        and model.patch.gap.profile is None
-        and not has_unreadable_measurements(model)
+        patch.interface.strips is None
+        and patch.gap.profile is None
+        and patch.mesh.file is None
+        and patch.pieces.are_alike
+        and patch.pieces.lower.end.kind != "radius"
+        and getattr(patch.interface.skin, "rms_height", None) is None
     )
 
 
@@ -43,7 +53,8 @@ def solve(models: SimilarModels) -> CaseResults:
     """Compute the case results of similar models of a pressed patch."""
     begin = process_time()
     model = models.first
-    batch = solve_cases(models.columns().patch, len(models), model.accuracy.tolerance)
+    patch = models.columns().patch
+    batch = case_meshes.solve_cases(patch, len(models), model.accuracy.tolerance)
 
     results = CaseResults.blank(len(models))
     results.values.update(batch.values)
@@ -54,38 +65,80 @@ def solve(models: SimilarModels) -> CaseResults:
         results.outcome[batch.outcome == code] = outcome
     for case, error in batch.messages.items():
         results.messages[case] = str(error)
-    _insert_texts(model, batch, results)
+    if batch.values:
+        _insert_texts(model, batch, results)
+        _insert_findings(model, batch, results)
     results.seconds[:] = (process_time() - begin) / len(models)
     return results
 
 
 def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
-    """Store the texts of cases that follow from the numbers of a batch: settings, remarks, and why a tolerance is missed."""
+    """Store settings, reasons of missing values, warnings and notes of the cases of a batch.
+
+    `model` is one of the models, with the texts that all of them have in common.
+    """
+    patch = model.patch
     for count in np.unique(batch.n_nodes):
         results.numerics[batch.n_nodes == count] = {"interface_nodes": int(count)}
-    if model.source.remarks:
-        results.warnings[:] = shorten_file_names(model.source.remarks, model.source.path)
-    if model.source.notes:
-        results.notes[:] = list(model.source.notes)
+    reason = "; or ".join(measures.list_unbounded_pressure_reasons(patch))
+    for name in measures.PRESSURE_PEAK_MEASURES:
+        is_unbounded = np.isnan(batch.values[name]) & (batch.outcome != OutcomeCode.FAILED)
+        if is_unbounded.any():
+            row = PATCH_TABLE[name]
+            missing = Measure(None, row.unit, None, row.floor, reason=reason)
+            results.fill(np.flatnonzero(is_unbounded), {name: missing})
 
-    # The measure with the largest ratio of error to allowed error is named.
-    names = list(results.values)
+    # Texts that all cases have in common
+    path = model.source.path
+    warnings = shorten_file_names([*model.source.remarks, *result.warn_of_locking(patch)], path)
+    notes = shorten_file_names(model.source.notes, path)
+    if assumption := measures.describe_assumed_plane_state(patch.pieces):
+        notes.append(f"{assumption}; the run of a single case states how much the two differ")
+    results.warnings[batch.outcome != OutcomeCode.FAILED] = warnings
+    results.notes[batch.outcome != OutcomeCode.FAILED] = notes
+
+    # Those of single cases; if the largest pressure and approach cause none, no other case has any.
+    peaks = np.nan_to_num(batch.values["pressure_peak"])
+    certain = peaks - np.nan_to_num(batch.errors["pressure_peak"])
+    approaches = np.nan_to_num(batch.values["approach"])
+    is_own = batch.outcome == OutcomeCode.NO_CONTACT
+    if result.warn_of_strains(patch, peaks.max(), approaches.max()) or (
+        strength.note_on_yielding_faces(patch, certain.max())
+    ):
+        is_own[:] = batch.outcome != OutcomeCode.FAILED
+    for case in np.flatnonzero(is_own).tolist():
+        own = result.warn_of_strains(patch, peaks[case], approaches[case])
+        if batch.outcome[case] == OutcomeCode.NO_CONTACT:
+            own.append(Outcome.NO_CONTACT.sentence)
+        results.warnings[case] = [*warnings, *own]
+        yielding = strength.note_on_yielding_faces(patch, certain[case])
+        results.notes[case] = [*notes, *yielding.values()]
+
+
+def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
+    """Store why cases miss their tolerance, with the measure that misses it most; `model` has the tolerance."""
+    names = list(batch.values)
     tolerance = model.accuracy.tolerance
     ratios = np.zeros((len(names), len(results)))
     for row, name in zip(ratios, names):
-        allowed = compute_allowed_error(tolerance, results.values[name], results.floors[name])
-        np.divide(results.errors[name], allowed, out=row, where=allowed > 0)
+        allowed = compute_allowed_error(tolerance, batch.values[name], batch.floors[name])
+        np.divide(batch.errors[name], allowed, out=row, where=allowed > 0)
     ratios = np.nan_to_num(ratios)
+
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():
         name = names[ratios[:, case].argmax()]
-        error = results.errors[name][case]
-        size = abs(results.values[name][case])
+        error = batch.errors[name][case]
+        size = abs(batch.values[name][case])
         share = f"{error / size:.2g} of its value" if error < size else "at least its value"
         advice = f"a finer mesh does not reduce it or is too expensive; {findings.USE_ERROR_ADVICE}"
-        if batch.excess[case] <= 1:
+        if not model.patch.mesh.is_automatic:
+            advice = f"leave out {findings.ELEMENT_SIZE_KEY}"
+        elif batch.excess[case] <= 1:
             finer = findings.PROPOSED_TOLERANCE_RATIO * tolerance
             advice = f"set accuracy.tolerance = {finer:.3g} for a finer mesh"
         results.findings[case] = (
-            f"{name} has an estimated error of {share}; the tolerance is {tolerance:g}; {advice}"
+            f"{name} has an estimated error of {share}; the tolerance is {tolerance:g}; the mesh "
+            f"({batch.n_nodes[case]} interface nodes) causes this error; {advice}"
         )
+        results.warnings[case] = [*results.warnings[case], results.findings[case]]
