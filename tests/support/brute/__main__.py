@@ -13,9 +13,9 @@ from time import process_time
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from brute import recipe, systems
 from campaigns import Row, measure_rows
 
+from brute import recipe, systems
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads

@@ -46,6 +46,8 @@ class Structure(NamedTuple):
     - transition (2 n, 2 n): of displacements and velocities in a step
     - start, end (2 n, n): response to generalised forces that fall from 1 to 0, and rise from 0 to 1
     - drive (k, n): generalised forces of the drive at the samples
+    - spring_rows (s, n), springs (s, 2): displacement of nonlinear springs per coordinate, their stiffness [N/m3] and 0, or
+      stiffness [N/m] and wave number [rad/m] of a sinusoidal force
     - path (k, 2 p): prescribed slides [m] and velocities [m/s] of the ports at the samples, with n = 0
     """
 
@@ -54,6 +56,8 @@ class Structure(NamedTuple):
     start: np.ndarray
     end: np.ndarray
     drive: np.ndarray
+    spring_rows: np.ndarray
+    springs: np.ndarray
     path: np.ndarray
 
 
@@ -61,7 +65,7 @@ class Loads(NamedTuple):
     """Normal loads of the points.
 
     - kind: PRESCRIBED, CONTACT, LOWER or GROOVES
-    - values (k, m) [N]: at the samples, with PRESCRIBED; (1, m) loads at the start otherwise
+    - values (k, m) [N]: at the samples, with PRESCRIBED and GROOVES; (1, m) loads at the start otherwise
     - x (m,) [m], area (m,) [m2]: of the nodes of a patch
     - opening (m,) [m], compliance (m, m) [m/N]: CONTACT without forces at the start
     - motions (2, n): heave and pitch per coordinate
@@ -206,6 +210,7 @@ def march(points, structure, loads, dt, state, samples):
     n_unsolved = 0
     general = np.zeros(n)
     old_general = np.zeros(n)
+    old = np.zeros(n)
     climb = 1.0
     slope = 0.0
     slides = np.zeros(n_ports)
@@ -236,7 +241,7 @@ def march(points, structure, loads, dt, state, samples):
         guess = force.copy()
         done = False
         start_climb = climb
-        for outer in range(40):
+        for _ in range(40):
             # motion of the ports with the generalised forces of the last iteration that friction does not give
             y = free.copy()
             if n:
@@ -252,12 +257,13 @@ def march(points, structure, loads, dt, state, samples):
                     v += structure.rows[p, i] * y[n + i]
                 samples[row + 1, 3 * p] = q
                 rates[p] = v
-            # slide and velocity at the end with the present friction forces
+            # state at the end with the present friction forces
+            for j in range(m if n else 0):
+                y -= by_end @ structure.rows[points.port[j]] * (climb * guess[j])
             for p in range(n_ports):
-                end_slide = samples[row + 1, 3 * p]
-                for j in range(m):
-                    end_slide -= slide_by_force[p, points.port[j]] * climb * guess[j]
-                slides[p] = end_slide
+                slides[p] = structure.path[row + 1, p] if n == 0 else 0.0
+                for i in range(n):
+                    slides[p] += structure.rows[p, i] * y[i]
 
             # loads at the end
             if loads.kind == PRESCRIBED:
@@ -271,15 +277,12 @@ def march(points, structure, loads, dt, state, samples):
             elif loads.kind == CONTACT:
                 heave = pitch = 0.0
                 for i in range(n):
-                    displaced = y[i]
-                    for j in range(m):
-                        for k in range(n):
-                            displaced -= by_end[i, k] * structure.rows[points.port[j], k] * guess[j]
-                    heave += loads.motions[0, i] * displaced
-                    pitch += loads.motions[1, i] * displaced
+                    heave += loads.motions[0, i] * y[i]
+                    pitch += loads.motions[1, i] * y[i]
                 solve_contact(loads, heave, pitch, normal)
                 end_load[:] = normal
             else:
+                base = loads.values[row + 1]
                 turn = loads.grooves[0] * slides[0] - loads.grooves[2]
                 slope = loads.grooves[0] * loads.grooves[1] * np.sin(turn)
                 climb = np.sqrt(1 + slope * slope)
@@ -426,23 +429,23 @@ def march(points, structure, loads, dt, state, samples):
                 if sweep == MAX_SWEEPS - 1:
                     n_unsolved += 1
 
-            # forces on the coordinates besides friction
-            moved = 0.0
+            # forces on the coordinates besides friction, at the last estimate of the end
+            old[:] = general
+            general[:] = 0.0
+            for k in range(structure.springs.shape[0]):
+                stiffness, wave = structure.springs[k]
+                x = structure.spring_rows[k] @ y[:n]
+                pull = stiffness / wave * np.sin(wave * x) if wave > 0 else stiffness * x**3
+                general += structure.spring_rows[k] * pull
             if loads.kind == CONTACT:
                 lift = normal.sum() - loads.values[0].sum()
-                turn = (normal - loads.values[0]) @ loads.x
-                for i in range(n):
-                    value = -(loads.motions[0, i] * lift + loads.motions[1, i] * turn)
-                    moved = max(moved, abs(value - general[i]))
-                    general[i] = value
-            elif loads.kind == GROOVES:
-                for i in range(n):
-                    value = structure.rows[0, i] * slope * base.sum()
-                    moved = max(moved, abs(value - general[i]))
-                    general[i] = value
-                moved = max(moved, np.abs(guess - next_force).max())
-            elif loads.kind == LOWER:
-                moved = np.abs(guess - next_force).max()
+                moment = (normal - loads.values[0]) @ loads.x
+                general -= loads.motions[0] * lift + loads.motions[1] * moment
+            elif loads.kind == GROOVES and n:
+                general += structure.rows[0] * (slope * base.sum())
+            moved = np.abs(guess - next_force).max()
+            if n:
+                moved = max(moved, np.abs(general - old).max())
             next_force[:] = guess
             if moved <= 1e-9 * scale:
                 done = True

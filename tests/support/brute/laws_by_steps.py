@@ -123,7 +123,6 @@ def slide_point(kind, numbers, cells, memory, new, ds, dt, velocity, before, aft
         h = abs(ds) / pieces
         slipped = 0.0
         for _ in range(pieces):
-            rates = (0.0, 0.0, 0.0, 0.0)
             last = 0.0
             total = 0.0
             for stage in range(4):

@@ -106,9 +106,10 @@ def make_scene(seed: int, kind: str, effect: str, law: str) -> Scene:
             text += _write_modes(rng, sizes, effect, mass, frequency)
     if kind == "rig":
         acceleration = rng.uniform(1.0, 4.0) * limit / mass / G
-        text += f'[drive]\nkind = "base"\nfrequency = "{drive:.6g} Hz"\nacceleration = "{acceleration:.6g} g"\ncycles = {n_cycles}\n'
+        motion = f'[drive]\nkind = "base"\nacceleration = "{acceleration:.6g} g"\n'
     else:
-        text += f'[slide]\nkind = "sine"\namplitude = "{travel * 1e6:.6g} um"\nfrequency = "{drive:.6g} Hz"\ncycles = {n_cycles}\n'
+        motion = f'[slide]\nkind = "sine"\namplitude = "{travel * 1e6:.6g} um"\n'
+    text += f'{motion}frequency = "{drive:.6g} Hz"\ncycles = {n_cycles}\n'
     steps = 4000
     if has_patch:
         steps = 1600

@@ -115,7 +115,12 @@ def _make_structure(tables: dict, time) -> Structure:
         path = amplitude * np.stack([np.sin(omega * time), omega * np.cos(omega * time)], axis=1)
         none = np.zeros((0, 0))
         return Structure(
-            np.zeros((1, 0)), none, none, none, np.zeros((time.size, 0)), np.ascontiguousarray(path)
+            np.zeros((1, 0)),
+            *(none,) * 3,
+            np.zeros((time.size, 0)),
+            np.zeros((0, 0)),
+            np.zeros((0, 2)),
+            np.ascontiguousarray(path),
         )
 
     table = tables["structure"]
@@ -133,6 +138,7 @@ def _make_structure(tables: dict, time) -> Structure:
                 matrix += read_number(element[key]) * np.outer(row, row)
         rows = np.array([_make_difference(face["between"], n) for face in table["interface"]])
         base = mass @ np.ones(n)
+        output = np.eye(n)[0]
     else:
         modes = table["mode"]
         n = len(modes)
@@ -143,6 +149,7 @@ def _make_structure(tables: dict, time) -> Structure:
         stiffness = modal_mass * np.diag(frequency**2)
         damping = modal_mass * np.diag(2 * ratio * frequency)
         slide = np.array([mode["slide"] for mode in modes])
+        output = np.array([mode.get("output", float(k == 0)) for k, mode in enumerate(modes)])
         base = np.array([mode.get("base", 0.0) for mode in modes])
         base[0] = modes[0].get("base", slide[0])
         base = modal_mass * base
@@ -172,8 +179,24 @@ def _make_structure(tables: dict, time) -> Structure:
         np.ascontiguousarray(constant - rising),
         np.ascontiguousarray(rising),
         forces,
+        *_list_springs(table, rows, output),
         np.zeros((time.size, 0)),
     )
+
+
+def _list_springs(table: dict, rows, output) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacements per coordinate, and numbers, of the nonlinear springs of a table [structure]."""
+    lines, springs = [], []
+    if "stiffening" in table:
+        lines.append(output)
+        springs.append([read_number(table["stiffening"]["cubic"]), 0.0])
+    bonded = table.get("bonded", {})
+    if "wavelength" in bonded:
+        lines.append(rows[0])
+        springs.append(
+            [read_number(bonded["stiffness"]), 2 * np.pi / read_number(bonded["wavelength"])]
+        )
+    return np.array(lines, float).reshape(-1, rows.shape[1]), np.array(springs).reshape(-1, 2)
 
 
 def _make_difference(between, n: int) -> np.ndarray:
@@ -384,7 +407,7 @@ def _make_loads(tables: dict, time, values, face: Face) -> Loads:
         kind = LOWER
         x, area = patch.x.copy(), patch.area.copy()
         pressure = np.stack([patch.x, patch.pressure])
-    else:
+    if kind in (PRESCRIBED, GROOVES):
         factor = np.ones(time.size)
         if "amplitude" in normal:
             omega = 2 * np.pi * read_number(normal["frequency"])
