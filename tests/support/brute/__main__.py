@@ -1,7 +1,8 @@
 """Score the program on the recipe of refused combinations: `python tests/support/brute [--references] [PART ...]`.
 
-Without options every scene that the program accepts is run and compared with `references.json`. `--references` computes
-that file again, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it is.
+Without options every scene that the program accepts is run and compared with `references.json`. `--references`
+computes what that file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it
+is.
 """
 
 import json
@@ -31,9 +32,11 @@ def select_scenes(parts: list[str]) -> list[recipe.Scene]:
 
 
 def write_references(scenes) -> None:
-    """Compute the references of scenes by brute force and add them to the file."""
+    """Compute the references that the file lacks by brute force."""
     stored = json.loads(REFERENCES.read_text("utf-8")) if REFERENCES.exists() else {}
     for scene in scenes:
+        if str(scene.seed) in stored:
+            continue
         begin = process_time()
         found = systems.find_reference(scene.text, scene.steps)
         print(

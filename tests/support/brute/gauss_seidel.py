@@ -25,7 +25,7 @@ class Points(NamedTuple):
     - port (m,): number of the port
     - kind (m,), numbers (m, 6), cells (m, k, 2), memory (m, 2 k): see `laws_by_steps`
     - limits (m, 2): factors of the load for a slide to +x and to -x (1, or those of an averaged pressure)
-    - average (2,): bond length [m] and order of an averaged pressure that changes, or (0, 0)
+    - average (w + 1,): spacing [m] and w weights of an averaged pressure that changes; (0,) for other laws
     - compliance (m, m) [m/N]: of the pieces
     """
 
@@ -117,24 +117,18 @@ def solve_contact(loads, heave, pitch, force):
 
 @njit(cache=True)
 def average_behind(place, sign, x, pressure, average):
-    """Return the pressure averaged over the path behind a place, with the weight s^p exp(-s/eps) and `average` = (eps, p).
+    """Return the pressure averaged over the path behind a place, with the spacing and the weights of `average`.
 
     A point on which nothing presses carries nothing, and the average ends where the pressure vanishes.
     """
     total = 0.0
-    weights = 0.0
-    h = average[0] / 40
-    lost = False
-    for k in range(1000):
-        s = k * h
-        at = place - sign * s
-        inside = x[0] <= at <= x[-1]
-        value = np.interp(at, x, pressure) if inside else 0.0
-        weight = (k / 40.0) ** average[1] * np.exp(-k / 40.0) * (0.5 if k == 0 else 1.0)
-        lost = lost or value <= 0.0
-        weights += weight
-        total += 0.0 if lost else weight * value
-    return total / weights
+    for k in range(average.size - 1):
+        at = place - sign * k * average[0]
+        value = np.interp(at, x, pressure) if x[0] <= at <= x[-1] else 0.0
+        if value <= 0.0:
+            break
+        total += average[k + 1] * value
+    return total
 
 
 @njit(cache=True)
@@ -294,7 +288,7 @@ def march(points, structure, loads, dt, state, samples):
                 start_load[j] = end_load[j] if keeps else load[j]
                 scale = max(scale, end_load[j] * max(points.numbers[j, 0], 1e-3))
 
-            if points.average[0] > 0.0:
+            if points.average.size > 1:
                 shift = slides[0] if loads.kind == LOWER else 0.0
                 field = loads.pressure[1] if loads.kind == LOWER else end_load / loads.area
                 for j in range(m):

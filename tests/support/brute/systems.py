@@ -249,10 +249,13 @@ def _make_points(tables: dict, time) -> tuple[Points, Loads]:
     density = np.where(kind == LUGRE, 1.0, numbers[:, 2])
     is_bond = (kind == BONDS) | (kind == LUGRE)
     memory[is_bond, 0] = (density * values)[is_bond]
-    average = np.zeros(2)
+    average = np.zeros(1)
     if point_loads.kind in (CONTACT, LOWER) and tables["friction"]["law"] == "convolution":
         law = tables["friction"]
-        average[:] = read_number(law["bond_length"]), law.get("order", 1.0)
+        s = np.arange(600) / 40
+        weight = s ** law.get("order", 1.0) * np.exp(-s)
+        weight[0] *= 0.5
+        average = np.append(read_number(law["bond_length"]) / 40, weight / weight.sum())
     points = Points(port, kind, numbers, cells, memory, limits, average, compliance)
     return points, point_loads
 
@@ -286,13 +289,20 @@ def _make_face(law: dict, contact, load, tables: dict | None = None) -> Face:
         moves = tables is not None and (
             _is_lower(contact) or any(_find_motions(tables)[0]) or any(_find_motions(tables)[1])
         )
-        is_whole = "shear" not in contact and not moves and law["law"] != "convolution"
+        holder = contact.get("holder", {}).get("tangential_stiffness")
+        is_soft = "shear" in contact or holder
+        is_whole = not is_soft and not moves and law["law"] != "convolution"
         index = np.arange(forces.size) if moves else np.flatnonzero(forces > 0)
         if is_whole:
             loads, compliance = np.array([forces.sum()]), np.zeros((1, 1))
         else:
             loads = forces[index]
-            compliance = patch.shear[np.ix_(index, index)] * ("shear" in contact)
+            # The package adds the holder to the compliance of the pieces; alone it is the same at all nodes.
+            compliance = np.zeros((index.size, index.size))
+            if "shear" in contact:
+                compliance += patch.shear[np.ix_(index, index)]
+            elif holder:
+                compliance += 1 / read_number(holder)
     kind, numbers, cells = _make_law(law, float(loads.sum()))
     limits = np.ones((loads.size, 2))
     if law["law"] == "convolution" and patch is not None:
