@@ -82,7 +82,7 @@ def solve_scene(text: str, steps_per_cycle: int) -> tuple[dict[str, float], int]
     period = 1 / read_number(motion["frequency"])
     n_cycles = round(motion.get("cycles", 1))
     time = period * np.arange(n_cycles * steps_per_cycle + 1) / steps_per_cycle
-    structure = _make_structure(tables, time)
+    structure = make_structure(tables, time)
     points, point_loads = _make_points(tables, time)
     n_ports = structure.rows.shape[0]
     samples = np.zeros((time.size, 3 * n_ports + 1))
@@ -106,7 +106,7 @@ def solve_scene(text: str, steps_per_cycle: int) -> tuple[dict[str, float], int]
 # ---- structure
 
 
-def _make_structure(tables: dict, time) -> Structure:
+def make_structure(tables: dict, time) -> Structure:
     """Return the linear structure of a rig, or the prescribed slide of a bench."""
     step = time[1]
     if "slide" in tables:
@@ -303,7 +303,7 @@ def _make_face(law: dict, contact, load, tables: dict | None = None) -> Face:
                 compliance += patch.shear[np.ix_(index, index)]
             elif holder:
                 compliance += 1 / read_number(holder)
-    kind, numbers, cells = _make_law(law, float(loads.sum()))
+    kind, numbers, cells = make_law(law, float(loads.sum()))
     limits = np.ones((loads.size, 2))
     if law["law"] == "convolution" and patch is not None:
         for column, sign in enumerate((1.0, -1.0)):
@@ -315,8 +315,14 @@ def _make_face(law: dict, contact, load, tables: dict | None = None) -> Face:
     )
 
 
-def _make_law(law: dict, load: float) -> tuple[int, tuple, list]:
-    """Return kind, numbers and cells of a law; a stiffness belongs to the `load` [N] of the whole contact."""
+def make_law(law: dict, load: float) -> tuple[int, np.ndarray, list]:
+    """Return kind, numbers (6,) and cells of a law; a stiffness belongs to the `load` [N] of the whole contact."""
+    kind, numbers, cells = _list_numbers(law, load)
+    return kind, np.array([*numbers, *(0.0,) * (6 - len(numbers))]), cells
+
+
+def _list_numbers(law: dict, load: float) -> tuple[int, tuple, list]:
+    """Return kind, numbers and cells of a law as in `laws_by_steps`."""
     name = law["law"]
     static = law["static"]
     stiffness = read_number(law["stiffness"]) / load if "stiffness" in law else 0.0
@@ -389,13 +395,27 @@ def _is_lower(contact: dict) -> bool:
     return any(isinstance(part, dict) and part.get("on") == "lower" for part in contact.values())
 
 
+def make_constant_loads(values, n_samples: int) -> Loads:
+    """Return constant loads `values` (m,) [N] at a number of samples."""
+    m = values.size
+    return Loads(
+        PRESCRIBED,
+        np.repeat(values[None], n_samples, axis=0),
+        np.zeros(m),
+        np.ones(m),
+        np.zeros(m),
+        np.zeros((m, m)),
+        np.zeros((2, 1)),
+        np.zeros((2, 2)),
+        np.zeros(3),
+    )
+
+
 def _make_loads(tables: dict, time, values, face: Face) -> Loads:
     """Return the loads of the points, which are `values` (m,) [N] at the start."""
-    m = values.size
-    kind = PRESCRIBED
-    history = values[None]
-    x, area, opening, compliance = np.zeros(m), np.ones(m), np.zeros(m), np.zeros((m, m))
-    motions, pressure, grooves = np.zeros((2, 1)), np.zeros((2, 2)), np.zeros(3)
+    kind, history, x, area, opening, compliance, motions, pressure, grooves = make_constant_loads(
+        values, 1
+    )
     contact = tables.get("contact", {})
     normal = tables.get("normal", {})
     carved = contact.get("grooves") or normal.get("grooves")
