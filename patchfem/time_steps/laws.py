@@ -1,0 +1,182 @@
+"""Numbers and first memory of the laws of contact points, from keys of a scene or from parameters."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import MIN_LOAD, PatchfemError
+from ..friction.bonds.parameters import Bonds, growth_numbers
+from ..friction.laws.iwan import slider_cells
+from .step_rows import Law
+
+MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
+# Cells of an Iwan model; the force of first loading is exact to 6e-5 of the friction limit for chi >= -0.5
+N_CELLS = 96
+NO_GROWTH = (-1.0, 0.0, 0.0, 0.0, 0.0)  # growth numbers of bonds of constant length
+
+
+class PointLaw(NamedTuple):
+    """Law of m contact points.
+
+    - law: number of the law
+    - numbers (k, m), memory (l, m): as described by the law
+    - load (m,): normal load [N] at the start
+    """
+
+    law: Law
+    numbers: np.ndarray
+    memory: np.ndarray
+    load: np.ndarray
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Friction limits (m,) [N] at the start; the first number of a law is its coefficient of friction."""
+        return self.numbers[0] * self.load
+
+
+def _pack(law: Law, numbers, memory, load) -> PointLaw:
+    """Return a PointLaw from rows of `numbers` and `memory`, floats or arrays (m,), and the `load` [N]."""
+    load = np.atleast_1d(np.asarray(load, float))
+    shape = np.broadcast_shapes(load.shape, *map(np.shape, (*numbers, *memory)))
+    rows = [
+        np.array(np.broadcast_arrays(np.zeros(shape), *part)[1:], float)
+        for part in (numbers, memory)
+    ]
+    return PointLaw(
+        law, rows[0].reshape(-1, *shape), rows[1].reshape(-1, *shape), load + np.zeros(shape)
+    )
+
+
+def make_cells(static, lengths, load, weights=(1.0,), *, is_fixed: bool = False) -> PointLaw:
+    """Return points of K parallel springs with sliders.
+
+    Parameters
+    ----------
+    static : float or (m,) array
+        Coefficient of friction.
+    lengths : sequence of K floats or (m,) arrays
+        Slides [m] at which the cells slip under `load`.
+    load : float or (m,) array
+        Normal load [N].
+    weights : sequence of K floats
+        Fractions of the friction limit, with the sum 1.
+    is_fixed : bool
+        Whether the stiffness stays that under `load` when the load changes.
+    """
+    lengths = [np.maximum(length, MIN_LENGTH) for length in lengths]
+    memory = [part for _ in lengths for part in (0.0, load)]
+    numbers = (static, float(is_fixed), float(len(lengths)), *weights, *lengths)
+    return _pack(Law.CELLS, numbers, memory, load)
+
+
+def make_elements(stiffness, yields) -> PointLaw:
+    """Return t parallel elements of constant limits, a point each.
+
+    Parameters
+    ----------
+    stiffness, yields : (t,) array
+        Stiffnesses [N/m] and slides at which the elements yield [m].
+    """
+    return make_cells(np.multiply(stiffness, yields), [np.asarray(yields, float)], 1.0)
+
+
+def make_iwan(law, load) -> PointLaw:
+    """Return points of an Iwan model (`friction.laws.iwan.Iwan`) under a load [N]."""
+    cells = slider_cells(law.static, law.stiffness, law.chi, law.beta, N_CELLS)
+    weights = cells.stiffness * cells.yield_displacement
+    return make_cells(law.static, list(cells.yield_displacement), load, weights / weights.sum())
+
+
+def make_bonds(bonds: Bonds, load) -> PointLaw:
+    """Return points of bonds of order 1 and reading "stretch" under a load [N]."""
+    rest = (0.0, 0.0, 0.0, 0.0)
+    numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial, *rest)
+    load = np.asarray(load, float)
+    return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load, 0.0, 0.0), load)
+
+
+def make_lugre(law, load) -> PointLaw:
+    """Return points of the LuGre law (`friction.laws.lugre.LuGre`) under a load [N], as a sum over bonds."""
+    length = law.static / law.stiffness
+    damping = (law.kinetic, law.speed, law.micro_damping, law.viscous)
+    numbers = (law.static, length, *NO_GROWTH, 1.0, *damping)
+    return _pack(Law.BONDS, numbers, (length, load, 0.0, 0.0), load)
+
+
+def make_bouc_wen(law, load) -> PointLaw:
+    """Return points of the Bouc-Wen law (`friction.laws.bouc_wen.BoucWen`) under a load [N]."""
+    numbers = (law.static, law.length, law.exponent, law.shape)
+    return _pack(Law.BOUC_WEN, numbers, (0.0, load), load)
+
+
+def make_tanh(law, load, compliance=0.0) -> PointLaw:
+    """Return points of the regularised law (`friction.laws.tanh.Tanh`) under a load [N] behind a compliance [m/N]."""
+    return _pack(Law.TANH, (law.static, law.speed, compliance), (0.0, 0.0), load)
+
+
+def make_coulomb(law, load, compliance=0.0) -> PointLaw:
+    """Return points of Coulomb's law under a load [N].
+
+    A compliance [m/N] of a point makes it elastic-plastic, with a stiffness that does not follow the load.
+    """
+    if np.any(compliance):
+        return make_cells(law.static, [law.static * load * compliance], load, is_fixed=True)
+    return _pack(Law.COULOMB, (law.static, law.kinetic), (0.0,), load)
+
+
+def make_cubic(stiffness: float) -> PointLaw:
+    """Return a spring of force stiffness q^3, with the stiffness in N/m3."""
+    return _pack(Law.CUBIC, (stiffness,), (0.0,), 1.0)
+
+
+def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
+    """Return a spring whose force is sinusoidal, of stiffness [N/m] at rest and a wavelength [m]."""
+    return _pack(Law.INTERLOCK, (stiffness, wavelength), (0.0,), 1.0)
+
+
+def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:
+    """Return elastic-plastic points (eq. 3.12) under a load [N]; a compliance of shear modes left out is neglected."""
+    return make_cells(law.static, [law.length], load)
+
+
+# Function (law, load) that returns the points of a law, by `friction.law`
+MAKERS = {
+    "coulomb": make_coulomb,
+    "elastic-plastic": _make_elastic_plastic,
+    "iwan": make_iwan,
+    "nonlocal": make_bonds,
+    "lugre": make_lugre,
+    "bouc-wen": make_bouc_wen,
+    "tanh": make_tanh,
+}
+# Laws that are stiff or rigid, so that points need the compliance of the shear modes left out
+STIFF_LAWS = ("coulomb", "tanh")
+
+
+def make_point_law(name: str, law, load, compliance=0.0) -> PointLaw:
+    """Return points with a friction law under a load [N].
+
+    Parameters
+    ----------
+    name : str
+        Name of the law, `friction.law`.
+    law : friction law per newton of load, or friction.bonds.parameters.Bonds
+        Law as `friction.record.make_law` returns it.
+    load : float or (m,) array
+        Normal load [N].
+    compliance : float or (m,) array
+        Compliance [m/N] of the shear modes left out, which the laws in STIFF_LAWS need.
+
+    Raises
+    ------
+    PatchfemError
+        If the law has no function for points.
+    """
+    if name not in MAKERS:
+        raise PatchfemError(
+            f"a bench and time steps need a function of the law '{name}' for points; add it to time_steps/laws.py"
+        )
+    load = np.maximum(load, MIN_LOAD)
+    if name in STIFF_LAWS:
+        return MAKERS[name](law, load, compliance)
+    return MAKERS[name](law, load)
