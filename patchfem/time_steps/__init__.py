@@ -8,7 +8,7 @@ ones may be empty (their load is 0). A law is one compiled function of a block:
 
 All arrays are 1-D. The value of point j < WIDTH in a row is entry `row + j`, where the members of an enumeration of rows
 are multiples of WIDTH, as in `values[Value.SLIDE + j]`. The distance between rows is known to the compiler, so that it
-vectorises loops over j in range(WIDTH).
+vectorises loops over j. A loop without branches runs over whole vectors, up to `count` rounded up to a multiple of VECTOR.
 
 - numbers: numbers of the law, read only; a law documents its rows
 - memory: state of the points at the start of the step, read only

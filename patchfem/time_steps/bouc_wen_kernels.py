@@ -10,45 +10,45 @@ from math import sqrt
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
-from .step_rows import Value
+from .step_rows import WIDTH, Value
 
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
 
 
 @njit(**NJIT_CALL)
-def slide_bouc_wen(numbers, memory, trial, values, first, end, step):
-    """Slide points of the Bouc-Wen law; the package describes the arguments (`time_steps`).
+def slide_bouc_wen(numbers, memory, trial, values, count, step):
+    """Slide a block of points of the Bouc-Wen law; the package describes the arguments (`time_steps`).
 
     Rows of `numbers`: coefficient of friction, length [m], exponent, shape. Memory: y [N], load of the springs [N].
     """
-    for j in range(first, end):
-        friction = numbers[0, j]
-        length = numbers[1, j]
-        exponent = numbers[2, j]
-        load = values[Value.END_LOAD, j]
-        middle = 0.5 * (values[Value.START_LOAD, j] + load)
-        slide = values[Value.SLIDE, j]
-        values[Value.END_BY_VELOCITY, j] = values[Value.MEAN_BY_VELOCITY, j] = 0.0
+    for j in range(count):
+        friction = numbers[j]
+        length = numbers[WIDTH + j]
+        exponent = numbers[2 * WIDTH + j]
+        load = values[Value.END_LOAD + j]
+        middle = 0.5 * (values[Value.START_LOAD + j] + load)
+        slide = values[Value.SLIDE + j]
+        values[Value.END_BY_VELOCITY + j] = values[Value.MEAN_BY_VELOCITY + j] = 0.0
         if middle <= 0:
-            trial[0, j] = 0.0
-            trial[1, j] = max(load, 0.0)
-            values[Value.END, j] = values[Value.MEAN, j] = 0.0
-            values[Value.END_BY_SLIDE, j] = values[Value.MEAN_BY_SLIDE, j] = 0.0
-            values[Value.ENERGY, j] = values[Value.STRETCH, j] = 0.0
+            trial[j] = 0.0
+            trial[WIDTH + j] = max(load, 0.0)
+            values[Value.END + j] = values[Value.MEAN + j] = 0.0
+            values[Value.END_BY_SLIDE + j] = values[Value.MEAN_BY_SLIDE + j] = 0.0
+            values[Value.ENERGY + j] = values[Value.STRETCH + j] = 0.0
             continue
 
         # The first half of the change of load cuts the force and adds springs; the path is under the mean load.
-        start = min(max(memory[0, j], -middle), middle)
-        springs = max(memory[1, j], middle)
+        start = min(max(memory[j], -middle), middle)
+        springs = max(memory[WIDTH + j], middle)
         energy = 0.5 * length * start * start / springs
         direction = 1.0 if slide > 0 else -1.0
         path = abs(slide) * springs / (length * middle)
         y = direction * start / middle
-        moved = follow_path(y, path, exponent, numbers[3, j])
+        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j])
         mean = moved.mean if path > 0 else y
         work = energy + middle * mean * abs(slide)
         size = abs(moved.end) ** exponent
-        rate = (1 - size if moved.end > 0 else 1 - (1 - 2 * numbers[3, j]) * size) / length
+        rate = (1 - size if moved.end > 0 else 1 - (1 - 2 * numbers[3 * WIDTH + j]) * size) / length
         rate *= springs
 
         # Springs beyond the load break over the part of the path that slips.
@@ -63,15 +63,15 @@ def slide_bouc_wen(numbers, memory, trial, values, first, end, step):
             last = stop + size * (load - middle)
         most = sqrt(2 * work * left / length)
         last = min(max(last, -most), most)
-        trial[0, j] = direction * last
-        trial[1, j] = left
-        values[Value.END, j] = friction * direction * last
-        values[Value.MEAN, j] = friction * direction * middle * mean
-        values[Value.END_BY_SLIDE, j] = friction * rate if abs(stop) <= load else 0.0
+        trial[j] = direction * last
+        trial[WIDTH + j] = left
+        values[Value.END + j] = friction * direction * last
+        values[Value.MEAN + j] = friction * direction * middle * mean
+        values[Value.END_BY_SLIDE + j] = friction * rate if abs(stop) <= load else 0.0
         slope = 0.5 * rate
         if path > MIN_PATH:
             slope = middle * (moved.end - mean) / abs(slide)
-        values[Value.MEAN_BY_SLIDE, j] = friction * slope
+        values[Value.MEAN_BY_SLIDE + j] = friction * slope
         stretch = direction * last * length / left if left > 0 else 0.0
-        values[Value.ENERGY, j] = 0.5 * friction * direction * last * stretch
-        values[Value.STRETCH, j] = stretch
+        values[Value.ENERGY + j] = 0.5 * friction * direction * last * stretch
+        values[Value.STRETCH + j] = stretch

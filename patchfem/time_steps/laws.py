@@ -7,12 +7,33 @@ import numpy as np
 from ..core import MIN_LOAD, PatchfemError
 from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import slider_cells
-from .step_rows import Law
+from .step_rows import VECTOR, WIDTH, Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 # Cells of an Iwan model; the force of first loading is exact to 6e-5 of the friction limit for chi >= -0.5
 N_CELLS = 96
 NO_GROWTH = (-1.0, 0.0, 0.0, 0.0, 0.0)  # growth numbers of bonds of constant length
+
+
+class Blocks(NamedTuple):
+    """Arrays of b blocks of points.
+
+    - numbers (b, k WIDTH), memory (b, l WIDTH): rows of the law
+    - load (b, WIDTH): normal load [N]
+    - count (b,): number of points
+    """
+
+    numbers: np.ndarray
+    memory: np.ndarray
+    load: np.ndarray
+    count: np.ndarray
+
+
+class Sliders(NamedTuple):
+    """Parallel cells of a point: weights (K,), fractions of the friction limit, and inverse lengths `softness` (K,) [1/m]."""
+
+    weights: np.ndarray
+    softness: np.ndarray
 
 
 class PointLaw(NamedTuple):
@@ -21,12 +42,38 @@ class PointLaw(NamedTuple):
     - law: number of the law
     - numbers (k, m), memory (l, m): as described by the law
     - load (m,): normal load [N] at the start
+    - sliders: cells of all points, of the law SLIDERS
     """
 
     law: Law
     numbers: np.ndarray
     memory: np.ndarray
     load: np.ndarray
+    sliders: Sliders | None = None
+
+    def make_blocks(self) -> "Blocks":
+        """Return the arrays of the blocks of these points; the places behind the last point have no load."""
+        count = self.load.size
+        n_blocks = -(-count // WIDTH)
+        pad = n_blocks * WIDTH - count
+
+        def reshape(rows, mode):
+            """Return rows (k, m) by blocks, (b, k WIDTH)."""
+            padded = np.pad(rows, ((0, 0), (0, pad)), mode)
+            return padded.reshape(len(rows), n_blocks, WIDTH).swapaxes(0, 1).reshape(n_blocks, -1)
+
+        # The first row of a memory may be a length, by which a law divides.
+        numbers = reshape(self.numbers, "edge")
+        memory = reshape(self.memory, "constant")
+        memory[:, :WIDTH] = reshape(self.memory[:1], "edge")
+        load = reshape(self.load[None], "constant")
+        if self.sliders is not None:
+            size = self.sliders.weights.size
+            cells = np.concatenate([np.full(WIDTH, float(size)), *self.sliders])
+            numbers = np.hstack([numbers, np.tile(cells, (n_blocks, 1))])
+            springs = np.repeat(load[:, :, None], size, axis=2)
+            memory = np.concatenate([np.zeros_like(springs), springs], axis=2).reshape(n_blocks, -1)
+        return Blocks(numbers, memory, load, np.minimum(count - WIDTH * np.arange(n_blocks), WIDTH))
 
     @property
     def limits(self) -> np.ndarray:
@@ -47,26 +94,22 @@ def _pack(law: Law, numbers, memory, load) -> PointLaw:
     )
 
 
-def make_cells(static, lengths, load, weights=(1.0,), *, is_fixed: bool = False) -> PointLaw:
-    """Return points of K parallel springs with sliders.
+def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
+    """Return points of a spring and a slider each.
 
     Parameters
     ----------
     static : float or (m,) array
         Coefficient of friction.
-    lengths : sequence of K floats or (m,) arrays
-        Slides [m] at which the cells slip under `load`.
+    length : float or (m,) array
+        Slide [m] at which an unstretched point slips under `load`.
     load : float or (m,) array
         Normal load [N].
-    weights : sequence of K floats
-        Fractions of the friction limit, with the sum 1.
     is_fixed : bool
         Whether the stiffness stays that under `load` when the load changes.
     """
-    lengths = [np.maximum(length, MIN_LENGTH) for length in lengths]
-    memory = [part for _ in lengths for part in (0.0, load)]
-    numbers = (static, float(is_fixed), float(len(lengths)), *weights, *lengths)
-    return _pack(Law.CELLS, numbers, memory, load)
+    length = np.maximum(length, MIN_LENGTH)
+    return _pack(Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load)
 
 
 def make_elements(stiffness, yields) -> PointLaw:
@@ -77,14 +120,21 @@ def make_elements(stiffness, yields) -> PointLaw:
     stiffness, yields : (t,) array
         Stiffnesses [N/m] and slides at which the elements yield [m].
     """
-    return make_cells(np.multiply(stiffness, yields), [np.asarray(yields, float)], 1.0)
+    return make_cells(np.multiply(stiffness, yields), np.asarray(yields, float), 1.0)
 
 
 def make_iwan(law, load) -> PointLaw:
     """Return points of an Iwan model (`friction.laws.iwan.Iwan`) under a load [N]."""
     cells = slider_cells(law.static, law.stiffness, law.chi, law.beta, N_CELLS)
-    weights = cells.stiffness * cells.yield_displacement
-    return make_cells(law.static, list(cells.yield_displacement), load, weights / weights.sum())
+    forces = cells.stiffness * cells.yield_displacement
+    count = -(-forces.size // VECTOR) * VECTOR
+    weights = np.zeros(count)
+    weights[: forces.size] = forces / forces.sum()
+    softness = np.ones(count)
+    softness[: forces.size] = 1 / cells.yield_displacement
+    load = np.atleast_1d(np.asarray(load, float))
+    sliders = Sliders(weights, softness)
+    return _pack(Law.SLIDERS, (law.static,), (0.0,), load)._replace(sliders=sliders)
 
 
 def make_bonds(bonds: Bonds, load) -> PointLaw:
@@ -120,7 +170,7 @@ def make_coulomb(law, load, compliance=0.0) -> PointLaw:
     A compliance [m/N] of a point makes it elastic-plastic, with a stiffness that does not follow the load.
     """
     if np.any(compliance):
-        return make_cells(law.static, [law.static * load * compliance], load, is_fixed=True)
+        return make_cells(law.static, law.static * load * compliance, load, is_fixed=True)
     return _pack(Law.COULOMB, (law.static, law.kinetic), (0.0,), load)
 
 
@@ -136,7 +186,7 @@ def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
 
 def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:
     """Return elastic-plastic points (eq. 3.12) under a load [N]; a compliance of shear modes left out is neglected."""
-    return make_cells(law.static, [law.length], load)
+    return make_cells(law.static, law.length, load)
 
 
 # Function (law, load) that returns the points of a law, by `friction.law`

@@ -1,13 +1,19 @@
-"""Rows of the arrays of contact points in a step."""
+"""Rows of a block of contact points in a step."""
 
 from enum import IntEnum
 from typing import NamedTuple
+
+# Points of a block, the entries of a row; the fastest of 8, 16 and 32 for sets of 1 to 100 points
+WIDTH = 16
+VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
+N_VALUES = 21  # rows of `Value`
 
 
 class Law(IntEnum):
     """Number of a law, which names the function of its points.
 
-    - CELLS: springs with sliders in parallel; elastic-plastic law, Iwan, Coulomb with a compliance of its own
+    - CELLS: a spring and a slider in series; elastic-plastic law, Coulomb with a compliance of its own
+    - SLIDERS: many of them in parallel; Iwan
     - BONDS: bonds that are summed by their moments; nonlocal law of order 1, Dahl and LuGre
     - BOUC_WEN, TANH: laws of these names
     - CUBIC, INTERLOCK: nonlinear springs
@@ -23,6 +29,7 @@ class Law(IntEnum):
     INTERLOCK = 5
     COULOMB = 6
     LIST = 7
+    SLIDERS = 8
 
 
 class Value(IntEnum):
@@ -44,26 +51,26 @@ class Value(IntEnum):
     """
 
     START_LOAD = 0
-    END_LOAD = 1
-    SLIDE = 2
-    START_VELOCITY = 3
-    VELOCITY = 4
-    START = 5
-    END = 6
-    MEAN = 7
-    END_BY_SLIDE = 8
-    END_BY_VELOCITY = 9
-    MEAN_BY_SLIDE = 10
-    MEAN_BY_VELOCITY = 11
-    ENERGY = 12
-    STRETCH = 13
-    BENT = 14
-    FORCE = 15
-    BY_SLIDE = 16
-    BY_SHEAR = 17
-    BY_VELOCITY = 18
-    TOTAL = 19
-    BEND_RATE = 20
+    END_LOAD = WIDTH
+    SLIDE = 2 * WIDTH
+    START_VELOCITY = 3 * WIDTH
+    VELOCITY = 4 * WIDTH
+    START = 5 * WIDTH
+    END = 6 * WIDTH
+    MEAN = 7 * WIDTH
+    END_BY_SLIDE = 8 * WIDTH
+    END_BY_VELOCITY = 9 * WIDTH
+    MEAN_BY_SLIDE = 10 * WIDTH
+    MEAN_BY_VELOCITY = 11 * WIDTH
+    ENERGY = 12 * WIDTH
+    STRETCH = 13 * WIDTH
+    BENT = 14 * WIDTH
+    FORCE = 15 * WIDTH
+    BY_SLIDE = 16 * WIDTH
+    BY_SHEAR = 17 * WIDTH
+    BY_VELOCITY = 18 * WIDTH
+    TOTAL = 19 * WIDTH
+    BEND_RATE = 20 * WIDTH
 
 
 class Step(NamedTuple):
@@ -79,20 +86,32 @@ class Step(NamedTuple):
 
 
 class CellRow(IntEnum):
-    """Rows of `numbers` of parallel cells; the weights of all cells follow, then their lengths.
+    """Rows of `numbers` of points with a spring and a slider in series.
 
-    - FRICTION: coefficient of friction
+    - FRICTION, LENGTH: coefficient of friction, and slide [m] at which an unstretched point slips
     - IS_FIXED: 1 if the stiffness does not follow the load
-    - COUNT: number K of cells
-    - WEIGHTS: first of the K rows of fractions of the friction limit; K rows of lengths [m] follow
 
-    Memory: force over the coefficient of friction of each cell [N], then the load [N] whose springs it has.
+    Memory: force over the coefficient of friction [N], load [N] whose springs the point has.
     """
 
     FRICTION = 0
-    IS_FIXED = 1
-    COUNT = 2
-    WEIGHTS = 3
+    LENGTH = WIDTH
+    IS_FIXED = 2 * WIDTH
+
+
+class SliderRow(IntEnum):
+    """Entries of `numbers` of points with K parallel springs and sliders, which all points of a block share.
+
+    - FRICTION: coefficients of friction of the points
+    - COUNT: number K, a multiple of VECTOR; the last ones may have no weight
+    - CELLS: first of K weights, the fractions of the friction limit, and of K inverse lengths [1/m] that follow
+
+    Memory: for each point in turn, K forces over the coefficient of friction [N] and K loads of the springs [N].
+    """
+
+    FRICTION = 0
+    COUNT = WIDTH
+    CELLS = 2 * WIDTH
 
 
 class BondRow(IntEnum):
@@ -108,10 +127,10 @@ class BondRow(IntEnum):
     """
 
     FRICTION = 0
-    LENGTH = 1
-    GROWTH = 2
-    INITIAL = 7
-    KINETIC = 8
-    SPEED = 9
-    DAMPING = 10
-    VISCOUS = 11
+    LENGTH = WIDTH
+    GROWTH = 2 * WIDTH
+    INITIAL = 7 * WIDTH
+    KINETIC = 8 * WIDTH
+    SPEED = 9 * WIDTH
+    DAMPING = 10 * WIDTH
+    VISCOUS = 11 * WIDTH

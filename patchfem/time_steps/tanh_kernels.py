@@ -13,7 +13,7 @@ from math import tanh
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from .step_rows import Value
+from .step_rows import WIDTH, Value
 
 MAX_ITERATIONS = 60  # iterations of Newton's method, which ends after about 8
 TOLERANCE = 1e-15  # last change of y relative to y
@@ -41,22 +41,22 @@ def solve_velocity(speed, stiffness, given):
 
 
 @njit(**NJIT_CALL)
-def slide_tanh(numbers, memory, trial, values, first, end, step):
-    """Slide points of the regularised law; the package describes the arguments (`time_steps`).
+def slide_tanh(numbers, memory, trial, values, count, step):
+    """Slide a block of points of the regularised law; the package describes the arguments (`time_steps`).
 
     Rows of `numbers`: coefficient of friction, speed v_0 [m/s], compliance d [m/N]. Memory: force [N], its last change [N].
     """
-    for j in range(first, end):
-        speed = numbers[1, j]
-        compliance = numbers[2, j]
-        stop = numbers[0, j] * values[Value.END_LOAD, j]
-        before = values[Value.START_LOAD, j]
-        limit = 0.5 * (numbers[0, j] * before + stop)
-        force = memory[0, j]
-        given = values[Value.VELOCITY, j]
+    for j in range(count):
+        speed = numbers[WIDTH + j]
+        compliance = numbers[2 * WIDTH + j]
+        stop = numbers[j] * values[Value.END_LOAD + j]
+        before = values[Value.START_LOAD + j]
+        limit = 0.5 * (numbers[j] * before + stop)
+        force = memory[j]
+        given = values[Value.VELOCITY + j]
         elastic = 0.0
         if compliance > 0:
-            given += compliance * (step.rate * force + step.lag * memory[1, j])
+            given += compliance * (step.rate * force + step.lag * memory[WIDTH + j])
             elastic = step.rate * compliance * stop
         direction = 1.0 if given > 0 else -1.0
         y = abs(given) / speed
@@ -68,7 +68,7 @@ def slide_tanh(numbers, memory, trial, values, first, end, step):
             last = min(max(force, -stop), stop)
 
         # Part of the step that slips, with the forces under the mean load
-        slipped = values[Value.SLIDE, j] - compliance * (last - force)
+        slipped = values[Value.SLIDE + j] - compliance * (last - force)
         slope = stop * (1 - t * t) / speed
         by_velocity = slope / (1 + step.rate * compliance * slope)
         by_slide = 0.0
@@ -76,7 +76,7 @@ def slide_tanh(numbers, memory, trial, values, first, end, step):
             mean = 0.5 * (min(max(force, -limit), limit) + limit * t)
             mean_by_velocity = 0.5 * by_velocity
         else:
-            first_velocity = values[Value.START_VELOCITY, j]
+            first_velocity = values[Value.START_VELOCITY + j]
             middle = tanh((1.5 * slipped / step.duration - 0.25 * (first_velocity + given)) / speed)
             mean = limit * (tanh(first_velocity / speed) + 4 * middle + t) / 6
             by_slide = limit * (1 - middle * middle) / speed / step.duration
@@ -87,18 +87,18 @@ def slide_tanh(numbers, memory, trial, values, first, end, step):
             mean_by_velocity = 0.0
 
         # Path mean of spring and slip together
-        total = values[Value.SLIDE, j]
+        total = values[Value.SLIDE + j]
         if compliance > 0:
             share = abs(slipped) / (abs(slipped) + abs(total - slipped) + 1e-300)
             mean = share * mean + (1 - share) * 0.5 * (force + last)
             mean_by_velocity = 0.5 * by_velocity
-        trial[0, j] = last
-        trial[1, j] = last - force
-        values[Value.END, j] = last
-        values[Value.MEAN, j] = mean
-        values[Value.END_BY_SLIDE, j] = 0.0
-        values[Value.MEAN_BY_SLIDE, j] = by_slide
-        values[Value.END_BY_VELOCITY, j] = by_velocity
-        values[Value.MEAN_BY_VELOCITY, j] = mean_by_velocity
-        values[Value.ENERGY, j] = 0.5 * compliance * last * last
-        values[Value.STRETCH, j] = compliance * last
+        trial[j] = last
+        trial[WIDTH + j] = last - force
+        values[Value.END + j] = last
+        values[Value.MEAN + j] = mean
+        values[Value.END_BY_SLIDE + j] = 0.0
+        values[Value.MEAN_BY_SLIDE + j] = by_slide
+        values[Value.END_BY_VELOCITY + j] = by_velocity
+        values[Value.MEAN_BY_VELOCITY + j] = mean_by_velocity
+        values[Value.ENERGY + j] = 0.5 * compliance * last * last
+        values[Value.STRETCH + j] = compliance * last

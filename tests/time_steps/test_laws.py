@@ -11,14 +11,14 @@ from patchfem.friction.laws.iwan import Iwan
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.time_steps import laws
-from patchfem.time_steps.step_rows import Step, Value
+from patchfem.time_steps.step_rows import N_VALUES, WIDTH, Step, Value
 
 LOAD = 100.0  # N
 LENGTH = 1e-6  # m
 DURATION = 1e-5  # s
 LAWS = {
-    "elastic-plastic": laws.make_cells(0.3, [LENGTH], LOAD),
-    "fixed stiffness": laws.make_cells(0.3, [LENGTH], LOAD, is_fixed=True),
+    "elastic-plastic": laws.make_cells(0.3, LENGTH, LOAD),
+    "fixed stiffness": laws.make_cells(0.3, LENGTH, LOAD, is_fixed=True),
     "coulomb behind compliance": laws.make_coulomb(Coulomb(0.3, 0.3), LOAD, 1e-9),
     "iwan": laws.make_iwan(Iwan(0.3, 0.3 / LENGTH, -0.5, 0.5), LOAD),
     "nonlocal": laws.make_bonds(Bonds(0.3, LENGTH), LOAD),
@@ -36,12 +36,13 @@ class Point:
 
     def __init__(self, law):
         self.law = law
-        self.memory = law.memory.copy()
+        blocks = law.make_blocks()
+        self.numbers = blocks.numbers[0]
+        self.memory = blocks.memory[0].copy()
         self.trial = self.memory.copy()
-        self.values = np.zeros((len(Value), 1))
-        self.values[Value.END_LOAD] = law.load
+        self.values = np.zeros(N_VALUES * WIDTH)
+        self.values[Value.END_LOAD] = law.load[0]
         self.slide_law = load_compiled_module("time_steps.laws_kernels").slide_law
-        self.duration = 0.0
         self.slide(0.0, 0.0, LOAD, 0.0)
 
     def slide(self, slide, velocity, load, duration=DURATION, commits=True):
@@ -55,8 +56,8 @@ class Point:
         values[Value.VELOCITY] = velocity
         values[Value.END_LOAD] = load
         step = Step(duration, 1 / duration if duration else 0.0, 0.0)
-        self.slide_law(int(self.law.law), self.law.numbers, self.memory, self.trial, values, step)
-        out = values[:, 0].copy()
+        self.slide_law(int(self.law.law), self.numbers, self.memory, self.trial, values, 1, step)
+        out = values.copy()
         if commits:
             self.memory[:] = self.trial
         else:
@@ -70,7 +71,7 @@ def test_laws_create_no_energy(name, varies):
     """Work is at least the change of the stored energy: to round-off, and to 1e-3 of limit times length under load jumps."""
     rng = np.random.default_rng(7)
     point = Point(LAWS[name])
-    energy = point.values[Value.ENERGY, 0]
+    energy = point.values[Value.ENERGY]
     least = 0.0
     for _ in range(20000):
         load = LOAD * rng.uniform(0.02, 2.0) if varies else LOAD
