@@ -42,6 +42,7 @@ class PointLaw(NamedTuple):
     - law: number of the law
     - numbers (k, m), memory (l, m): as described by the law
     - load (m,): normal load [N] at the start
+    - stiffness, viscosity (m,): of a point at rest [N/m], [N s/m]
     - sliders: cells of all points, of the law SLIDERS
     """
 
@@ -49,6 +50,8 @@ class PointLaw(NamedTuple):
     numbers: np.ndarray
     memory: np.ndarray
     load: np.ndarray
+    stiffness: np.ndarray
+    viscosity: np.ndarray
     sliders: Sliders | None = None
 
     def make_blocks(self) -> "Blocks":
@@ -81,17 +84,25 @@ class PointLaw(NamedTuple):
         return self.numbers[0] * self.load
 
 
-def _pack(law: Law, numbers, memory, load) -> PointLaw:
-    """Return a PointLaw from rows of `numbers` and `memory`, floats or arrays (m,), and the `load` [N]."""
-    load = np.atleast_1d(np.asarray(load, float))
-    shape = np.broadcast_shapes(load.shape, *map(np.shape, (*numbers, *memory)))
-    rows = [
-        np.array(np.broadcast_arrays(np.zeros(shape), *part)[1:], float)
-        for part in (numbers, memory)
-    ]
-    return PointLaw(
-        law, rows[0].reshape(-1, *shape), rows[1].reshape(-1, *shape), load + np.zeros(shape)
-    )
+def _pack(law: Law, numbers, memory, load, stiffness=0.0, viscosity=0.0) -> PointLaw:
+    """Return a PointLaw from its rows, which are floats or arrays (m,).
+
+    Parameters
+    ----------
+    law : Law
+        Number of the law.
+    numbers, memory : sequence of float or (m,) array
+        Rows of numbers and of the first memory.
+    load : float or (m,) array
+        Normal load [N].
+    stiffness, viscosity : float or (m,) array
+        Of a point at rest [N/m], [N s/m].
+    """
+    last = load, stiffness, viscosity
+    rows = np.broadcast_arrays(np.zeros(1), *numbers, *memory, *last)[1:]
+    rows = np.array(rows, float)
+    first = len(numbers)
+    return PointLaw(law, rows[:first], rows[first:-3], *rows[-3:])
 
 
 def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
@@ -109,7 +120,7 @@ def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
         Whether the stiffness stays that under `load` when the load changes.
     """
     length = np.maximum(length, MIN_LENGTH)
-    return _pack(Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load)
+    return _pack(Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load, static * load / length)
 
 
 def make_elements(stiffness, yields) -> PointLaw:
@@ -132,9 +143,9 @@ def make_iwan(law, load) -> PointLaw:
     weights[: forces.size] = forces / forces.sum()
     softness = np.ones(count)
     softness[: forces.size] = 1 / cells.yield_displacement
-    load = np.atleast_1d(np.asarray(load, float))
-    sliders = Sliders(weights, softness)
-    return _pack(Law.SLIDERS, (law.static,), (0.0,), load)._replace(sliders=sliders)
+    stiffness = law.stiffness * np.asarray(load, float)
+    points = _pack(Law.SLIDERS, (law.static,), (0.0,), load, stiffness)
+    return points._replace(sliders=Sliders(weights, softness))
 
 
 def make_bonds(bonds: Bonds, load) -> PointLaw:
@@ -142,7 +153,8 @@ def make_bonds(bonds: Bonds, load) -> PointLaw:
     rest = (0.0, 0.0, 0.0, 0.0)
     numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial, *rest)
     load = np.asarray(load, float)
-    return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load, 0.0, 0.0), load)
+    memory = (bonds.length, bonds.initial * load, 0.0, 0.0)
+    return _pack(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
 
 
 def make_lugre(law, load) -> PointLaw:
@@ -150,18 +162,23 @@ def make_lugre(law, load) -> PointLaw:
     length = law.static / law.stiffness
     damping = (law.kinetic, law.speed, law.micro_damping, law.viscous)
     numbers = (law.static, length, *NO_GROWTH, 1.0, *damping)
-    return _pack(Law.BONDS, numbers, (length, load, 0.0, 0.0), load)
+    load = np.asarray(load, float)
+    viscosity = (law.micro_damping + law.viscous) * load
+    memory = (length, load, 0.0, 0.0)
+    return _pack(Law.BONDS, numbers, memory, load, law.stiffness * load, viscosity)
 
 
 def make_bouc_wen(law, load) -> PointLaw:
     """Return points of the Bouc-Wen law (`friction.laws.bouc_wen.BoucWen`) under a load [N]."""
     numbers = (law.static, law.length, law.exponent, law.shape)
-    return _pack(Law.BOUC_WEN, numbers, (0.0, load), load)
+    stiffness = law.static * np.asarray(load, float) / law.length
+    return _pack(Law.BOUC_WEN, numbers, (0.0, load), load, stiffness)
 
 
 def make_tanh(law, load, compliance=0.0) -> PointLaw:
     """Return points of the regularised law (`friction.laws.tanh.Tanh`) under a load [N] behind a compliance [m/N]."""
-    return _pack(Law.TANH, (law.static, law.speed, compliance), (0.0, 0.0), load)
+    viscosity = law.static * np.asarray(load, float) / law.speed
+    return _pack(Law.TANH, (law.static, law.speed, compliance), (0.0, 0.0), load, 0.0, viscosity)
 
 
 def make_coulomb(law, load, compliance=0.0) -> PointLaw:
@@ -181,7 +198,7 @@ def make_cubic(stiffness: float) -> PointLaw:
 
 def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     """Return a spring whose force is sinusoidal, of stiffness [N/m] at rest and a wavelength [m]."""
-    return _pack(Law.INTERLOCK, (stiffness, wavelength), (0.0,), 1.0)
+    return _pack(Law.INTERLOCK, (stiffness, wavelength), (0.0,), 1.0, stiffness)
 
 
 def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:

@@ -3,10 +3,12 @@
 from enum import IntEnum
 from typing import NamedTuple
 
+import numpy as np
+
 # Points of a block, the entries of a row; the fastest of 8, 16 and 32 for sets of 1 to 100 points
 WIDTH = 16
 VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
-N_VALUES = 21  # rows of `Value`
+N_VALUES = 22  # rows of `Value`
 
 
 class Law(IntEnum):
@@ -47,7 +49,8 @@ class Value(IntEnum):
     - BY_SLIDE, BY_SHEAR, BY_VELOCITY: its derivatives by the increment of the port, by BENT [N/m] and by the velocity of
       the port [N s/m]
     - TOTAL: displacement since the start [m]
-    - BEND_RATE: part of the velocity that the shear of the pieces takes, from increments before the step [m/s]
+    - LAST_BENT: BENT of the last step [m]
+    - WEIGHTED: workspace of the Jacobian
     """
 
     START_LOAD = 0
@@ -70,7 +73,8 @@ class Value(IntEnum):
     BY_SHEAR = 17 * WIDTH
     BY_VELOCITY = 18 * WIDTH
     TOTAL = 19 * WIDTH
-    BEND_RATE = 20 * WIDTH
+    LAST_BENT = 20 * WIDTH
+    WEIGHTED = 21 * WIDTH
 
 
 class Step(NamedTuple):
@@ -134,3 +138,84 @@ class BondRow(IntEnum):
     SPEED = 9 * WIDTH
     DAMPING = 10 * WIDTH
     VISCOUS = 11 * WIDTH
+
+
+class Port(IntEnum):
+    """Rows of `Ports.values`.
+
+    - SLIDE, VELOCITY: at the start of a step [m], [m/s]
+    - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
+    - FORCE: mean force of the step [N]
+    - END_VELOCITY, INCREMENT: velocity at the end [m/s] and increment [m] under the assumed forces
+    - HOLD: force that holds a port at rest [N]
+    - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
+    - BASE: force from which a line search starts [N]
+    - LAST, EARLIER, FIRST: mean forces of the last three steps [N], the last one first
+    - DAMPING: weight of the force at the end of the step in the mean force, above 0 where the step does not resolve the
+      vibration of the port on its points
+    - STIFFNESS, VISCOSITY: of the points at rest [N/m], [N s/m]
+    - MOVE: increment of the points [m]
+    - RETURN: displacement of a rigid port at rest that is taken back [m]
+    """
+
+    SLIDE = 0
+    VELOCITY = 1
+    FREE = 2
+    FREE_VELOCITY = 3
+    FORCE = 4
+    END_VELOCITY = 5
+    HOLD = 6
+    INCREMENT = 7
+    SUM = 8
+    BY_SLIDE = 9
+    BY_VELOCITY = 10
+    BASE = 11
+    LAST = 12
+    EARLIER = 13
+    DAMPING = 14
+    STIFFNESS = 15
+    VISCOSITY = 16
+    MOVE = 17
+    RETURN = 18
+    FIRST = 19
+
+
+class Points(NamedTuple):
+    """Points of p ports in b blocks; r shear coordinates of the pieces.
+
+    - law, port, count, n_memory (b,): law, port, number of points and used entries of the memory of each block
+    - first, first_shear (p + 1,): first block and first shear coordinate of each port
+    - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
+    - node (b, WIDTH): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
+      times the pressure of the lower piece at the place of the point
+    - share, place (b, WIDTH): fraction of the resultant or factor of the pressure [N]; position at rest [m]
+    - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
+    - shear (8, r): see `march_rows.Shear`
+    - is_spring (p,): whether the points of a port are springs, whose work is not friction
+    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
+    - nodal (n,): forces of the nodes of a patch [N]
+    - clock (1,): duration of the last step [s], 0 at the start
+    - products (r, 3): workspace
+    """
+
+    law: np.ndarray
+    port: np.ndarray
+    count: np.ndarray
+    n_memory: np.ndarray
+    first: np.ndarray
+    first_shear: np.ndarray
+    numbers: np.ndarray
+    memory: np.ndarray
+    trial: np.ndarray
+    values: np.ndarray
+    node: np.ndarray
+    share: np.ndarray
+    place: np.ndarray
+    shapes: np.ndarray
+    stiffness: np.ndarray
+    shear: np.ndarray
+    is_spring: np.ndarray
+    pressure: np.ndarray
+    nodal: np.ndarray
+    clock: np.ndarray
+    products: np.ndarray
