@@ -154,9 +154,16 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
             is_supported &= is_rigid
         elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
+        elif support.law == "pieces":
+            is_supported = _has_elements(joint)
         if not is_supported:
             return joint
     return None
+
+
+def _has_elements(joint: Joint) -> bool:
+    """Return whether an interface that slips part by part is a set of parallel elements."""
+    return law_supports(joint.law, "pieces") and law_supports(joint.law, "shear")
 
 
 def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
@@ -169,7 +176,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if motion.grooves:
         return law_has_trait(law, "memoryless") and not joint.compliance
     if joint.compliance:
-        return law_supports(joint.law, "pieces")
+        return _has_elements(joint)
     if motion.load_change:
         return law in VARYING_LAWS
     if law_has_trait(law, "bonds"):

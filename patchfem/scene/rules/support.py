@@ -189,16 +189,11 @@ class Joint(TableFacts):
     def can_slip_in_strips(self) -> bool:
         """Whether partial slip is supported in each strip separately.
 
-        That needs elements under a constant load, the shear of the pieces, and no spring that couples the strips.
+        That needs the shear of the pieces, and no spring that couples the strips.
         """
         patch = self.contact
         is_coupled = patch.asperities.tangential_ratio or patch.holder.tangential_stiffness
-        return bool(
-            self.kind == "rig"
-            and patch.shear
-            and not is_coupled
-            and self.supports("pieces", "shear")
-        )
+        return bool(self.kind == "rig" and patch.shear and not is_coupled)
 
     @property
     def is_read(self) -> bool:
@@ -222,7 +217,6 @@ class Feature(NamedTuple):
 
 # Features that only the friction law has, with a function of the joint that tells whether it has them.
 LAW_FEATURES = {
-    "law for a constant load": lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
     "law with memory for a constant pressure": lambda j: (
         not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
     ),
@@ -232,7 +226,6 @@ LAW_FEATURES = {
     "law for rigid pieces": lambda j: (
         not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
     ),
-    "law without elements": lambda j: j.is_interface and j.lacks("pieces", "shear"),
     "law for one interface": lambda j: j.lacks("joints"),
     "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
     "law without bonds": lambda j: not j.has_trait("bonds"),
@@ -348,7 +341,6 @@ def find_feature(name: str) -> Feature:
 
 # What names in braces in the advice of support.toml stand for.
 LAW_ADVICE = {
-    "{laws_with_pieces}": suggest_laws("pieces", "shear"),
     "{laws_with_shear}": suggest_laws("shear"),
     "{laws_with_varying_load}": suggest_laws("varying-load"),
 }
