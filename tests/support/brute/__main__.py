@@ -17,7 +17,6 @@ if __name__ == "__main__":
 from campaigns import Row, measure_rows
 
 from brute import recipe, systems
-from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
@@ -52,8 +51,8 @@ def score_scene(scene: recipe.Scene, reference: dict) -> list[Row] | str:
         result = run(loads(scene.text))
     except SceneError as error:
         return f"refused: {error.mistakes[0]}"
-    except (Missing, NotConverged, PatchfemError) as error:
-        return f"no result: {error}"
+    except Exception as error:  # a fault of the program is a row of the report
+        return f"no result: {type(error).__name__}: {error}"
     return measure_rows(result.measures, reference["values"], reference["doubts"])
 
 
