@@ -1,17 +1,18 @@
 """Bouc-Wen law of contact points under any load (compiled). Equations: `friction.laws.bouc_wen`.
 
 The force is mu y, |y| <= N, with springs s of the largest load so far as in `cells_kernels`, the limit of this law for a
-large exponent: along a path x = s |ds|/(N length), y/N follows the law. A slipping point follows a load that rises after
-the slide as far as the work of the step allows, so that no energy is created.
+large exponent: along a path x = s |ds|/(N length), y/N follows the law, dy/ds = s/length (1 - |y/N|^n ...), while the load
+changes along the path. The end of a step gains no more energy than the work of the step.
 """
 
-from math import sqrt
+from math import exp, sqrt
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
 from .step_rows import WIDTH, Value
 
+MIN_RELAXATION = 1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
 
 
@@ -59,8 +60,15 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
         # Second half of the change of load
         stop = middle * moved.end
         last = min(max(stop, -load), load)
-        if load > middle and stop > 0 and slide != 0:
-            last = stop + size * (load - middle)
+        if stop > 0 and slide != 0:
+            # Under a load that is linear in the path, the deviation of y relaxes at the rate r per path of the step. Its end
+            # then deviates from that under the mean load by y/N (1 + exp(-r) - 2 (1 - exp(-r))/r) of half the change.
+            relaxation = exponent * moved.end ** (exponent - 1) * path
+            share = relaxation * relaxation / 6
+            if relaxation > MIN_RELAXATION:
+                decay = exp(-relaxation)
+                share = 1 + decay - 2 * (1 - decay) / relaxation
+            last = min(stop + moved.end * share * (load - middle), load)
         most = sqrt(2 * work * left / length)
         last = min(max(last, -most), most)
         trial[j] = direction * last

@@ -147,7 +147,7 @@ def test_dahl_points_behind_compliance_agree_with_solve_ivp():
         compliance,
     )
     constant = systems.make_constant_loads(loads, time.size)
-    samples = np.zeros((time.size, 4))
+    samples = np.zeros((time.size, 3))
     assert systems.march(points, structure, constant, time[1], np.zeros(0), samples) == 0
     assert np.abs(samples[:, 1] - force).max() < 1e-4 * LIMIT
 

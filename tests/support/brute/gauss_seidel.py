@@ -45,6 +45,7 @@ class Structure(NamedTuple):
     - rows (p, n): slide of each port per coordinate
     - transition (2 n, 2 n): of displacements and velocities in a step
     - start, end (2 n, n): response to generalised forces that fall from 1 to 0, and rise from 0 to 1
+    - output (n,): displacement of the output per coordinate
     - drive (k, n): generalised forces of the drive at the samples
     - spring_rows (s, n), springs (s, 2): displacement of nonlinear springs per coordinate, their stiffness [N/m3] and 0, or
       stiffness [N/m] and wave number [rad/m] of a sinusoidal force
@@ -55,6 +56,7 @@ class Structure(NamedTuple):
     transition: np.ndarray
     start: np.ndarray
     end: np.ndarray
+    output: np.ndarray
     drive: np.ndarray
     spring_rows: np.ndarray
     springs: np.ndarray
@@ -155,8 +157,8 @@ def march(points, structure, loads, dt, state, samples):
         Step [s].
     state : (2 n,) array
         Displacements and velocities at the start, changed in place.
-    samples : (k, 3 p + 1) array
-        Slide [m], force [N] and slip [m] of each port, and total load, at every sample (filled).
+    samples : (k, 2 p + 1) array
+        Slide [m] and force [N] of each port, and the displacement of the output [m], at every sample, zeros at first.
     """
     m = points.port.size
     n_ports, n = structure.rows.shape
@@ -217,14 +219,15 @@ def march(points, structure, loads, dt, state, samples):
             q = structure.path[row, p] if n == 0 else 0.0
             for i in range(n):
                 q += structure.rows[p, i] * state[i]
-            samples[row, 3 * p] = q
-            samples[row, 3 * p + 1] = 0.0
+            samples[row, 2 * p] = q
+            samples[row, 2 * p + 1] = 0.0
             slides[p] = q
         for j in range(m):
-            samples[row, 3 * points.port[j] + 1] += climb * force[j]
+            samples[row, 2 * points.port[j] + 1] += climb * force[j]
         if loads.kind == GROOVES:
             samples[row, 1] += slope * base.sum()
-        samples[row, 3 * n_ports] = load.sum()
+        for i in range(n):
+            samples[row, 2 * n_ports] += structure.output[i] * state[i]
         if row == n_steps:
             break
 
@@ -243,13 +246,13 @@ def march(points, structure, loads, dt, state, samples):
             for p in range(n_ports):
                 if n == 0:
                     rates[p] = structure.path[row + 1, n_ports + p]
-                    samples[row + 1, 3 * p] = structure.path[row + 1, p]
+                    samples[row + 1, 2 * p] = structure.path[row + 1, p]
                     continue
                 q = v = 0.0
                 for i in range(n):
                     q += structure.rows[p, i] * y[i]
                     v += structure.rows[p, i] * y[n + i]
-                samples[row + 1, 3 * p] = q
+                samples[row + 1, 2 * p] = q
                 rates[p] = v
             # state at the end with the present friction forces
             for j in range(m if n else 0):
@@ -306,7 +309,7 @@ def march(points, structure, loads, dt, state, samples):
                 change = 0.0
                 for j in range(m):
                     p = points.port[j]
-                    ds = mean_climb * (samples[row + 1, 3 * p] - samples[row, 3 * p])
+                    ds = mean_climb * (samples[row + 1, 2 * p] - samples[row, 2 * p])
                     v = climb * rates[p]
                     for k in range(m):
                         bent = points.compliance[j, k] * (guess[k] - force[k])
@@ -450,7 +453,7 @@ def march(points, structure, loads, dt, state, samples):
         # commit: memory at the forces found, motion, bonds that form in this step
         for j in range(m):
             p = points.port[j]
-            ds = mean_climb * (samples[row + 1, 3 * p] - samples[row, 3 * p])
+            ds = mean_climb * (samples[row + 1, 2 * p] - samples[row, 2 * p])
             v = climb * rates[p]
             for k in range(m):
                 bent = points.compliance[j, k] * (guess[k] - force[k])

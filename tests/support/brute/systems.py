@@ -71,7 +71,7 @@ def find_reference(text: str, steps_per_cycle: int) -> Reference:
         doubts[name] = max(abs(change), 0.5 * abs(earlier))
         if change and 1.6 < earlier / change < 2.5:
             values[name] = value + change
-            doubts[name] = 0.3 * abs(change)
+            doubts[name] = 0.6 * abs(change)
     return Reference(values, doubts, sum(n_unsolved for _, n_unsolved in runs))
 
 
@@ -85,19 +85,17 @@ def solve_scene(text: str, steps_per_cycle: int) -> tuple[dict[str, float], int]
     structure = make_structure(tables, time)
     points, point_loads = _make_points(tables, time)
     n_ports = structure.rows.shape[0]
-    samples = np.zeros((time.size, 3 * n_ports + 1))
+    samples = np.zeros((time.size, 2 * n_ports + 1))
     state = np.zeros(2 * structure.rows.shape[1])
     n_unsolved = march(points, structure, point_loads, float(time[1]), state, samples)
 
     # the last cycle of the first port
     slide, force = samples[-steps_per_cycle - 1 :, 0], samples[-steps_per_cycle - 1 :, 1]
-    if "slide" in tables:
-        peak = np.abs(samples[:, 1]).max()
-    else:
-        peak = np.abs(force).max()
+    output = slide if "slide" in tables else samples[-steps_per_cycle - 1 :, -1]
+    peak = np.abs(samples[:, 1] if "slide" in tables else force).max()
     values = {
         "loop_area": float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(slide))),
-        "relative_displacement_amplitude": float(np.ptp(slide)) / 2,
+        "relative_displacement_amplitude": float(np.ptp(output)) / 2,
         "friction_force_peak": float(peak),
     }
     return values, n_unsolved
@@ -117,6 +115,7 @@ def make_structure(tables: dict, time) -> Structure:
         return Structure(
             np.zeros((1, 0)),
             *(none,) * 3,
+            np.zeros(0),
             np.zeros((time.size, 0)),
             np.zeros((0, 0)),
             np.zeros((0, 2)),
@@ -178,6 +177,7 @@ def make_structure(tables: dict, time) -> Structure:
         np.ascontiguousarray(exponential[: 2 * n, : 2 * n]),
         np.ascontiguousarray(constant - rising),
         np.ascontiguousarray(rising),
+        output,
         forces,
         *_list_springs(table, rows, output),
         np.zeros((time.size, 0)),
