@@ -12,7 +12,9 @@ from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
 from .step_rows import WIDTH, Value
 
-MIN_RELAXATION = 1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6
+MIN_RELAXATION = (
+    1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6
+)
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
 
 

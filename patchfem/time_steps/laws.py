@@ -120,7 +120,9 @@ def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
         Whether the stiffness stays that under `load` when the load changes.
     """
     length = np.maximum(length, MIN_LENGTH)
-    return _pack(Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load, static * load / length)
+    return _pack(
+        Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load, static * load / length
+    )
 
 
 def make_elements(stiffness, yields) -> PointLaw:

@@ -62,7 +62,9 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 STALLED = 1e3  # largest residual of such a step relative to RESIDUAL
 INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
-CONTACT_WEIGHT = 10.0  # weight of the residuals of normal contact, which would add up as it loses no energy
+CONTACT_WEIGHT = (
+    10.0  # weight of the residuals of normal contact, which would add up as it loses no energy
+)
 TINY = 1e-300  # m, in place of no path
 
 
@@ -120,7 +122,9 @@ def slide_block(points, block, move, velocity, damping, step):
     rest = 1 - damping
     if start == stop:
         for j in range(n_lanes):
-            values[Value.FORCE + j] = damping * values[Value.END + j] + rest * values[Value.MEAN + j]
+            values[Value.FORCE + j] = (
+                damping * values[Value.END + j] + rest * values[Value.MEAN + j]
+            )
             values[Value.BY_SLIDE + j] = (
                 damping * values[Value.END_BY_SLIDE + j] + rest * values[Value.MEAN_BY_SLIDE + j]
             )
@@ -195,7 +199,9 @@ def write_forces(system, level, step):
         damping = moves[Port.DAMPING, p]
         moves[Port.INCREMENT, p] = dq
         moves[Port.END_VELOCITY, p] = v
-        moves[Port.MOVE, p] = dq if damping == 0.0 else (1 - damping) * dq + damping * step.duration * v
+        moves[Port.MOVE, p] = (
+            dq if damping == 0.0 else (1 - damping) * dq + damping * step.duration * v
+        )
     if flank.size:
         flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.MOVE, 0], step.duration)
     change = 0.0

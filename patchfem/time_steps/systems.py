@@ -90,7 +90,9 @@ def make_system(
     if start is not None:
         state[0] = [*start.z, *start.v]
     sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    no_lists = BondLists(np.zeros((N_ROWS, 0)), np.zeros((0, 6)), np.zeros((0, 14)), *[np.zeros(0)] * 3)
+    no_lists = BondLists(
+        np.zeros((N_ROWS, 0)), np.zeros((0, 6)), np.zeros((0, 14)), *[np.zeros(0)] * 3
+    )
     flank = time_march.make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, no_lists, flank, sets, state, totals, options)
@@ -107,7 +109,9 @@ def _set_start(system: System, contact) -> None:
     slides = rows @ system.state[0, :n]
     velocities = rows @ system.state[0, n:]
     values[:, Value.TOTAL // WIDTH] = slides[:, None]
-    values[:, Value.VELOCITY // WIDTH] = values[:, Value.START_VELOCITY // WIDTH] = velocities[:, None]
+    values[:, Value.VELOCITY // WIDTH] = values[:, Value.START_VELOCITY // WIDTH] = velocities[
+        :, None
+    ]
 
     # Springs refer to the displacement at rest; rigid friction opposes the velocity of its port.
     is_spring = points.is_spring[points.port].astype(bool)
@@ -290,5 +294,3 @@ def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> time_ma
         points.nodal.copy() if has_nodes else np.zeros(0),
         float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
     )
-
-

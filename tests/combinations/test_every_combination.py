@@ -33,8 +33,8 @@ REFUSED = {
     "yaw": ("order 2", "report", "convolution"),
     "lower": ("coulomb", "tanh", "elastic-plastic", "convolution", "iwan", "bouc-wen", "lugre"),
     "load": ("order 2",),
-    "pitch": ("order 2",),
-    "shear and pitch": ("order 2", "convolution"),
+    "pitch": ("order 2", "convolution"),
+    "shear and pitch": ("coulomb", "order 2", "convolution"),
     "grooves": ("order 2", "report", "convolution", "iwan", "bouc-wen", "lugre"),
     "shear and grooves": ("tanh", "order 2", "report", "convolution", "iwan", "bouc-wen", "lugre"),
     "cubic spring": (),
@@ -153,7 +153,7 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             plain,
         ),
         "shear and grooves": (
-            "tanh", STEEL + SHEAR + CARVED.format("contact", "1 um") + friction + RIG,
+            STEEL + SHEAR + CARVED.format("contact", "1 um") + friction + RIG,
             STIFF + SHEAR + CARVED.format("contact", "1e-6 um") + friction + RIG,
             patch + RIG,
         ),
@@ -186,7 +186,13 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             point + BENCH,
         ),
     }  # fmt: skip
-    return table[effect]
+    # Points that stick rigidly need short steps.
+    n_steps = 1600 if law == "coulomb" else 400
+    steps = f"steps_per_cycle = {n_steps}"
+    marked, vanishing, without = (
+        text.replace("steps_per_cycle = 400", steps) for text in table[effect]
+    )
+    return marked, vanishing, without
 
 
 @cache

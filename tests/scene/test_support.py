@@ -87,6 +87,7 @@ PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
+    "patch.strips, strips that slip together, partial slip": "{patch}.holder.tangential_stiffness=1e7_N/m",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
     "shape on the lower piece, interface": BONDS,
     "mode with yaw, patch.strips, rig, law for one interface": f"{BONDS} {{law}}.order=2",
@@ -195,8 +196,6 @@ def test_refuses_each_cause_of_a_feature(text, changes, words):
 OVERLAPS = [
     ("patch.strips, law of an averaged pressure, partial slip", "contact.strips", "leave out this entry"),
     ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
-    ("law for one interface, several interfaces, partial slip", "structure.interface[1].law",
-     "leave out [structure.interface.contact.shear], or use law 'coulomb' or 'elastic-plastic'"),
     ("wear, patch.strips, shape on the lower piece, wear.start", "wear", "leave out [wear] or leave out wear.start"),
 ]  # fmt: skip
 

@@ -61,7 +61,9 @@ def make_contact(model: Model, numerics, patch) -> Contact:
         law = laws.make_interlocking(*rig.springs.interlock)
         springs.append(PointSet(law, rows[0], is_spring=True))
     if rig.springs.cubic is not None:
-        springs.append(PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True))
+        springs.append(
+            PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True)
+        )
     fields = {}
     sets = []
     if model.rig.friction.interfaces:
@@ -72,7 +74,9 @@ def make_contact(model: Model, numerics, patch) -> Contact:
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
-            sets = [_make_points(model, numerics, part, moves="sets" in fields) for part in surfaces]
+            sets = [
+                _make_points(model, numerics, part, moves="sets" in fields) for part in surfaces
+            ]
 
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
@@ -113,7 +117,9 @@ def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
     interfaces = model.rig.friction.interfaces
     is_soft = [model.partial_slip or interface.partial_slip for interface in interfaces]
     keys = [model.friction if patch is not None else interface.numbers for interface in interfaces]
-    if not any(is_soft) or not all(joints.has_elements(k) for k, soft in zip(keys, is_soft) if soft):
+    if not any(is_soft) or not all(
+        joints.has_elements(k) for k, soft in zip(keys, is_soft) if soft
+    ):
         return []
     return joints.list_joints(model, patch, numerics.meshed)
 
@@ -240,6 +246,7 @@ def _find_length(point_set: PointSet) -> float:
     length = float(law.limits.sum() / stiffness)
     if point_set.shear is None:
         return length
-    shape = point_set.shear.shape
-    compliance = (shape / point_set.shear.stiffness) @ shape.T
-    return length + float(law.limits.sum() / tangential_stiffness(compliance, law.load > 0))
+    # Few modes have no inverse compliance. This is the mean displacement of the pieces under the friction limits.
+    shear = point_set.shear
+    bends = (law.limits @ shear.shape) ** 2 / shear.stiffness
+    return length + float(bends.sum() / law.limits.sum())

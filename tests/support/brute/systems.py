@@ -71,7 +71,7 @@ def find_reference(text: str, steps_per_cycle: int) -> Reference:
         doubts[name] = max(abs(change), 0.5 * abs(earlier))
         if change and 1.6 < earlier / change < 2.5:
             values[name] = value + change
-            doubts[name] = 0.6 * abs(change)
+            doubts[name] = abs(change)
     return Reference(values, doubts, sum(n_unsolved for _, n_unsolved in runs))
 
 
