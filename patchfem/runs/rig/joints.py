@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction, points, slip
+from ... import friction, points, slip, time_steps
 from ...core import PatchfemError
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_supports
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
@@ -25,7 +25,7 @@ from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements
-from . import bond_lists, strips
+from . import bond_lists, contact_points, strips
 from .numerics import Numerics
 
 NO_STEADY_LOOP = (
@@ -78,6 +78,12 @@ class Joint(NamedTuple):
         if self.stiffness is not None:
             return points.laws.make_elements(self.stiffness, self.yields)
         return points.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
+
+    def make_step_law(self):
+        """Return the law under its mean load as a `time_steps.laws.PointLaw`."""
+        if self.stiffness is not None:
+            return time_steps.laws.make_elements(self.stiffness, self.yields)
+        return time_steps.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
@@ -140,7 +146,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = _replace_averaged_law(model.friction, model, patch)
+        law = replace_averaged_law(model.friction, model, patch)
         contact_load = float(patch.pressure.load)
         parts = _list_patch_parts(model, patch)
         return [Joint(law, load, speed, contact_load, *elements) for load, elements in parts]
@@ -150,14 +156,19 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         load = interface.load
         load = _make_point_load(model.point) if load is None else Load(load)
         parts = ()
-        if interface.partial_slip:
+        if interface.partial_slip and has_elements(interface.numbers):
             parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
-        law = _replace_averaged_law(interface.numbers, model, patch)
+        law = replace_averaged_law(interface.numbers, model, patch)
         joints.append(Joint(law, load, speed, load.mean, *parts))
     return joints
 
 
-def _replace_averaged_law(law, model: Model, patch):
+def has_elements(law) -> bool:
+    """Return whether a patch with a law that slips part by part is a set of parallel elements, under a constant load."""
+    return law_supports(law, "pieces") and law_supports(law, "shear")
+
+
+def replace_averaged_law(law, model: Model, patch):
     """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
     On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
@@ -182,7 +193,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     """
     slide_apart = model.rig.friction.strips_slide_apart
     load = Load(float(patch.pressure.load))
-    if not model.partial_slip:
+    if not (model.partial_slip and has_elements(model.friction)):
         if not slide_apart:
             return [(load, ())]
         return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
@@ -279,6 +290,8 @@ def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Con
     patch : Patch or None
         None under [normal].
     """
+    if not _needs_old_march(model, numerics):
+        return contact_points.make_contact(model, numerics, patch)
     rig = model.rig
     rows = rig.modes.interfaces
     springs = []
@@ -301,6 +314,15 @@ def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Con
     length = joints[0].length if joints else 0.0
     contact = points.contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
+
+
+def _needs_old_march(model: Model, numerics: Numerics) -> bool:
+    """Return whether a model has a list of bonds, grooves or a shape on the lower piece."""
+    if model.friction is None:
+        return False
+    has_bonds = law_has_trait(model.friction.law, "bonds")
+    has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
+    return has_list or model.grooves is not None or model.side == "lower"
 
 
 def _has_bond_list(model: Model, numerics: Numerics) -> bool:

@@ -1,0 +1,252 @@
+"""Contact points of a rig for the march: a law, a load and a port for every effect.
+
+In: a Model, its Numerics and its Patch. Out: a `time_steps.contacts.Contact`. Each interface, or each strip of a patch that
+yaws or slips part by part, is a set of points on its port: a point, the nodes of a patch with shear modes of its pieces, or
+the parallel elements of a patch under a constant load.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import friction, slip
+from ...contact import contact_sets
+from ...contact.stiffness import tangential_stiffness
+from ...effects import law_has_trait
+from ...model.law import make_bond_parameters
+from ...model.model import MIN_RIG_REST_SPEED, Model
+from ...structure.drive_sizes import find_drive_omega
+from ...time_steps import laws
+from ...time_steps.contacts import Contact, PointSet
+from ..bench import shear
+from ..patch import faces
+from . import joints
+
+
+class Surface(NamedTuple):
+    """Interface, or a strip of it.
+
+    - keys: effective keys of its law
+    - total: load [N] on the whole contact, to which stiffness and damping in the keys refer
+    - force: load of a point [N], or loads of the nodes (m,)
+    - compliance (m, m): shear compliance of the pieces [m/N], or None
+    - row (n,): slide per modal coordinate
+    """
+
+    keys: object
+    total: float
+    force: np.ndarray
+    compliance: np.ndarray | None
+    row: np.ndarray
+
+
+def make_contact(model: Model, numerics, patch) -> Contact:
+    """Return the contact points of a march, with all interfaces and nonlinear springs.
+
+    Parameters
+    ----------
+    model : Model
+        Rig, springs and friction laws.
+    numerics : Numerics
+        Numbers of shear modes and coarser meshes.
+    patch : Patch or None
+        None under [normal] and between masses.
+    """
+    rig = model.rig
+    rows = rig.modes.interfaces
+    springs = []
+    if rig.springs.interlock is not None:
+        law = laws.make_interlocking(*rig.springs.interlock)
+        springs.append(PointSet(law, rows[0], is_spring=True))
+    if rig.springs.cubic is not None:
+        springs.append(
+            PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True)
+        )
+    fields = {}
+    sets = []
+    if model.rig.friction.interfaces:
+        fields = _find_load(model, patch)
+        found = _list_element_joints(model, numerics, patch) if not fields else []
+        sets = [PointSet(joint.make_step_law(), row) for joint, row in zip(found, rows)]
+        if len(found) == 1:
+            fields["elements"] = found[0].reduction
+        if not sets:
+            surfaces = _list_surfaces(model, numerics, patch)
+            sets = [
+                _make_points(model, numerics, part, moves="sets" in fields) for part in surfaces
+            ]
+
+    limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
+    scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
+    length = _find_length(sets[0]) if sets else 0.0
+    return Contact([*sets, *springs], limit or scale, length, **fields)
+
+
+def _find_load(model: Model, patch) -> dict:
+    """Return the fields of a Contact that describe a load that changes."""
+    if model.load_varies:
+        return {
+            "load": model.point.evaluate,
+            "preload": float(model.point.evaluate(np.zeros(1))[0]),
+        }
+    if patch is None or not model.rig.friction.load_varies:
+        return {}
+
+    # Without pressure, the gap at the approach of the preload is g - C f. The rotational spring of the holder is in series
+    # with the pitch, as a compliance x_i x_j/K in addition to that of the pieces.
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    compliance = patch.pieces.normal
+    spring = model.patch.loading.rotational_stiffness
+    if spring > 0:
+        compliance = compliance + np.outer(patch.x, patch.x) / spring
+    opening = patch.pressure.gap - compliance @ force
+    modes = model.rig.modes
+    still = np.zeros(modes.omega.size)
+    return {
+        "sets": contact_sets.ContactSets(compliance, patch.x, opening, force > 0),
+        "heave": still if modes.normal is None else np.asarray(modes.normal, float),
+        "pitch": still if modes.pitch is None else np.asarray(modes.pitch, float),
+        "preload": float(force.sum()),
+    }
+
+
+def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
+    """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere."""
+    interfaces = model.rig.friction.interfaces
+    is_soft = [model.partial_slip or interface.partial_slip for interface in interfaces]
+    keys = [model.friction if patch is not None else interface.numbers for interface in interfaces]
+    if not any(is_soft) or not all(
+        joints.has_elements(k) for k, soft in zip(keys, is_soft) if soft
+    ):
+        return []
+    return joints.list_joints(model, patch, numerics.meshed)
+
+
+def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
+    """Return the interfaces of a rig, or the strips of its patch that have forces of their own."""
+    rig = model.rig
+    rows = rig.modes.interfaces
+    if patch is not None:
+        keys = joints.replace_averaged_law(model.friction, model, patch)
+        total = float(patch.pressure.load)
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+        compliance = patch.slip_compliance if model.partial_slip else None
+        is_apart = rig.friction.strips_slide_apart
+        if patch.strips is None or not (is_apart or model.partial_slip):
+            return [Surface(keys, total, force, compliance, rows[0])]
+        # The strips are not coupled: each has its fraction of the width, and so a larger compliance.
+        forces = patch.state.force
+        compliance = None if compliance is None else compliance * len(forces)
+        return [
+            Surface(keys, total, force, compliance, rows[k if is_apart else 0])
+            for k, force in enumerate(forces)
+        ]
+
+    surfaces = []
+    for k, interface in enumerate(rig.friction.interfaces):
+        load = model.point.load if interface.load is None else interface.load
+        force = np.array([load])
+        compliance = None
+        if interface.partial_slip:
+            solved = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)
+            own = solved[int(k in numerics.meshed)]
+            force = own.pressure.sigma_n * own.pieces.interface.weight
+            compliance = own.slip_compliance
+        keys = joints.replace_averaged_law(interface.numbers, model, patch)
+        surfaces.append(Surface(keys, load, force, compliance, rows[k]))
+    return surfaces
+
+
+def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> PointSet:
+    """Return the points of a surface.
+
+    Parameters
+    ----------
+    model : Model
+        Rig with its loads.
+    numerics : Numerics
+        Number of shear modes; None: set by the tolerance.
+    surface : Surface
+        Interface or strip.
+    moves : bool
+        Whether heave and pitch change its pressure, so that every node has a load of its own.
+    """
+    keys = surface.keys
+    if law_has_trait(keys.law, "bonds"):
+        law = make_bond_parameters(keys, model.rig.slide_speed_scale, MIN_RIG_REST_SPEED)
+    else:
+        law = friction.record.make_law(keys, surface.total)
+    if surface.compliance is None:
+        # Laws without memory act on the resultant.
+        has_nodes = moves and not law_has_trait(keys.law, "memoryless")
+        if not has_nodes:
+            load = model.point.evaluate(np.zeros(1)) if model.load_varies else surface.force.sum()
+            return PointSet(laws.make_point_law(keys.law, law, load), surface.row)
+        nodes = np.arange(surface.force.size)
+        points = laws.make_point_law(keys.law, law, surface.force)
+        return PointSet(points, surface.row, nodes)
+
+    # The shear modes of nodes that may be pressed later are weighted with an added pressure.
+    force = surface.force
+    weight = force
+    if moves:
+        weight = force + shear.ADDED_WEIGHT_PRESSURE_FRACTION * force.mean()
+    length = getattr(law, "length", None) or 0.0
+    fall = shear.find_steepest_fall(law) if law_has_trait(keys.law, "bonds") else 0.0
+    modes = _choose_modes(model, numerics, surface.compliance, keys.static * weight, length, fall)
+    own = surface.compliance[np.ix_(modes.points, modes.points)]
+    neglected = np.diag(own) - (modes.shape**2 / modes.stiffness).sum(axis=1)
+    points = laws.make_point_law(keys.law, law, force[modes.points], np.maximum(neglected, 0.0))
+    return PointSet(points, surface.row, modes.points if moves else None, modes)
+
+
+def _choose_modes(model: Model, numerics, compliance, limit, length: float, fall: float):
+    """Return the shear modes of the pieces; their number is that of the numerics, the scene, or by the tolerance.
+
+    Parameters
+    ----------
+    model : Model
+        Tolerance and number of modes of the scene.
+    numerics : Numerics
+        Number of modes of the run, or None.
+    compliance : (m, m) array
+        Shear compliance of the nodes [m/N].
+    limit : (m,) array
+        Friction limits [N].
+    length : float
+        Length of the law [m].
+    fall : float
+        Steepest fall of the friction force over the slip, relative to its limit [1/m].
+    """
+    count = numerics.shear_modes or model.accuracy.shear_modes
+    if count is not None:
+        return slip.shear_modes.shear_modes(compliance, limit, count, fall)
+    # Rigid friction is replaced by a short length, as its number of modes would have no bound.
+    if not length:
+        slide = limit.sum() / tangential_stiffness(compliance, limit > 0)
+        length = shear.MIN_BOND_LENGTH_RATIO * slide
+    return slip.shear_modes.find_sufficient_modes(
+        compliance,
+        limit,
+        length,
+        slip.shear_modes.N_SHEAR_MODES,
+        shear.SHEAR_MODES_ERROR_RATIO * model.accuracy.tolerance,
+        fall,
+    )
+
+
+def _find_length(point_set: PointSet) -> float:
+    """Return the displacement [m] over which the first interface stretches before it slips; 0 for a rigid one."""
+    law = point_set.law
+    stiffness = law.stiffness.sum()
+    if not stiffness:
+        return 0.0
+    length = float(law.limits.sum() / stiffness)
+    if point_set.shear is None:
+        return length
+    # Few modes have no inverse compliance. This is the mean displacement of the pieces under the friction limits.
+    shear = point_set.shear
+    bends = (law.limits @ shear.shape) ** 2 / shear.stiffness
+    return length + float(bends.sum() / law.limits.sum())
