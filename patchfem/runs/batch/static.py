@@ -98,8 +98,9 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     results.notes[batch.outcome != OutcomeCode.FAILED] = notes
 
     # Those of single cases; if the largest pressure and approach cause none, no other case has any.
-    peaks = np.nan_to_num(batch.values["pressure_peak"])
-    certain = peaks - np.nan_to_num(batch.errors["pressure_peak"])
+    peak = measures.PRESSURE_PEAK_MEASURES[0]
+    peaks = np.nan_to_num(batch.values[peak])
+    certain = peaks - np.nan_to_num(batch.errors[peak])
     approaches = np.nan_to_num(batch.values["approach"])
     is_own = batch.outcome == OutcomeCode.NO_CONTACT
     if result.warn_of_strains(patch, peaks.max(), approaches.max()) or (
