@@ -56,7 +56,7 @@ PUBLIC = {
     ),
     "press_cases": (
         "HolderCases",
-        "press_cases",
+        "press_on_table",
     ),
     "press_kernels": (
         "compute_energy",
@@ -73,7 +73,6 @@ PUBLIC = {
     ),
     "set_table": (
         "SetTable",
-        "find_set_ends",
         "solve_set",
     ),
     "stiffness": ("tangential_stiffness",),

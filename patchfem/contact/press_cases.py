@@ -72,7 +72,7 @@ class PressedSets(NamedTuple):
         return (self.slot >= 0) & (self.residual <= MAX_RESIDUAL)
 
 
-def press_cases(table: SetTable, holders: HolderCases, amplitudes, start) -> PressedSets:
+def press_on_table(table: SetTable, holders: HolderCases, amplitudes, start) -> PressedSets:
     """Find the contact set and the motion of the holder of each case.
 
     Parameters
@@ -113,8 +113,10 @@ def press_cases(table: SetTable, holders: HolderCases, amplitudes, start) -> Pre
             one = holders.take(part)
             _complete_sets(table, one, amplitudes, active, part)
             found = table.find_slots(active[part])
-            part, found, one = part[found >= 0], found[found >= 0], one.take(found >= 0)
-            closing[part] = _balance(table, one, found, closing[part])
+            is_regular = found >= 0
+            part = part[is_regular]
+            found = found[is_regular]
+            closing[part] = _balance(table, one.take(is_regular), found, closing[part])
             unknown = table.combine(found, closing[part])
             wrong = _find_wrong_nodes(table, found, closing[part], unknown)
             active[part] ^= wrong
@@ -198,7 +200,8 @@ def _solve_motion(resultants, holders: HolderCases, missing) -> np.ndarray:
     A prescribed rotation does not change, and neither does a prescribed approach, whose change is NaN. `resultants`
     (n, 2, q) are load and moment per unit of each column.
     """
-    by_approach, by_rotation = resultants[:, 0, 0], resultants[:, 1, 1] + holders.spring
+    by_approach = resultants[:, 0, 0]
+    by_rotation = resultants[:, 1, 1] + holders.spring
     mixed = resultants[:, 0, 1]
     load, moment = missing.T
     with np.errstate(divide="ignore", invalid="ignore"):

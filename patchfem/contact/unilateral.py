@@ -27,7 +27,7 @@ from .active_set import (
     solve_primal,
     solve_primal_dual,
 )
-from .press_cases import HolderCases, press_cases
+from .press_cases import HolderCases, press_on_table
 from .set_table import SetTable
 from .strip_compliance import StripCompliance, factorise
 
@@ -179,7 +179,7 @@ def _solve_as_one_case(
     spring = problem.springs[1] if n_motions > 1 else 0.0
     approach = np.nan if n_motions else 0.0
     holder = HolderCases(*np.array([[load], [approach], [moment], [spring]]))
-    pressed = press_cases(table, holder, np.ones((1, 1)), start[None])
+    pressed = press_on_table(table, holder, np.ones((1, 1)), start[None])
     if not pressed.is_solved[0]:
         return None, table.n_sets
 

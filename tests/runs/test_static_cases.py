@@ -9,9 +9,7 @@ from scene_texts import BLOCK, COATING
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.runs.patch import mesh_levels
-from patchfem.runs.patch.case_meshes import solve_cases
-from patchfem.runs.patch.cases import OutcomeCode, Reason, take_patch
+from patchfem.runs import patch as folder
 
 TOLERANCE = 1e-3
 TILT = '[contact.tilt]\nangle = "0.02 mrad"\n'
@@ -37,7 +35,7 @@ def make_group(text: str):
 def list_single_runs(group) -> list:
     """Return the measures of a single run of each case."""
     runs = (
-        mesh_levels.solve_with_coarser(take_patch(group, case), TOLERANCE)
+        folder.mesh_levels.solve_with_coarser(folder.cases.take_patch(group, case), TOLERANCE)
         for case in range(LOADS.size)
     )
     return [patches[0].measures for patches in runs]
@@ -49,9 +47,9 @@ def list_single_runs(group) -> list:
 def test_always_cases_agree_with_single_runs_within_errors(extra):
     """Values differ by less than both errors, and every case meets the tolerance."""
     group = make_group(BLOCK + COATING + extra)
-    batch = solve_cases(group, LOADS.size, TOLERANCE)
-    assert batch.outcome.tolist() == [OutcomeCode.DONE] * LOADS.size
-    assert batch.reason.tolist() == [Reason.NONE] * LOADS.size
+    batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
+    assert batch.outcome.tolist() == [folder.cases.OutcomeCode.DONE] * LOADS.size
+    assert batch.reason.tolist() == [folder.cases.Reason.NONE] * LOADS.size
     assert batch.excess.max() <= 1
     for case, measures in enumerate(list_single_runs(group)):
         assert measures.keys() == batch.values.keys()
@@ -67,7 +65,7 @@ def test_always_cases_agree_with_single_runs_within_errors(extra):
 def test_exact_cases_agree_with_single_runs_on_the_same_mesh(extra):
     """On a mesh that the scene prescribes, values, errors and floors are those of single runs to 1e-9."""
     group = make_group(BLOCK + COATING + extra).with_element_size(0.15e-3)
-    batch = solve_cases(group, LOADS.size, TOLERANCE)
+    batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
     for case, measures in enumerate(list_single_runs(group)):
         for name, measure in measures.items():
             value = np.nan if measure.value is None else measure.value
@@ -87,9 +85,16 @@ def test_always_failed_case_does_not_stop_the_others():
     loads = LOADS.copy()
     loads[1] = 1e-250
     loads[2] = 0.0
-    batch = solve_cases(group.with_loading(load=loads), LOADS.size, TOLERANCE)
-    expected = [OutcomeCode.DONE, OutcomeCode.FAILED, OutcomeCode.NO_CONTACT, OutcomeCode.DONE]
+    batch = folder.case_meshes.solve_cases(group.with_loading(load=loads), LOADS.size, TOLERANCE)
+    expected = [
+        folder.cases.OutcomeCode.DONE,
+        folder.cases.OutcomeCode.FAILED,
+        folder.cases.OutcomeCode.NO_CONTACT,
+        folder.cases.OutcomeCode.DONE,
+    ]
     assert batch.outcome.tolist() == expected
-    assert batch.reason[1] == Reason.REFUSED and isinstance(batch.messages[1], PatchfemError)
+    assert batch.reason[1] == folder.cases.Reason.REFUSED and isinstance(
+        batch.messages[1], PatchfemError
+    )
     assert np.isnan(batch.values["pressure_peak"][1])
     assert batch.excess[[0, 3]].max() <= 1

@@ -109,7 +109,7 @@ def compute_chunk(
     # Cases whose results are kept are single runs, and so the only group.
     keep = work.keep and (lambda case, result: work.keep(int(numbers[case]), result))
     for places, models in _group_models(work, numbers):
-        part = batches.solve_models(models, keep, say, True, len(work.cases))
+        part = batches.solve_models(models, keep, say, len(work.cases))
         results.insert(places, part)
         for case, place in enumerate(places.tolist()) if work.extract is not None else ():
             # The title and the effects of similar models are the same.

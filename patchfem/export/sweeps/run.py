@@ -243,10 +243,8 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
 
 def _format_numbers(numbers: np.ndarray, number_format: str) -> list[str]:
     """Return numbers as strings; "" for NaN."""
-    return [
-        "" if number != number else number_format % number
-        for number in numbers.astype(float).tolist()
-    ]
+    values = numbers.astype(float).tolist()
+    return ["" if value != value else number_format % value for value in values]
 
 
 def compute_in_memory(

@@ -24,10 +24,9 @@ NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or mak
 
 
 def solve(
-    models: Sequence[Model],
+    models: Sequence[Model | PatchfemError],
     report: Callable | None = None,
     on_result: Callable | None = None,
-    estimate: bool = True,
 ) -> CaseResults:
     """Compute the case results of models by single runs, one after the other.
 
@@ -35,20 +34,20 @@ def solve(
 
     Parameters
     ----------
-    models : sequence of Model
-        Models in the order of the results.
+    models : sequence of Model or PatchfemError
+        Models in the order of the results, or errors in place of models that could not be built.
     report : callable, optional
         Callback for progress messages.
     on_result : callable, optional
         Called with the case index and the Result after each run.
-    estimate : bool
-        If False, coarse runs and error estimates are omitted.
     """
     results = CaseResults.blank(len(models))
     for case, model in enumerate(models):
         begin = process_time()
         try:
-            result = run(plan(model), report, estimate=estimate)
+            if isinstance(model, PatchfemError):
+                raise model
+            result = run(plan(model), report)
             if on_result is not None:
                 on_result(case, result)
         except FAILED_CASE_ERRORS as error:

@@ -17,7 +17,7 @@ from .. import findings
 from ..patch import case_meshes, measures, result, strength
 from ..patch.cases import Batch, OutcomeCode
 from ..results.patch_rows import PATCH_TABLE
-from ..results.result import shorten_file_names
+from ..results.result import Advice, shorten_file_names
 from .case_results import FAILED_OUTCOME, CaseResults, has_unreadable_measurements
 
 # Number of consecutive cases of a sweep that are solved together. Their meshes depend on all of them, so that it is fixed.
@@ -98,8 +98,9 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     results.notes[batch.outcome != OutcomeCode.FAILED] = notes
 
     # Those of single cases; if the largest pressure and approach cause none, no other case has any.
-    peaks = np.nan_to_num(batch.values["pressure_peak"])
-    certain = peaks - np.nan_to_num(batch.errors["pressure_peak"])
+    peak = measures.PRESSURE_PEAK_MEASURES[0]
+    peaks = np.nan_to_num(batch.values[peak])
+    certain = peaks - np.nan_to_num(batch.errors[peak])
     approaches = np.nan_to_num(batch.values["approach"])
     is_own = batch.outcome == OutcomeCode.NO_CONTACT
     if result.warn_of_strains(patch, peaks.max(), approaches.max()) or (
@@ -127,18 +128,22 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
 
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():
-        name = names[ratios[:, case].argmax()]
-        error = batch.errors[name][case]
-        size = abs(batch.values[name][case])
-        share = f"{error / size:.2g} of its value" if error < size else "at least its value"
+        excess = {name: ratio for name, ratio in zip(names, ratios[:, case]) if ratio > 1}
+        missed = {
+            name: Measure(
+                batch.values[name][case], PATCH_TABLE[name].unit, batch.errors[name][case]
+            )
+            for name in excess
+        }
         advice = f"a finer mesh does not reduce it or is too expensive; {findings.USE_ERROR_ADVICE}"
         if not model.patch.mesh.is_automatic:
             advice = f"leave out {findings.ELEMENT_SIZE_KEY}"
         elif batch.excess[case] <= 1:
             finer = findings.PROPOSED_TOLERANCE_RATIO * tolerance
             advice = f"set accuracy.tolerance = {finer:.3g} for a finer mesh"
-        results.findings[case] = (
-            f"{name} has an estimated error of {share}; the tolerance is {tolerance:g}; the mesh "
-            f"({batch.n_nodes[case]} interface nodes) causes this error; {advice}"
+        cause = f"the mesh ({batch.n_nodes[case]} interface nodes) causes this error; "
+        finding = findings.Missed(None, (), model, missed, excess).make_finding(
+            Advice(cause + advice)
         )
-        results.warnings[case] = [*results.warnings[case], results.findings[case]]
+        results.findings[case] = finding.sentence
+        results.warnings[case] = [*results.warnings[case], finding.sentence]

@@ -68,16 +68,26 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
 
 def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
     """Return the contacts of several parts of the cases one after the other."""
-    width = max(part.crossings.shape[1] for part in parts)
-    padded = [
-        np.pad(
-            part.crossings,
-            ((0, 0), (0, width - part.crossings.shape[1])),
-            constant_values=np.nan,
-        )
-        for part in parts
-    ]
-    return ContactPlaces(np.concatenate([part.begins for part in parts]), np.concatenate(padded))
+    counts = [part.crossings.shape for part in parts]
+    crossings = np.full((sum(n for n, _ in counts), max(e for _, e in counts)), np.nan)
+    first = 0
+    for part, (n_contacts, n_crossings) in zip(parts, counts):
+        crossings[first : first + n_contacts, :n_crossings] = part.crossings
+        first += n_contacts
+    return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
+
+
+class PressedParts(NamedTuple):
+    """Cases that are pressed on one mesh.
+
+    - values: their measures on the mesh.
+    - places: where their contacts begin and end.
+    - is_missing (k,): cases that miss the tolerance, or all if it is not judged; those that fail are left out.
+    """
+
+    values: MeshValues
+    places: ContactPlaces
+    is_missing: np.ndarray
 
 
 def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
@@ -127,6 +137,7 @@ class _CaseSolver:
         self.cases = cases
         self.tolerance = tolerance
         self.batch = Batch.blank(cases.n_cases)
+        self.areas = np.zeros(cases.n_cases)  # areas of the nodes in contact [m2]
 
     def solve(self, numbers: np.ndarray) -> None:
         """Solve some cases (k,) on common meshes, and those that miss the tolerance on meshes of their own."""
@@ -135,8 +146,7 @@ class _CaseSolver:
                 self.solve_alone(number)
             return
         missing = self._solve_together(numbers)
-        half_widths = self.batch.values.get("contact_half_width", np.zeros(self.cases.n_cases))
-        order = missing[np.argsort(half_widths[missing], kind="stable")]
+        order = missing[np.argsort(self.areas[missing], kind="stable")]
         for part in np.array_split(order, 2):
             self.solve(part)
 
@@ -176,7 +186,9 @@ class _CaseSolver:
         while True:
             pair = condense(self.patch_model, *bodies, keep_factors=False)
             is_judged = len(series) >= grids.MIN_NESTED_MESHES - 1
-            values, places, is_missing = self._press_parts(numbers, pair, places, series, is_judged)
+            values, places, is_missing = self._press_parts(
+                numbers, pair, places, series, is_judged=is_judged
+            )
             series = [*series, values]
 
             bodies = [body.refine() for body in bodies]
@@ -197,12 +209,14 @@ class _CaseSolver:
         for bodies in reversed(levels):
             pair = condense(self.patch_model, *bodies, keep_factors=False)
             is_judged = len(series) == len(levels) - 1
-            values, places, _ = self._press_parts(numbers, pair, places, series, is_judged)
+            values, places, _ = self._press_parts(
+                numbers, pair, places, series, is_judged=is_judged
+            )
             series = [*series, values]
 
     def _press_parts(
-        self, numbers: np.ndarray, pair: CondensedPair, places, series, is_judged: bool
-    ) -> tuple[MeshValues, ContactPlaces, np.ndarray]:
+        self, numbers: np.ndarray, pair: CondensedPair, places, series, *, is_judged: bool
+    ) -> PressedParts:
         """Press cases on a mesh, in parts that limit the memory.
 
         Parameters
@@ -220,10 +234,7 @@ class _CaseSolver:
 
         Returns
         -------
-        values : MeshValues
-        places : ContactPlaces
-        is_missing : (k,) bool ndarray
-            Cases that miss the tolerance, or all without errors; those that fail are left out.
+        PressedParts
         """
         level = make_level(self.patch_model, pair)
         is_missing = np.ones(numbers.size, bool)
@@ -237,6 +248,7 @@ class _CaseSolver:
             pressed, errors = press_on_level(level, cases, start)
             values.append(collect_mesh_values(pressed))
             found_places.append(find_contact_places(pressed))
+            self.areas[numbers[rows]] = pressed.active @ level.strip.weight
             if is_judged:
                 own = [*(mesh.take(rows) for mesh in series), values[-1]]
                 is_missing[rows] = self._keep_measures(numbers[rows], pressed, own, errors)
@@ -244,7 +256,7 @@ class _CaseSolver:
                 is_missing[rows[row]] = False
                 self.batch.fail(int(numbers[rows[row]]), error)
             level.limit_sets(MAX_TABLE_SETS)
-        return join_mesh_values(values), join_places(found_places), is_missing
+        return PressedParts(join_mesh_values(values), join_places(found_places), is_missing)
 
     def _keep_measures(self, numbers, pressed: PressedCases, series, errors) -> np.ndarray:
         """Estimate the errors of cases, and keep their measures; return whether they miss the tolerance (k,).

@@ -208,9 +208,9 @@ def estimate_static_measures(
             [mesh.take(rows).values for mesh in used],
             {name: error[rows] for name, error in hidden_errors.items()},
             tolerance,
-            all(are_cells_halved(b.pair, a.pair) for a, b in pairwise(used)),
             max(MIN_REPORTED_RELATIVE_ERROR, fine.level.pair.round_off_error),
             factor[rows],
+            nested=all(are_cells_halved(b.pair, a.pair) for a, b in pairwise(used)),
             has_same_gap=fine.level.model.gap.profile is None,
         )
         values[:, rows] = part.values
@@ -337,10 +337,10 @@ def extrapolate_static_values(
     values_by_mesh: "list[Arrays] | list[Values]",
     hidden_errors: "Arrays | Values",
     tolerance: float | None,
-    nested: bool = True,
     min_relative_error: float = MIN_REPORTED_RELATIVE_ERROR,
     error_factor: float | np.ndarray = 1.0,
     *,
+    nested: bool = True,
     has_same_gap: bool = True,
 ) -> StaticEstimates:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
@@ -356,12 +356,12 @@ def extrapolate_static_values(
         Errors by name that no refinement shows (`estimate_hidden_errors`).
     tolerance : float or None
         Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
-    nested : bool
-        Whether every mesh halves the cells of the previous one.
     min_relative_error : float
         Lower bound of the relative errors.
     error_factor : float or (n,) ndarray
         Factor on all errors.
+    nested : bool
+        Whether every mesh halves the cells of the previous one.
     has_same_gap : bool
         Whether the gap is the same on all meshes, which that of a measured profile is not.
 
@@ -412,15 +412,30 @@ def compute_fraction_error(estimates: StaticEstimates, peak: int, fraction: int)
     peak, fraction : int
         Rows of the peak pressure and of the loaded fraction.
     """
-    values, errors = estimates.values, estimates.errors
+    values = estimates.values
     pressure = np.where(values[peak] > 0, values[peak], np.inf)
-    relative = errors[peak] / pressure
+    relative = estimates.errors[peak] / pressure
     error = values[fraction] * relative / (1 - np.minimum(relative, 0.5))
-    return np.maximum(errors[fraction], error)
+    return np.maximum(estimates.errors[fraction], error)
 
 
 def extrapolate_static_measures(values_by_mesh, hidden_errors, tolerance) -> Measures:
-    """Return the measures of a single case by `extrapolate_static_values`, with the same parameters."""
+    """Return the measures of a single case from its values on two meshes or more (`extrapolate_static_values`).
+
+    Parameters
+    ----------
+    values_by_mesh : list of dict
+        Numbers by name, coarse to fine.
+    hidden_errors : dict
+        Errors by name that no refinement shows.
+    tolerance : float or None
+        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
+
+    Returns
+    -------
+    dict
+        Measure by name.
+    """
     return extrapolate_static_values(values_by_mesh, hidden_errors, tolerance).make_measures(0)
 
 
@@ -470,7 +485,7 @@ def _find_unbounded_pressure(pressed: PressedCases) -> dict[str, np.ndarray]:
     patch_model = pressed.level.model
     x = pressed.x
     cells = np.diff(x)
-    is_loaded = pressed.loaded.any(axis=1)
+    is_loaded = pressed.is_loaded.any(axis=1)
     masks = [is_loaded[:, [0, -1]].any(axis=1)] if patch_model.has_singular_ends else []
     for jump in patch_model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]

@@ -23,7 +23,7 @@ from ...contact.press import (
     press_strips,
     split_into_strips,
 )
-from ...contact.press_cases import press_cases
+from ...contact.press_cases import press_on_table
 from ...contact.set_table import SetTable
 from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
@@ -221,7 +221,7 @@ class PressedCases:
         return self.force / self.level.strip.weight
 
     @cached_property
-    def loaded(self) -> np.ndarray:
+    def is_loaded(self) -> np.ndarray:
         """Whether each node of each strip carries pressure (n, s, m), in a smooth layer a fraction of the peak."""
         if not self.level.is_smooth:
             return self.force > 0
@@ -231,7 +231,7 @@ class PressedCases:
     @cached_property
     def mean_pressure(self) -> np.ndarray:
         """Pressures (n, m) [Pa], means over the strips; pressures of a smooth layer that count as none are 0."""
-        return np.where(self.loaded, self.pressure, 0.0).mean(axis=1)
+        return np.where(self.is_loaded, self.pressure, 0.0).mean(axis=1)
 
     @property
     def active(self) -> np.ndarray:
@@ -497,12 +497,10 @@ def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
 
     # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
     # node takes the worn depth of its neighbour there, and on the lower side likewise.
-    higher = node + 1
-    lower = node - 1
-    if unworn_gap[lower] < unworn_gap[higher]:
-        higher, lower = lower, higher
+    neighbours = [node - 1, node + 1]
+    neighbours.sort(key=lambda neighbour: unworn_gap[neighbour])
     variants = []
-    for side, neighbour in ((-1, higher), (1, lower)):
+    for side, neighbour in zip((-1, 1), neighbours):
         moved = unworn_gap + side * half_steps + worn
         moved[..., node] += worn[..., neighbour] - worn[..., node]
         variants.append((0.5 - side * weight_shift, moved))
@@ -652,7 +650,7 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
 
     if not level.is_smooth:
         table = level.tables[0]
-        sets = press_cases(table, holders, cases.amplitudes, start)
+        sets = press_on_table(table, holders, cases.amplitudes, start)
         solved = np.flatnonzero(sets.is_solved)
         slots = sets.slot[solved]
         unknown = table.combine(slots, sets.closing[solved])
@@ -763,9 +761,8 @@ def press_pieces(
 def _make_holder(patch_model, cases: Cases, case: int) -> Holder:
     """Return load and prescribed motions of one case; `patch_model` has the strips."""
     _, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
-    load, approach, moment, spring = (
-        None if np.isnan(column[case]) else float(column[case]) for column in cases.holders
-    )
+    numbers = np.array(cases.holders)[:, case].tolist()
+    load, approach, moment, spring = (None if np.isnan(one) else one for one in numbers)
     # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
     return Holder(
         load=load,

@@ -147,22 +147,18 @@ def warn_of_strains(patch_model, pressure: float, approach: float) -> list[str]:
     approach : float
         Approach [m].
     """
-    pieces = patch_model.pieces.both
-    materials = _list_materials(patch_model)
+    lowest_young = min(material.young for material in _list_materials(patch_model))
+    height = sum(piece.height for piece in patch_model.pieces.both)
     strains = {
-        "the peak pressure is {:.3g} of the lowest Young's modulus": (
-            pressure / min(material.young for material in materials)
-        ),
-        "the approach is {:.3g} of the total height of the two pieces": (
-            approach / sum(piece.height for piece in pieces)
-        ),
+        "the peak pressure is {:.3g} of the lowest Young's modulus": pressure / lowest_young,
+        "the approach is {:.3g} of the total height of the two pieces": approach / height,
     }
     limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
-    return [
-        words.format(strain) + limit
-        for words, strain in strains.items()
-        if strain > MAX_SMALL_STRAIN
-    ]
+    warnings = []
+    for words, strain in strains.items():
+        if strain > MAX_SMALL_STRAIN:
+            warnings.append(words.format(strain) + limit)
+    return warnings
 
 
 def warn_of_locking(patch_model) -> list[str]:

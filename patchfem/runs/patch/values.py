@@ -219,7 +219,7 @@ def _compute_edge_values(pressed: PressedCases) -> EdgeValues:
     """
     shape = pressed.force.shape[:2]
     row_edges = find_contact_edges(pressed)
-    intervals = edges.find_intervals(pressed.x, pressed.flatten(pressed.loaded), row_edges)
+    intervals = edges.find_intervals(pressed.x, pressed.flatten(pressed.is_loaded), row_edges)
     low, high = (ends.reshape(shape) for ends in intervals[1:])
     width = np.fmax.reduce(high, axis=1) - np.fmin.reduce(low, axis=1)
     normal, rotational, tangential = _compute_stiffnesses(pressed, row_edges)
@@ -248,7 +248,7 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
             x, pressed.flatten(pressure), pressed.flatten(threshold)[:, :1]
         )
     else:
-        active = pressed.flatten(pressed.loaded)
+        active = pressed.flatten(pressed.is_loaded)
         table = level.tables[0]
         layer = level.linear_layer
         cells = edges.EdgeCells(
@@ -270,10 +270,8 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
     return row_edges
 
 
-def _compute_stiffnesses(
-    pressed: PressedCases, row_edges: edges.ContactEdges
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return normal [N/m], rotational [N m/rad] and tangential stiffness [N/m] of all strips, (n s,) each.
+def _compute_stiffnesses(pressed: PressedCases, row_edges: edges.ContactEdges) -> np.ndarray:
+    """Return normal [N/m], rotational [N m/rad] and tangential stiffness [N/m] of all strips (3, n s).
 
     The stiffness of the nodes in contact is that of edges half a cell beyond the last nodes. Every edge that lies elsewhere
     adds the change along the parabola through the sets with one node less and one more.
@@ -286,7 +284,7 @@ def _compute_stiffnesses(
         Their edges.
     """
     level = pressed.level
-    active = pressed.flatten(pressed.loaded)
+    active = pressed.flatten(pressed.is_loaded)
     n_edges = row_edges.node.shape[1]
     work = np.zeros((3, len(active)))
     changes = np.zeros((2, 3, len(active), n_edges))
@@ -317,8 +315,7 @@ def _compute_stiffnesses(
             changes[:, number] = one.end_changes(own, column, n_edges)
 
     shift = np.where(row_edges.exists, row_edges.fraction - 0.5, 0.0)
-    normal, rotational, tangential = work + edges.parabola_change(shift, *changes).sum(axis=-1)
-    return normal, rotational, tangential
+    return work + edges.parabola_change(shift, *changes).sum(axis=-1)
 
 
 def _compute_roll_values(pressed: PressedCases) -> Arrays:
