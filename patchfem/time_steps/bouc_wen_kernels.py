@@ -10,7 +10,7 @@ from math import sqrt
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
-from .step_rows import WIDTH, Value
+from .step_rows_kernels import WIDTH, Value
 
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
 

@@ -22,7 +22,7 @@ from ...time_steps import laws
 from ...time_steps.contacts import Contact, PointSet
 from ..bench import shear
 from ..patch import faces
-from . import joints
+from . import bond_lists, joints
 
 
 class Surface(NamedTuple):
@@ -54,6 +54,8 @@ def make_contact(model: Model, numerics, patch) -> Contact:
     patch : Patch or None
         None under [normal] and between masses.
     """
+    if _needs_lists(model, numerics):
+        return joints.make_contact(model, numerics, patch)
     rig = model.rig
     rows = rig.modes.interfaces
     springs = []
@@ -61,7 +63,9 @@ def make_contact(model: Model, numerics, patch) -> Contact:
         law = laws.make_interlocking(*rig.springs.interlock)
         springs.append(PointSet(law, rows[0], is_spring=True))
     if rig.springs.cubic is not None:
-        springs.append(PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True))
+        springs.append(
+            PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True)
+        )
     fields = {}
     sets = []
     if model.rig.friction.interfaces:
@@ -72,12 +76,23 @@ def make_contact(model: Model, numerics, patch) -> Contact:
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
-            sets = [_make_points(model, numerics, part, moves="sets" in fields) for part in surfaces]
+            sets = [
+                _make_points(model, numerics, part, moves="sets" in fields) for part in surfaces
+            ]
 
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     length = _find_length(sets[0]) if sets else 0.0
     return Contact([*sets, *springs], limit or scale, length, **fields)
+
+
+def _needs_lists(model: Model, numerics) -> bool:
+    """Return whether a model has a list of bonds, grooves or a shape on the lower piece."""
+    if model.friction is None:
+        return False
+    has_bonds = law_has_trait(model.friction.law, "bonds")
+    has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
+    return has_list or model.grooves is not None or model.side == "lower"
 
 
 def _find_load(model: Model, patch) -> dict:
@@ -113,7 +128,9 @@ def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
     interfaces = model.rig.friction.interfaces
     is_soft = [model.partial_slip or interface.partial_slip for interface in interfaces]
     keys = [model.friction if patch is not None else interface.numbers for interface in interfaces]
-    if not any(is_soft) or not all(joints.has_elements(k) for k, soft in zip(keys, is_soft) if soft):
+    if not any(is_soft) or not all(
+        joints.has_elements(k) for k, soft in zip(keys, is_soft) if soft
+    ):
         return []
     return joints.list_joints(model, patch, numerics.meshed)
 
