@@ -7,7 +7,7 @@ eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the 
 
 from math import exp
 
-from ..compiled.flags_kernels import NJIT_CALL
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
     MAX_SERIES_PATH,
@@ -18,7 +18,7 @@ from ..friction.bonds.point_kernels import (
     shape_functions,
     shape_series,
 )
-from .step_rows import VECTOR, WIDTH, BondRow, Value
+from .step_rows_kernels import VECTOR, WIDTH, BondRow, Value
 
 MIN_LENGTH = 1e-9  # smallest bond length of the LuGre law relative to that at rest
 
@@ -58,7 +58,7 @@ def slide_bonds(numbers, memory, trial, values, count, step):
         finish_bonds(numbers, memory, trial, values, count, step)
 
 
-@njit(forceinline=True, **{k: v for k, v in NJIT_CALL.items() if k != "forceinline"})
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def move_bonds(numbers, trial, values, j, shapes):
     """Move the bonds of point j along its slide; write forces, slopes, energy and stretch.
 
