@@ -13,12 +13,12 @@ vectorises loops over j. A loop without branches runs over whole vectors, up to 
 - numbers: numbers of the law, read only; a law documents its rows
 - memory: state of the points at the start of the step, read only
 - trial: state at the end of the step, output
-- values: rows of `step_rows.Value`; inputs SLIDE (increment ds [m]), START_VELOCITY and VELOCITY (at the ends of the
+- values: rows of `step_rows_kernels.Value`; inputs SLIDE (increment ds [m]), START_VELOCITY and VELOCITY (at the ends of the
   step [m/s]), START_LOAD and END_LOAD [N], START (force at the start [N]); outputs END (force at the end [N]), MEAN (mean
   force over the path [N]), END_BY_SLIDE, MEAN_BY_SLIDE [N/m], END_BY_VELOCITY, MEAN_BY_VELOCITY [N s/m] (derivatives),
   ENERGY (stored at the end [J]) and STRETCH (elastic part of the displacement at the end [m])
 - count: number of points in the block; a loop with branches or functions runs over range(count)
-- step: `step_rows.Step`, its duration [s], and the factors of the formula of order 2 for a velocity,
+- step: `step_rows_kernels.Step`, its duration [s], and the factors of the formula of order 2 for a velocity,
   v = rate * increment - lag * last increment
 
 The function is called several times in a step, with other slides. It must give the same outputs for the same inputs, so that

@@ -7,7 +7,7 @@ eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the 
 
 from math import exp
 
-from ..compiled.flags_kernels import NJIT_CALL
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
     MAX_SERIES_PATH,
@@ -18,7 +18,7 @@ from ..friction.bonds.point_kernels import (
     shape_functions,
     shape_series,
 )
-from .step_rows import VECTOR, WIDTH, BondRow, Value
+from .step_rows_kernels import VECTOR, WIDTH, BondRow, Value
 
 MIN_LENGTH = 1e-9  # smallest bond length of the LuGre law relative to that at rest
 
@@ -58,7 +58,7 @@ def slide_bonds(numbers, memory, trial, values, count, step):
         finish_bonds(numbers, memory, trial, values, count, step)
 
 
-@njit(forceinline=True, **{k: v for k, v in NJIT_CALL.items() if k != "forceinline"})
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def move_bonds(numbers, trial, values, j, shapes):
     """Move the bonds of point j along its slide; write forces, slopes, energy and stretch.
 
@@ -156,8 +156,8 @@ def finish_bonds(numbers, memory, trial, values, count, step):
         stiffness = numbers[BondRow.FRICTION + j] / numbers[BondRow.LENGTH + j]
         slide = values[Value.SLIDE + j]
         velocity = values[Value.VELOCITY + j]
+        z = trial[2 * WIDTH + j]
         if middle != stop:
-            z = trial[2 * WIDTH + j]
             press_bonds(numbers, trial, j, middle, stop)
             values[Value.END + j] = stiffness * trial[2 * WIDTH + j]
             values[Value.ENERGY + j] = 0.5 * stiffness * trial[3 * WIDTH + j]
@@ -171,9 +171,16 @@ def finish_bonds(numbers, memory, trial, values, count, step):
             viscous = numbers[BondRow.VISCOUS + j]
             if step.duration > 0 and damping + viscous > 0:
                 m = 0.5 * (memory[WIDTH + j] + trial[WIDTH + j])
-                values[Value.MEAN + j] += (
-                    damping * (trial[2 * WIDTH + j] - memory[2 * WIDTH + j]) / step.duration
+                # The bonds are damped as the slide stretches them, not as a change of load breaks them.
+                bonds = memory[WIDTH + j], memory[2 * WIDTH + j], memory[3 * WIDTH + j]
+                start = press_point(
+                    bonds,
+                    values[Value.START_LOAD + j],
+                    middle,
+                    numbers[BondRow.INITIAL + j],
+                    numbers[BondRow.LENGTH + j],
                 )
+                values[Value.MEAN + j] += damping * (z - start.z) / step.duration
                 values[Value.MEAN + j] += viscous * middle * slide / step.duration
                 values[Value.MEAN_BY_SLIDE + j] += (damping * m + viscous * middle) / step.duration
             direction = 1.0 if velocity > 0 else -1.0

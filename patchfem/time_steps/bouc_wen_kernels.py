@@ -10,7 +10,7 @@ from math import exp, sqrt
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
-from .step_rows import WIDTH, Value
+from .step_rows_kernels import WIDTH, Value
 
 MIN_RELAXATION = (
     1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6

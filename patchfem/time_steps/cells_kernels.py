@@ -8,9 +8,9 @@ slide stretches its spring, which is a part of the path, so that no energy is cr
 
 from typing import NamedTuple
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .step_rows import VECTOR, WIDTH, CellRow, SliderRow, Value
+from .step_rows_kernels import VECTOR, WIDTH, CellRow, SliderRow, Value
 
 MIN_MOVE = 1e-290  # change of y [N] below which a cell does not move
 
@@ -32,7 +32,7 @@ class MovedCell(NamedTuple):
     stretch: float
 
 
-@njit(**NJIT_KERNEL)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
     """Return a `MovedCell` after a step; it has no branch, so that loops over cells are vectorised.
 

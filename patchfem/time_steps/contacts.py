@@ -2,7 +2,7 @@
 
 from ..points import contacts
 from . import systems
-from .step_rows import Law
+from .step_rows_kernels import Law
 
 PointSet = contacts.PointSet
 

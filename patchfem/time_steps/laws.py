@@ -7,9 +7,12 @@ import numpy as np
 from ..core import MIN_LOAD, PatchfemError
 from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import slider_cells
-from .step_rows import VECTOR, WIDTH, Law
+from .step_rows_kernels import VECTOR, WIDTH, Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
+MIN_COMPLIANCE = (
+    1e-6  # smallest compliance of a point, relative to the largest one, in the stiffness of all
+)
 # Cells of an Iwan model; the force of first loading is exact to 6e-5 of the friction limit for chi >= -0.5
 N_CELLS = 96
 NO_GROWTH = (-1.0, 0.0, 0.0, 0.0, 0.0)  # growth numbers of bonds of constant length
@@ -30,7 +33,11 @@ class Blocks(NamedTuple):
 
 
 class Sliders(NamedTuple):
-    """Parallel cells of a point: weights (K,), fractions of the friction limit, and inverse lengths `softness` (K,) [1/m]."""
+    """Parallel cells of a point.
+
+    - weights (K,): fractions of the friction limit
+    - softness (K,): inverse lengths [1/m]
+    """
 
     weights: np.ndarray
     softness: np.ndarray
@@ -179,8 +186,16 @@ def make_bouc_wen(law, load) -> PointLaw:
 
 def make_tanh(law, load, compliance=0.0) -> PointLaw:
     """Return points of the regularised law (`friction.laws.tanh.Tanh`) under a load [N] behind a compliance [m/N]."""
-    viscosity = law.static * np.asarray(load, float) / law.speed
-    return _pack(Law.TANH, (law.static, law.speed, compliance), (0.0, 0.0), load, 0.0, viscosity)
+    load = np.asarray(load, float)
+    if np.any(compliance):
+        # In a series of both, the spring limits the force of fast motions.
+        stiffness = 1 / np.maximum(compliance, MIN_COMPLIANCE * np.max(compliance))
+        viscosity = 0.0
+    else:
+        stiffness = 0.0
+        viscosity = law.static * load / law.speed
+    numbers = (law.static, law.speed, compliance)
+    return _pack(Law.TANH, numbers, (0.0, 0.0, 0.0), load, stiffness, viscosity)
 
 
 def make_coulomb(law, load, compliance=0.0) -> PointLaw:

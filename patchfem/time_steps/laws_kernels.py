@@ -6,7 +6,7 @@ from .bonds_kernels import slide_bonds
 from .bouc_wen_kernels import slide_bouc_wen
 from .cells_kernels import slide_cells, slide_sliders
 from .springs_kernels import slide_cubic, slide_interlock
-from .step_rows import Law
+from .step_rows_kernels import Law
 from .tanh_kernels import slide_tanh
 
 

@@ -2,7 +2,8 @@
 
 Over a step the modes move exactly under a parabola of the drive and constant port forces F. With the increments
 dq = free - C F and the velocities v = free - G F of the ports, and increments db of the shear coordinates of the pieces, a
-point slides by ds = dq - d with d = shape . db, at the velocity v - (rate d - lag d_last). The unknowns F and db solve
+point slides by ds = dq - d with d = shape . db, behind pieces at the velocity rate ds - lag ds_last. The unknowns F and db
+solve
 
     F = sum over the points of (1 - w) mean + w (f0 + f1)/2,    kappa (b + db) = shapes^T f1
 
@@ -20,7 +21,7 @@ Rigid friction (`Law.COULOMB`) is solved with its port. With a constant accelera
 its velocity falls to 0 at a known time; then the port rests, or its motion is reversed. The mean of the force over the time
 of the step is explicit in A. A port at rest is brought back to its place after the step.
 
-`system` is a `march_rows.System` with `step_rows.Points`. A step of level k lasts a whole step over 2^k.
+`system` is a `march_rows.System` with `step_rows_kernels.Points`. A step of level k lasts a whole step over 2^k.
 """
 
 import numpy as np
@@ -54,7 +55,7 @@ from ..points.march_rows import (
     Total,
 )
 from .laws_kernels import slide_points
-from .step_rows import VECTOR, WIDTH, Law, Port, Step, Value
+from .step_rows_kernels import VECTOR, WIDTH, Law, Port, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
 MAX_CUTS = 8  # trials of a line search, each with a third of the step before
@@ -74,7 +75,7 @@ def slide_block(points, block, move, velocity, damping, step):
 
     Parameters
     ----------
-    points : step_rows.Points
+    points : step_rows_kernels.Points
         Points; the block is changed.
     block : int
         Number of the block.
@@ -105,8 +106,12 @@ def slide_block(points, block, move, velocity, damping, step):
     for j in range(n_lanes):
         bent = values[Value.BENT + j]
         values[Value.SLIDE + j] = move - bent
-        last = values[Value.LAST_BENT + j]
-        values[Value.VELOCITY + j] = velocity - step.rate * bent + step.lag * last
+        values[Value.VELOCITY + j] = velocity
+    if start < stop:
+        for j in range(n_lanes):
+            last = values[Value.LAST_SLIDE + j]
+            velocity = step.rate * values[Value.SLIDE + j] - step.lag * last
+            values[Value.VELOCITY + j] = velocity
 
     slide_points(
         points.law[block],
@@ -145,21 +150,20 @@ def slide_block(points, block, move, velocity, damping, step):
         by_end = damping + 0.5 * rest * part
         slide_sign = 1.0 if slide > 0 else -1.0
         bent_sign = 1.0 if bent > 0 else -1.0
-        end_slope = values[Value.END_BY_SLIDE + j]
+        end_slope = values[Value.END_BY_SLIDE + j] + step.rate * values[Value.END_BY_VELOCITY + j]
         mean_slope = values[Value.MEAN_BY_SLIDE + j]
-        end_viscosity = values[Value.END_BY_VELOCITY + j]
-        mean_viscosity = values[Value.MEAN_BY_VELOCITY + j]
+        mean_slope += step.rate * values[Value.MEAN_BY_VELOCITY + j]
         values[Value.FORCE + j] = (
             damping * values[Value.END + j] + rest * mean + rest * part * (half - mean)
         )
         values[Value.BY_SLIDE + j] = (
             by_mean * mean_slope + by_end * end_slope - more * abs(bent) * slide_sign
         )
-        values[Value.BY_VELOCITY + j] = by_mean * mean_viscosity + by_end * end_viscosity
+        values[Value.BY_VELOCITY + j] = 0.0
         values[Value.BY_SHEAR + j] = (
             more * (bent_sign * abs(slide) + slide_sign * abs(bent))
-            - by_mean * (mean_slope + step.rate * mean_viscosity)
-            - by_end * (end_slope + step.rate * end_viscosity)
+            - by_mean * mean_slope
+            - by_end * end_slope
         )
 
 
@@ -408,10 +412,9 @@ def write_matrix(system, level, step):
             v = compliance[1, p, k]
             matrix[p, k] = -moves[Port.BY_SLIDE, p] * move - moves[Port.BY_VELOCITY, p] * v
             for l in range(start, stop):
-                by_move = points.products[l, 0] * move + points.products[l, 1] * v
-                matrix[n_ports + l, k] = ratio * by_move
+                matrix[n_ports + l, k] = ratio * points.products[l, 0] * move
         for l in range(start, stop):
-            matrix[p, n_ports + l] = ratio * points.products[l, 2]
+            matrix[p, n_ports + l] = ratio * points.products[l, 1]
 
         # Rigid friction is a function of the velocity that all other forces give to the port.
         block = points.first[p]
@@ -436,12 +439,12 @@ def write_matrix(system, level, step):
 def write_products(points, p, matrix, n_ports, step):
     """Write the derivatives of the residuals of the shear coordinates of port p.
 
-    Those by the coordinates go to `matrix`, those by increment and velocity of the port, and of the port force by the
-    coordinates, to `points.products`.
+    Those by the coordinates go to `matrix`, those by the increment of the port, and of the port force by the coordinates, to
+    `points.products`.
 
     Parameters
     ----------
-    points : step_rows.Points
+    points : step_rows_kernels.Points
         Points; `products` and the row WEIGHTED of the values are overwritten.
     p : int
         Number of the port.
@@ -455,8 +458,8 @@ def write_products(points, p, matrix, n_ports, step):
     start = points.first_shear[p]
     stop = points.first_shear[p + 1]
     for k in range(start, stop):
-        for column in range(3):
-            points.products[k, column] = 0.0
+        points.products[k, 0] = 0.0
+        points.products[k, 1] = 0.0
         matrix[n_ports + k, n_ports + k] = points.stiffness[k]
     for block in range(points.first[p], points.first[p + 1]):
         values = points.values[block]
@@ -465,18 +468,16 @@ def write_products(points, p, matrix, n_ports, step):
         for k in range(start, stop):
             shape = points.shapes[k]
             by_slide = 0.0
-            by_velocity = 0.0
             by_shear = 0.0
             for j in range(n_lanes):
-                by_slide += shape[at + j] * values[Value.END_BY_SLIDE + j]
-                by_velocity += shape[at + j] * values[Value.END_BY_VELOCITY + j]
-                by_shear += shape[at + j] * values[Value.BY_SHEAR + j]
                 slope = values[Value.END_BY_SLIDE + j]
                 slope += step.rate * values[Value.END_BY_VELOCITY + j]
-                values[Value.WEIGHTED + j] = shape[at + j] * slope
+                weighted = shape[at + j] * slope
+                values[Value.WEIGHTED + j] = weighted
+                by_slide += weighted
+                by_shear += shape[at + j] * values[Value.BY_SHEAR + j]
             points.products[k, 0] += by_slide
-            points.products[k, 1] += by_velocity
-            points.products[k, 2] += by_shear
+            points.products[k, 1] += by_shear
             for l in range(start, k + 1):
                 other = points.shapes[l]
                 total = 0.0
@@ -748,7 +749,7 @@ def commit(system, duration):
             values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
             values[Value.START_VELOCITY + j] = values[Value.VELOCITY + j]
             values[Value.START + j] = values[Value.END + j]
-            values[Value.LAST_BENT + j] = values[Value.BENT + j]
+            values[Value.LAST_SLIDE + j] = values[Value.SLIDE + j]
         memory = points.memory[block]
         trial = points.trial[block]
         for k in range(points.n_memory[block]):
@@ -858,6 +859,27 @@ def find_damping(system, level):
 
 
 @njit(**NJIT_CALL)
+def find_order(system):
+    """Return the weight of the formula of order 2 for the velocity of points behind pieces, the rest is of order 1.
+
+    Where the law "tanh" is much faster than a step, the force hardly depends on the velocity, and only the formula of order
+    1 keeps points at rest that stick.
+    """
+    points = system.points
+    moves = system.ports.values
+    weight = 1.0
+    for p in range(moves.shape[1]):
+        block = points.first[p]
+        if block == points.first[p + 1] or points.law[block] != Law.TANH:
+            continue
+        if points.first_shear[p] < points.first_shear[p + 1]:
+            change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
+            change /= points.numbers[block, WIDTH]
+            weight = min(weight, 1 / (1 + change * change))
+    return weight
+
+
+@njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
     """Advance the motion by a step, unless the step must be halved.
 
@@ -895,8 +917,8 @@ def try_step(system, level, row, begin, end, drive):
     # Velocity of order 2 from two increments (BDF2), of order 1 in the first step
     last = points.clock[0]
     ratio = duration / last if last > 0 else 0.0
-    rate = (1 + 2 * ratio) / ((1 + ratio) * duration)
-    step = Step(duration, rate, ratio * ratio / ((1 + ratio) * duration))
+    part = find_order(system) * ratio / (1 + ratio)
+    step = Step(duration, (1 + part) / duration, part * ratio / duration)
 
     # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
     for k in range(points.stiffness.size):

@@ -4,7 +4,7 @@ from math import sin
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from .step_rows import WIDTH, Value
+from .step_rows_kernels import WIDTH, Value
 
 TWO_PI = 6.283185307179586
 SMALL_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
@@ -32,7 +32,9 @@ def slide_cubic(numbers, memory, trial, values, count, step):
 
 @njit(**NJIT_CALL)
 def slide_interlock(numbers, memory, trial, values, count, step):
-    """Move a block of springs of force k/w sin(w q), w = 2 pi/wavelength; the package describes the arguments (`time_steps`).
+    """Move a block of springs of force k/w sin(w q), w = 2 pi/wavelength.
+
+    The package describes the arguments (`time_steps`).
 
     Rows of `numbers`: k [N/m], wavelength [m]. Memory: q [m].
     """

@@ -7,7 +7,7 @@ from ..core import ModalBasis
 from ..friction.bonds.list_rows_kernels import N_ROWS, BondLists
 from ..points import time_march
 from ..points.march_rows import RESULTANT, Flank, Options, Ports, Shear, Structure, System, Total
-from .step_rows import N_VALUES, WIDTH, Law, Points, Port, Value
+from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Port, Value
 
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
@@ -177,11 +177,11 @@ def _make_port_values(contact, n_ports: int) -> np.ndarray:
         values[Port.STIFFNESS, p] = law.stiffness.sum()
         if point_set.shear is not None:
             # 1^T (D^-1 + S K^-1 S^T)^-1 1 for the stiffnesses D of the points and K of the coordinates of shapes S
-            shape = np.asarray(point_set.shear.shape)
-            weighted = shape * law.stiffness[:, None]
-            inner = np.diag(point_set.shear.stiffness) + shape.T @ weighted
-            column = weighted.sum(axis=0)
-            values[Port.STIFFNESS, p] -= column @ np.linalg.solve(inner, column)
+            is_stiff = law.stiffness > 0
+            shape = np.asarray(point_set.shear.shape)[is_stiff]
+            compliance = np.diag(1 / law.stiffness[is_stiff])
+            compliance += (shape / point_set.shear.stiffness) @ shape.T
+            values[Port.STIFFNESS, p] = np.linalg.solve(compliance, np.ones(len(shape))).sum()
     return values
 
 
@@ -238,7 +238,7 @@ def _make_points(contact, n_ports: int) -> Points:
         np.repeat([int(point_set.law.law) for point_set in sets], counts).astype(np.int64),
         np.repeat(np.arange(len(counts)), counts),
         np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
-        np.repeat([part.memory.shape[1] for part in blocks], counts).astype(np.int64),
+        _count_memory(sets, blocks),
         np.cumsum([0, *counts, *[0] * (n_ports - len(sets))]),
         first_shear,
         numbers,
@@ -255,8 +255,20 @@ def _make_points(contact, n_ports: int) -> Points:
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
         np.zeros(n_nodes),
         np.zeros(1),
-        np.zeros((stiffness.size, 3)),
+        np.zeros((stiffness.size, 2)),
     )
+
+
+def _count_memory(sets, blocks) -> np.ndarray:
+    """Return the number of used entries of the memory of each block (b,)."""
+    used = [np.zeros(0, np.int64)]
+    for point_set, part in zip(sets, blocks):
+        sliders = point_set.law.sliders
+        if sliders is None:
+            used.append(np.full(len(part.count), part.memory.shape[1]))
+        else:
+            used.append(2 * sliders.weights.size * part.count)
+    return np.concatenate(used)
 
 
 def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> time_march.Snapshot:

@@ -6,14 +6,14 @@ velocity less d dF/dt, by the formula of order 2 of the step. The force at the e
     v_0 y + rate d mu N tanh(y) = v + rate d F_0 + lag d (F_0 - F_-1),    F = mu N tanh(y)
 
 by Newton's method from below its solution, where the left side is concave. The mean over the slip is Simpson's rule with the
-velocity of a cubic in the middle, and 0 where this rule would create energy.
+velocity of a cubic in the middle, or of a line behind a spring, and 0 where this rule would create energy.
 """
 
 from math import tanh
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from .step_rows import WIDTH, Value
+from .step_rows_kernels import WIDTH, Value
 
 MAX_ITERATIONS = 60  # iterations of Newton's method, which ends after about 8
 TOLERANCE = 1e-15  # last change of y relative to y
@@ -44,7 +44,8 @@ def solve_velocity(speed, stiffness, given):
 def slide_tanh(numbers, memory, trial, values, count, step):
     """Slide a block of points of the regularised law; the package describes the arguments (`time_steps`).
 
-    Rows of `numbers`: coefficient of friction, speed v_0 [m/s], compliance d [m/N]. Memory: force [N], its last change [N].
+    Rows of `numbers`: coefficient of friction, speed v_0 [m/s], compliance d [m/N]. Memory: force [N], its last change
+    [N], velocity of slip over v_0.
     """
     for j in range(count):
         speed = numbers[WIDTH + j]
@@ -73,7 +74,13 @@ def slide_tanh(numbers, memory, trial, values, count, step):
         by_velocity = slope / (1 + step.rate * compliance * slope)
         by_slide = 0.0
         if compliance > 0 or step.duration == 0:
-            mean = 0.5 * (min(max(force, -limit), limit) + limit * t)
+            # Mean over the path of slip, by Simpson's rule for a velocity that is linear in time
+            first = memory[2 * WIDTH + j]
+            middle = 0.5 * (first + direction * y)
+            total = abs(first) + 4 * abs(middle) + y
+            mean = first * tanh(first) + 4 * middle * tanh(middle) + y * abs(t)
+            mean *= limit / total if total > 0 else 0.0
+            mean = mean if slipped > 0 else -mean
             mean_by_velocity = 0.5 * by_velocity
         else:
             first_velocity = values[Value.START_VELOCITY + j]
@@ -94,6 +101,7 @@ def slide_tanh(numbers, memory, trial, values, count, step):
             mean_by_velocity = 0.5 * by_velocity
         trial[j] = last
         trial[WIDTH + j] = last - force
+        trial[2 * WIDTH + j] = direction * y
         values[Value.END + j] = last
         values[Value.MEAN + j] = mean
         values[Value.END_BY_SLIDE + j] = 0.0

@@ -22,7 +22,7 @@ from ...time_steps import laws
 from ...time_steps.contacts import Contact, PointSet
 from ..bench import shear
 from ..patch import faces
-from . import joints
+from . import bond_lists, joints
 
 
 class Surface(NamedTuple):
@@ -54,6 +54,8 @@ def make_contact(model: Model, numerics, patch) -> Contact:
     patch : Patch or None
         None under [normal] and between masses.
     """
+    if _needs_lists(model, numerics):
+        return joints.make_contact(model, numerics, patch)
     rig = model.rig
     rows = rig.modes.interfaces
     springs = []
@@ -82,6 +84,15 @@ def make_contact(model: Model, numerics, patch) -> Contact:
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     length = _find_length(sets[0]) if sets else 0.0
     return Contact([*sets, *springs], limit or scale, length, **fields)
+
+
+def _needs_lists(model: Model, numerics) -> bool:
+    """Return whether a model has a list of bonds, grooves or a shape on the lower piece."""
+    if model.friction is None:
+        return False
+    has_bonds = law_has_trait(model.friction.law, "bonds")
+    has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
+    return has_list or model.grooves is not None or model.side == "lower"
 
 
 def _find_load(model: Model, patch) -> dict:

@@ -25,7 +25,7 @@ from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements
-from . import bond_lists, contact_points, strips
+from . import bond_lists, strips
 from .numerics import Numerics
 
 NO_STEADY_LOOP = (
@@ -290,8 +290,6 @@ def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Con
     patch : Patch or None
         None under [normal].
     """
-    if not _needs_old_march(model, numerics):
-        return contact_points.make_contact(model, numerics, patch)
     rig = model.rig
     rows = rig.modes.interfaces
     springs = []
@@ -314,15 +312,6 @@ def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Con
     length = joints[0].length if joints else 0.0
     contact = points.contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
     return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
-
-
-def _needs_old_march(model: Model, numerics: Numerics) -> bool:
-    """Return whether a model has a list of bonds, grooves or a shape on the lower piece."""
-    if model.friction is None:
-        return False
-    has_bonds = law_has_trait(model.friction.law, "bonds")
-    has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
-    return has_list or model.grooves is not None or model.side == "lower"
 
 
 def _has_bond_list(model: Model, numerics: Numerics) -> bool:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Points of a block, the entries of a row; the fastest of 8, 16 and 32 for sets of 1 to 100 points
-WIDTH = 16
+# Points of a block, the entries of a row; of 16, 32 and 48, the fastest for sets of 47 and of 107 points
+WIDTH = 48
 VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
 N_VALUES = 22  # rows of `Value`
 
@@ -49,7 +49,7 @@ class Value(IntEnum):
     - BY_SLIDE, BY_SHEAR, BY_VELOCITY: its derivatives by the increment of the port, by BENT [N/m] and by the velocity of
       the port [N s/m]
     - TOTAL: displacement since the start [m]
-    - LAST_BENT: BENT of the last step [m]
+    - LAST_SLIDE: SLIDE of the last step [m]
     - WEIGHTED: workspace of the Jacobian
     """
 
@@ -73,7 +73,7 @@ class Value(IntEnum):
     BY_SHEAR = 17 * WIDTH
     BY_VELOCITY = 18 * WIDTH
     TOTAL = 19 * WIDTH
-    LAST_BENT = 20 * WIDTH
+    LAST_SLIDE = 20 * WIDTH
     WEIGHTED = 21 * WIDTH
 
 
@@ -195,7 +195,7 @@ class Points(NamedTuple):
     - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
     - nodal (n,): forces of the nodes of a patch [N]
     - clock (1,): duration of the last step [s], 0 at the start
-    - products (r, 3): workspace
+    - products (r, 2): workspace
     """
 
     law: np.ndarray
