@@ -1,31 +1,46 @@
 """Quadratic program of contact with bounds: minimise t . C t/2 + g . t for lower <= t <= upper and prescribed resultants.
 
 Normal contact has the bounds 0 and the hardness, partial slip has minus and plus the friction limit, and a linear system
-on a set of cells has no bounds there and zeros elsewhere. The method is that of Polonsky and Keer (Wear 231, 1999, 206),
-preconditioned by the stiffness of the waves on the cells between the bounds.
+on a set of cells has no bounds there and zeros elsewhere. The motions q of the holder are the multipliers of the
+resultants: with the motions R as columns, C t + g - R q vanishes between the bounds, and R . t + K q has prescribed values,
+where K are springs of the holder.
+
+The method is that of Polonsky and Keer (Wear 231, 1999, 206): conjugate gradients on the cells between the bounds, cut at
+the bounds, and gradient steps for cells that leave a bound. It is preconditioned by the stiffness of the waves on the
+cells between the bounds, and its directions are conjugate by the formula of Polak and Ribiere, which forgets the last
+direction by itself where the set of cells changes. The energy is monitored: where it rises, a projected gradient step
+follows, which cannot fail.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+# Rounding error of the energy, relative to the sum of the magnitudes of its terms
+ENERGY_ROUND_OFF = 1e-13
+# Rounding error of a slope, relative to the largest gap of the cells between the bounds
+GAP_ROUND_OFF = 1e-15
+# Largest error of a resultant, relative to the largest prescribed one, at which the tractions are not restored again
+RESULTANT_TOL = 1e-13
+MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
+
 
 class BoundedProblem(NamedTuple):
-    """Quadratic program of n cells and r free motions of the holder.
+    """Quadratic program of n cells and r free motions of the holder; arrays over cells have any one shape.
 
     - gap (ny, nx): Linear term g [m].
     - lower, upper: Bounds [Pa] of the traction, (ny, nx) or numbers; -inf and inf for none.
     - motions (r, ny, nx): Closing of each cell per unit of each free motion; ones for the approach, x and y for tilts.
-    - target (r,): Prescribed sums of motion times traction, per cell [Pa] or [Pa m].
-    - springs (r,): Increase of these sums per unit of the motion, by springs of the holder.
+    - target (r,): Prescribed sums of motion times traction, [Pa] or [Pa m].
+    - springs (r,): Decrease of these sums per unit of the motion, by springs of the holder.
     """
 
     gap: np.ndarray
     lower: np.ndarray | float
     upper: np.ndarray | float
-    motions: np.ndarray
-    target: np.ndarray
-    springs: np.ndarray
+    motions: np.ndarray = ()
+    target: np.ndarray = ()
+    springs: np.ndarray = ()
 
 
 class BoundedSolution(NamedTuple):
@@ -33,8 +48,8 @@ class BoundedSolution(NamedTuple):
 
     - traction (ny, nx): [Pa], within the bounds and with the prescribed resultants.
     - motion (r,): Free motions q of the holder.
-    - slope (ny, nx): C t + g - q . motions [m]: 0 between the bounds, >= 0 at the lower and <= 0 at the upper one.
-    - n_iterations: Number of products with the compliance.
+    - slope (ny, nx): C t + g - R q [m]: 0 between the bounds, >= 0 at the lower and <= 0 at the upper one.
+    - n_iterations: Number of steps.
     - residual: Largest wrong slope over the largest displacement.
     """
 
@@ -65,10 +80,238 @@ def solve_bounded(
     tolerance : float
         Largest residual.
     max_iterations : int
-        Number of products after which the tractions are returned as they are.
+        Number of steps after which the tractions are returned as they are.
 
     Returns
     -------
     BoundedSolution
     """
-    raise NotImplementedError
+    holder = _Holder(problem, compliance.self_compliance)
+    if start is None:
+        start = np.full(problem.gap.shape, holder.uniform_traction)
+    is_movable = np.ones(start.shape, bool)
+    traction, motion = holder.project(start, np.zeros(holder.n_motions), is_movable)
+    best = _Best(np.inf, traction, motion, traction)
+
+    direction = motion_direction = last_slope = None
+    last_square = 1.0
+    n_iterations = 0
+    while n_iterations < max_iterations:
+        n_iterations += 1
+        displacement = compliance.product(traction)
+        raw_slope = displacement + problem.gap
+        is_free = holder.find_free_cells(traction)
+        motion = holder.fit_motion(raw_slope, motion, is_free)
+        slope = raw_slope - holder.move(motion)
+        is_leaving = holder.find_leaving_cells(traction, slope)
+        free_slope = np.where(is_free, slope, 0.0)
+
+        # Optimality: the slope vanishes between the bounds and has the right sign at them
+        noise = GAP_ROUND_OFF * np.abs(problem.gap[is_free]).max(initial=0.0)
+        largest_slope = max(np.abs(free_slope).max(), np.abs(slope[is_leaving]).max(initial=0.0))
+        scale = max(np.abs(displacement).max(), np.finfo(float).tiny)
+        residual = max(largest_slope - noise, 0.0) / scale
+        if residual <= tolerance:
+            break
+
+        # The energy must fall; conjugate steps after a change of the set do not guarantee it
+        energy, energy_noise = holder.compute_energy(traction, displacement, motion)
+        if energy > best.energy + energy_noise:
+            largest_eigenvalue = compliance.product(np.ones(traction.shape)).max()
+            moved = best.traction - best.slope / largest_eigenvalue
+            traction, motion = holder.project(moved, best.motion, np.ones(moved.shape, bool))
+            best = best._replace(energy=np.inf)
+            direction = None
+            continue
+        best = _Best(energy, traction, motion, slope)
+
+        # Conjugate direction on the cells between the bounds, without a change of the resultants
+        preconditioned, motion_change = holder.precondition(compliance, free_slope, is_free)
+        square = float(np.vdot(free_slope, preconditioned))
+        if direction is None:
+            direction = preconditioned
+            motion_direction = motion_change
+        else:
+            change = float(np.vdot(free_slope - last_slope, preconditioned))
+            conjugate = max(change / last_square, 0.0)
+            direction = preconditioned + conjugate * np.where(is_free, direction, 0.0)
+            motion_direction = motion_change + conjugate * motion_direction
+        last_slope = free_slope
+        last_square = max(square, np.finfo(float).tiny)
+
+        # Exact step, cut at the bounds; the other cells leave their bounds by gradient steps
+        curvature = float(np.vdot(direction, compliance.product(direction)))
+        curvature += float(holder.springs @ motion_direction**2)
+        step = float(np.vdot(free_slope, direction)) / curvature if curvature > 0 else 0.0
+        moved = traction - step * direction
+        moved[is_leaving] -= slope[is_leaving] / compliance.self_compliance
+        motion = motion - step * motion_direction
+        traction, motion = holder.project(moved, motion, is_free | is_leaving)
+    return BoundedSolution(traction, motion / holder.scale, slope, n_iterations, residual)
+
+
+class _Best(NamedTuple):
+    """Tractions of the lowest energy [Pa m] so far, with their motion and slope."""
+
+    energy: float
+    traction: np.ndarray
+    motion: np.ndarray
+    slope: np.ndarray
+
+
+class _Holder:
+    """Bounds of the cells and motions of the holder, scaled to a largest closing of 1.
+
+    Parameters
+    ----------
+    problem : BoundedProblem
+        Bounds, motions, resultants and springs.
+    self_compliance : float
+        Displacement of a cell per traction on it [m/Pa].
+    """
+
+    def __init__(self, problem: BoundedProblem, self_compliance: float):
+        shape = problem.gap.shape
+        self.lower = np.broadcast_to(problem.lower, shape)
+        self.upper = np.broadcast_to(problem.upper, shape)
+        self.self_compliance = self_compliance
+        self.n_motions = len(problem.motions)
+        rigid = np.reshape(problem.motions, (self.n_motions, problem.gap.size)).astype(float)
+        self.scale = np.abs(rigid).max(axis=1, initial=0.0)
+        self.rigid = rigid / self.scale[:, None]
+        self.target = np.asarray(problem.target, float) / self.scale
+        self.springs = np.asarray(problem.springs, float) / self.scale**2
+        self.gap = problem.gap
+
+        # Tractions that displace the cells between the bounds by each motion, for the set of these cells
+        self.known_set = None
+        self.motion_tractions = np.empty_like(self.rigid)
+
+    @property
+    def uniform_traction(self) -> float:
+        """Traction [Pa] of all cells that has the prescribed sum; 0 without free motions."""
+        return self.target[0] / self.gap.size if self.n_motions else 0.0
+
+    def find_free_cells(self, traction: np.ndarray) -> np.ndarray:
+        """Return which cells lie between their bounds."""
+        return (traction > self.lower) & (traction < self.upper)
+
+    def find_leaving_cells(self, traction: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """Return which cells at a bound lower the energy as they leave it."""
+        is_leaving = ((traction <= self.lower) & (slope < 0)) | (
+            (traction >= self.upper) & (slope > 0)
+        )
+        return is_leaving & (self.upper > self.lower)
+
+    def move(self, motion: np.ndarray) -> np.ndarray:
+        """Return the closing of the cells [m] by motions (r,)."""
+        return (motion @ self.rigid).reshape(self.gap.shape)
+
+    def fit_motion(self, slope, motion, is_free) -> np.ndarray:
+        """Return motions (r,) whose part without springs is fitted to the slope of the cells between the bounds.
+
+        Motions against springs remain, because they follow from the resultants.
+        """
+        is_fitted = self.springs == 0
+        if not is_fitted.any() or not is_free.any():
+            return motion
+        held = np.where(is_fitted, 0.0, motion)
+        remainder = (slope - self.move(held))[is_free]
+        rigid = self.rigid[is_fitted][:, is_free.ravel()]
+        fitted = np.linalg.lstsq(rigid @ rigid.T, rigid @ remainder, rcond=1e-13)[0]
+        held[is_fitted] = fitted
+        return held
+
+    def compute_energy(self, traction, displacement, motion) -> tuple[float, float]:
+        """Return the energy, per cell area, and its rounding error."""
+        elastic = float(np.vdot(traction, displacement)) / 2
+        rigid = float(np.vdot(traction, self.gap))
+        spring = float(self.springs @ motion**2) / 2
+        size = float(np.vdot(np.abs(traction), np.abs(self.gap))) + abs(elastic) + spring
+        return elastic + rigid + spring, ENERGY_ROUND_OFF * size
+
+    def precondition(self, compliance, slope, is_free):
+        """Return about the tractions (ny, nx) and motions (r,) that cause a slope between the bounds.
+
+        They change no resultant: the tractions of a fitted motion of the holder are subtracted.
+        """
+        preconditioned = np.where(is_free, compliance.precondition(slope), 0.0)
+        if not self.n_motions:
+            return preconditioned, np.zeros(0)
+        if self.known_set is None or not np.array_equal(is_free, self.known_set):
+            self.known_set = is_free
+            for k, rigid in enumerate(self.rigid):
+                moved = np.where(is_free, rigid.reshape(slope.shape), 0.0)
+                held = np.where(is_free, compliance.precondition(moved), 0.0)
+                self.motion_tractions[k] = held.ravel()
+        stiffness = self.motion_tractions @ self.rigid.T + np.diag(self.springs)
+        motion = np.linalg.lstsq(stiffness, self.rigid @ preconditioned.ravel(), rcond=1e-13)[0]
+        held = (motion @ self.motion_tractions).reshape(slope.shape)
+        return preconditioned - held, -motion
+
+    def project(self, traction, motion, is_movable) -> tuple[np.ndarray, np.ndarray]:
+        """Cut tractions at their bounds and shift them until the resultants are the prescribed ones.
+
+        The nearest such tractions are those of a shift by a motion of the holder before the cut. Newton's method finds
+        this motion, with steps that are halved or doubled until the resultants come nearer.
+
+        Parameters
+        ----------
+        traction : (ny, nx) ndarray
+            Tractions [Pa], also beyond their bounds.
+        motion : (r,) ndarray
+            Motions of the holder, which its springs resist.
+        is_movable : (ny, nx) bool ndarray
+            Cells that may be shifted; the others stay. All may where these cannot carry the resultants.
+        """
+        if not self.n_motions:
+            return np.clip(traction, self.lower, self.upper), motion
+        shifted = self._shift(traction, motion, is_movable & (self.upper > self.lower))
+        if shifted is None:
+            shifted = self._shift(traction, motion, self.upper > self.lower)
+        return (np.clip(traction, self.lower, self.upper), motion) if shifted is None else shifted
+
+    def _shift(self, traction, motion, is_movable) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return shifted tractions and motions (see `project`), or None if they miss the resultants."""
+        movable = np.flatnonzero(is_movable)
+        rigid = self.rigid[:, movable]
+        lower = self.lower.flat[movable]
+        upper = self.upper.flat[movable]
+        start = traction.flat[movable]
+        fixed = np.where(is_movable, 0.0, np.clip(traction, self.lower, self.upper))
+        target = self.target - self.rigid @ fixed.ravel()
+        tolerance = RESULTANT_TOL * np.abs(self.target).max()
+
+        def find_error(shift):
+            """Return the missing resultants (r,) after a shift (r,) by motions of the holder."""
+            cut = np.clip(start + shift @ rigid / self.self_compliance, lower, upper)
+            return target - rigid @ cut - self.springs * (motion + shift)
+
+        shift = np.zeros(self.n_motions)
+        error = find_error(shift)
+        for _ in range(MAX_RESTORATIONS):
+            if np.abs(error).max() <= tolerance:
+                out = np.clip(traction, self.lower, self.upper)
+                out.flat[movable] = np.clip(
+                    start + shift @ rigid / self.self_compliance, lower, upper
+                )
+                return out, motion + shift
+            moved = start + shift @ rigid / self.self_compliance
+            inside = rigid[:, (moved > lower) & (moved < upper)]
+            if inside.shape[1] < self.n_motions:
+                inside = rigid
+            response = inside @ inside.T / self.self_compliance + np.diag(self.springs)
+            direction = np.linalg.lstsq(response, error, rcond=1e-13)[0]
+
+            # The derivative of the concave dual function along the direction falls from a positive value through 0
+            slope = float(direction @ error)
+            length = 1.0
+            for _ in range(MAX_RESTORATIONS):
+                new_error = find_error(shift + length * direction)
+                new_slope = float(direction @ new_error)
+                if abs(new_slope) <= 0.9 * slope:
+                    break
+                length *= 2.0 if new_slope > 0 else 0.5
+            shift = shift + length * direction
+            error = new_error
+        return None

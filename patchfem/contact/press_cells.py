@@ -4,7 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import NotConverged
+from .bounded import BoundedProblem, solve_bounded
 from .cells import CellCompliance
+
+MAX_ITERATIONS = 4000  # Largest number of steps; a hard case takes about 200
+# Largest residual of a stiffness of a contact set, which enters the stiffness squared
+STIFFNESS_RESIDUAL_TOL = 1e-7
 
 
 class FaceLoading(NamedTuple):
@@ -13,8 +19,8 @@ class FaceLoading(NamedTuple):
     - load: Normal load [N]; None under a prescribed approach.
     - approach: Approach [m] in place of a load, at fixed tilts.
     - line_x, line_y: Position of the load [m]; the tilt along that axis is free. None: the tilt is fixed.
-    - spring_x, spring_y: Stiffness [N m/rad] of the holder against the tilt along each axis, unloaded at the tilt that the
-      gap contains.
+    - spring_x, spring_y: Stiffness [N m/rad] of the holder against a free tilt along each axis, unloaded at the tilt that
+      the gap contains.
     - hardness: Largest pressure [Pa].
     """
 
@@ -34,7 +40,7 @@ class PressedCells(NamedTuple):
     - approach: Approach of the holder [m].
     - tilt_x, tilt_y: Tilts [rad] that the holder adds to those in the gap: positive ones open the gap at +x and at +y. A
       tilt along x turns the holder about y.
-    - n_iterations: Number of products with the compliance.
+    - n_iterations: Number of steps of the solver.
     - residual: Largest wrong gap over the largest displacement.
     """
 
@@ -78,7 +84,54 @@ def press_cells(
     NotConverged
         If the tolerance is not met.
     """
-    raise NotImplementedError
+    problem = _make_problem(compliance, gap, loading)
+    solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
+    if not solution.residual <= tolerance:
+        raise NotConverged(
+            f"contact: the pressure did not converge; after {solution.n_iterations} steps the gap "
+            f"is wrong by {solution.residual:.1e} of the displacement, more than {tolerance:.1e}"
+        )
+
+    # Approach and tilts of the holder; those that are not free stay
+    motion = iter(solution.motion.tolist())
+    approach = float((gap - problem.gap).flat[0]) + next(motion, 0.0)
+    is_loaded = loading.load is not None
+    tilt_x = -next(motion) if is_loaded and loading.line_x is not None else 0.0
+    tilt_y = -next(motion) if is_loaded and loading.line_y is not None else 0.0
+    open_gap = np.where(solution.traction > 0, 0.0, np.maximum(solution.slope, 0.0))
+    return PressedCells(
+        solution.traction,
+        open_gap,
+        approach,
+        tilt_x,
+        tilt_y,
+        solution.n_iterations,
+        solution.residual,
+    )
+
+
+def _make_problem(compliance: CellCompliance, gap, loading: FaceLoading) -> BoundedProblem:
+    """Return the bounded problem of a loading, with a gap [m] from its lowest point or from the approach."""
+    if loading.load is None:
+        return BoundedProblem(gap - loading.approach, 0.0, loading.hardness)
+    x = np.broadcast_to(compliance.x, gap.shape)
+    y = np.broadcast_to(compliance.y[:, None], gap.shape)
+    axes = [
+        (np.ones(gap.shape), 1.0, 0.0),
+        (x, loading.line_x, loading.spring_x),
+        (y, loading.line_y, loading.spring_y),
+    ]
+    motions, lines, springs = zip(*(axis for axis in axes if axis[1] is not None))
+    area = compliance.cell_area
+    target = loading.load / area * np.array(lines)
+    return BoundedProblem(
+        gap - gap.min(),
+        0.0,
+        loading.hardness,
+        np.array(motions),
+        target,
+        np.array(springs) / area,
+    )
 
 
 def compute_set_stiffness(
@@ -100,4 +153,8 @@ def compute_set_stiffness(
     float
         Stiffness [N/m], or [N m/rad] for a tilt.
     """
-    raise NotImplementedError
+    motion = np.broadcast_to(motion, active.shape)
+    bound = np.where(active, np.inf, 0.0)
+    problem = BoundedProblem(-motion, -bound, bound)
+    solution = solve_bounded(compliance, problem, tolerance=STIFFNESS_RESIDUAL_TOL)
+    return float(np.vdot(solution.traction, motion)) * compliance.cell_area
