@@ -7,21 +7,25 @@ where K are springs of the holder.
 
 The method is that of Polonsky and Keer (Wear 231, 1999, 206): conjugate gradients on the cells between the bounds, cut at
 the bounds, and gradient steps for cells that leave a bound. It is preconditioned by the stiffness of the waves on the
-cells between the bounds, and its directions are conjugate by the formula of Polak and Ribiere, which forgets the last
-direction by itself where the set of cells changes. The energy is monitored: where it rises, a projected gradient step
-follows, which cannot fail.
+cells between the bounds. Its directions are conjugate by the formula of Polak and Ribiere as long as the cuts leave the
+slopes orthogonal. The energy is monitored: where it does not fall for several steps, a projected gradient step follows,
+which cannot fail.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Rounding error of the energy, relative to the sum of the magnitudes of its terms
-ENERGY_ROUND_OFF = 1e-13
+# Number of steps without a lower energy after which a projected gradient step follows. A changed set of cells takes two or
+# three steps to lower the energy.
+MAX_STEPS_WITHOUT_GAIN = 8
+# Largest scalar product of two successive slopes, relative to the square of the last one, at which the directions are
+# conjugate; beyond it the last direction is forgotten (Powell, Math. Program. 12, 1977, 241)
+MAX_SLOPE_OVERLAP = 0.2
 # Rounding error of a slope, relative to the largest gap of the cells between the bounds
 GAP_ROUND_OFF = 1e-15
 # Largest error of a resultant, relative to the largest prescribed one, at which the tractions are not restored again
-RESULTANT_TOL = 1e-13
+RESULTANT_TOL = 1e-12
 MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
 
 
@@ -89,74 +93,81 @@ def solve_bounded(
     holder = _Holder(problem, compliance.self_compliance)
     if start is None:
         start = np.full(problem.gap.shape, holder.uniform_traction)
-    is_movable = np.ones(start.shape, bool)
-    traction, motion = holder.project(start, np.zeros(holder.n_motions), is_movable)
-    best = _Best(np.inf, traction, motion, traction)
+    everywhere = np.ones(start.shape, bool)
+    state = holder.load(compliance, holder.project(start, np.zeros(holder.n_motions), everywhere))
+    best = state
+    n_without_gain = 0
 
     direction = motion_direction = last_slope = None
     last_square = 1.0
     n_iterations = 0
     while n_iterations < max_iterations:
         n_iterations += 1
-        displacement = compliance.product(traction)
-        raw_slope = displacement + problem.gap
+        traction = state.traction
+        raw_slope = state.displacement + problem.gap
         is_free = holder.find_free_cells(traction)
-        motion = holder.fit_motion(raw_slope, motion, is_free)
+        motion = holder.fit_motion(raw_slope, state.motion, is_free)
         slope = raw_slope - holder.move(motion)
         is_leaving = holder.find_leaving_cells(traction, slope)
-        free_slope = np.where(is_free, slope, 0.0)
+        is_moving = is_free | is_leaving
+        moving_slope = np.where(is_moving, slope, 0.0)
 
         # Optimality: the slope vanishes between the bounds and has the right sign at them
         noise = GAP_ROUND_OFF * np.abs(problem.gap[is_free]).max(initial=0.0)
-        largest_slope = max(np.abs(free_slope).max(), np.abs(slope[is_leaving]).max(initial=0.0))
-        scale = max(np.abs(displacement).max(), np.finfo(float).tiny)
-        residual = max(largest_slope - noise, 0.0) / scale
+        scale = max(np.abs(state.displacement).max(), np.finfo(float).tiny)
+        residual = max(np.abs(moving_slope).max() - noise, 0.0) / scale
         if residual <= tolerance:
             break
 
-        # The energy must fall; conjugate steps after a change of the set do not guarantee it
-        energy, energy_noise = holder.compute_energy(traction, displacement, motion)
-        if energy > best.energy + energy_noise:
+        # The energy may rise while the set of cells between the bounds changes, but not for long. A projected gradient step
+        # of this length always lowers it.
+        n_without_gain += 1
+        if state.energy < best.energy:
+            best = state
+            n_without_gain = 0
+        if n_without_gain > MAX_STEPS_WITHOUT_GAIN:
             largest_eigenvalue = compliance.product(np.ones(traction.shape)).max()
-            moved = best.traction - best.slope / largest_eigenvalue
-            traction, motion = holder.project(moved, best.motion, np.ones(moved.shape, bool))
-            best = best._replace(energy=np.inf)
+            gradient = best.displacement + problem.gap - holder.move(best.motion)
+            moved = best.traction - gradient / largest_eigenvalue
+            state = holder.load(compliance, holder.project(moved, best.motion, everywhere))
+            best = state
+            n_without_gain = 0
             direction = None
             continue
-        best = _Best(energy, traction, motion, slope)
 
-        # Conjugate direction on the cells between the bounds, without a change of the resultants
-        preconditioned, motion_change = holder.precondition(compliance, free_slope, is_free)
-        square = float(np.vdot(free_slope, preconditioned))
-        if direction is None:
+        # Conjugate direction on the cells that can move, without a change of the resultants
+        preconditioned, motion_change = holder.precondition(compliance, moving_slope, is_moving)
+        square = float(np.vdot(moving_slope, preconditioned))
+        overlap = np.inf if direction is None else float(np.vdot(last_slope, preconditioned))
+        if abs(overlap) > MAX_SLOPE_OVERLAP * square:
             direction = preconditioned
             motion_direction = motion_change
         else:
-            change = float(np.vdot(free_slope - last_slope, preconditioned))
-            conjugate = max(change / last_square, 0.0)
-            direction = preconditioned + conjugate * np.where(is_free, direction, 0.0)
+            conjugate = (square - overlap) / last_square
+            direction = preconditioned + conjugate * np.where(is_moving, direction, 0.0)
             motion_direction = motion_change + conjugate * motion_direction
-        last_slope = free_slope
+        last_slope = moving_slope
         last_square = max(square, np.finfo(float).tiny)
 
-        # Exact step, cut at the bounds; the other cells leave their bounds by gradient steps
-        curvature = float(np.vdot(direction, compliance.product(direction)))
+        # Exact step, cut at the bounds
+        direction_displacement = compliance.product(direction)
+        curvature = float(np.vdot(direction, direction_displacement))
         curvature += float(holder.springs @ motion_direction**2)
-        step = float(np.vdot(free_slope, direction)) / curvature if curvature > 0 else 0.0
+        step = float(np.vdot(moving_slope, direction)) / curvature if curvature > 0 else 0.0
         moved = traction - step * direction
-        moved[is_leaving] -= slope[is_leaving] / compliance.self_compliance
         motion = motion - step * motion_direction
-        traction, motion = holder.project(moved, motion, is_free | is_leaving)
+        projected = holder.project(moved, motion, is_moving)
+        state = holder.load(compliance, projected)
     return BoundedSolution(traction, motion / holder.scale, slope, n_iterations, residual)
 
 
-class _Best(NamedTuple):
-    """Tractions of the lowest energy [Pa m] so far, with their motion and slope."""
+class _State(NamedTuple):
+    """Admissible tractions [Pa] and motions, their displacement [m], and their energy per cell area [Pa m]."""
 
-    energy: float
     traction: np.ndarray
     motion: np.ndarray
-    slope: np.ndarray
+    displacement: np.ndarray | None = None
+    energy: float = np.inf
 
 
 class _Holder:
@@ -222,13 +233,13 @@ class _Holder:
         held[is_fitted] = fitted
         return held
 
-    def compute_energy(self, traction, displacement, motion) -> tuple[float, float]:
-        """Return the energy, per cell area, and its rounding error."""
-        elastic = float(np.vdot(traction, displacement)) / 2
-        rigid = float(np.vdot(traction, self.gap))
-        spring = float(self.springs @ motion**2) / 2
-        size = float(np.vdot(np.abs(traction), np.abs(self.gap))) + abs(elastic) + spring
-        return elastic + rigid + spring, ENERGY_ROUND_OFF * size
+    def load(self, compliance, state: _State) -> _State:
+        """Return a state with its displacement and energy."""
+        traction, motion, *_ = state
+        displacement = compliance.product(traction)
+        energy = float(np.vdot(traction, displacement / 2 + self.gap))
+        energy += float(self.springs @ motion**2) / 2
+        return _State(traction, motion, displacement, energy)
 
     def precondition(self, compliance, slope, is_free):
         """Return about the tractions (ny, nx) and motions (r,) that cause a slope between the bounds.
@@ -249,7 +260,7 @@ class _Holder:
         held = (motion @ self.motion_tractions).reshape(slope.shape)
         return preconditioned - held, -motion
 
-    def project(self, traction, motion, is_movable) -> tuple[np.ndarray, np.ndarray]:
+    def project(self, traction, motion, is_movable) -> _State:
         """Cut tractions at their bounds and shift them until the resultants are the prescribed ones.
 
         The nearest such tractions are those of a shift by a motion of the holder before the cut. Newton's method finds
@@ -265,13 +276,15 @@ class _Holder:
             Cells that may be shifted; the others stay. All may where these cannot carry the resultants.
         """
         if not self.n_motions:
-            return np.clip(traction, self.lower, self.upper), motion
+            return _State(np.clip(traction, self.lower, self.upper), motion)
         shifted = self._shift(traction, motion, is_movable & (self.upper > self.lower))
         if shifted is None:
             shifted = self._shift(traction, motion, self.upper > self.lower)
-        return (np.clip(traction, self.lower, self.upper), motion) if shifted is None else shifted
+        if shifted is None:
+            return _State(np.clip(traction, self.lower, self.upper), motion)
+        return shifted
 
-    def _shift(self, traction, motion, is_movable) -> tuple[np.ndarray, np.ndarray] | None:
+    def _shift(self, traction, motion, is_movable) -> _State | None:
         """Return shifted tractions and motions (see `project`), or None if they miss the resultants."""
         movable = np.flatnonzero(is_movable)
         rigid = self.rigid[:, movable]
@@ -295,7 +308,7 @@ class _Holder:
                 out.flat[movable] = np.clip(
                     start + shift @ rigid / self.self_compliance, lower, upper
                 )
-                return out, motion + shift
+                return _State(out, motion + shift)
             moved = start + shift @ rigid / self.self_compliance
             inside = rigid[:, (moved > lower) & (moved < upper)]
             if inside.shape[1] < self.n_motions:

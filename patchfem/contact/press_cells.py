@@ -9,8 +9,8 @@ from .bounded import BoundedProblem, solve_bounded
 from .cells import CellCompliance
 
 MAX_ITERATIONS = 4000  # Largest number of steps; a hard case takes about 200
-# Largest residual of a stiffness of a contact set, which enters the stiffness squared
-STIFFNESS_RESIDUAL_TOL = 1e-7
+# Largest residual of the equations of a contact set; it enters a stiffness squared, and edges of the set linearly
+SET_RESIDUAL_TOL = 1e-9
 
 
 class FaceLoading(NamedTuple):
@@ -134,6 +134,31 @@ def _make_problem(compliance: CellCompliance, gap, loading: FaceLoading) -> Boun
     )
 
 
+def solve_on_set(
+    compliance: CellCompliance, active: np.ndarray, motion: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """Solve for the tractions on a contact set that cause a motion of its cells.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Normal or shear compliance.
+    active : (ny, nx) bool ndarray
+        Cells in contact.
+    motion : (ny, nx) ndarray or float
+        Displacement of the cells [m].
+
+    Returns
+    -------
+    (ny, nx) ndarray
+        Traction [Pa], 0 outside the set.
+    """
+    motion = np.broadcast_to(motion, active.shape)
+    bound = np.where(active, np.inf, 0.0)
+    problem = BoundedProblem(-motion, -bound, bound)
+    return solve_bounded(compliance, problem, tolerance=SET_RESIDUAL_TOL).traction
+
+
 def compute_set_stiffness(
     compliance: CellCompliance, active: np.ndarray, motion: np.ndarray | float = 1.0
 ) -> float:
@@ -153,8 +178,5 @@ def compute_set_stiffness(
     float
         Stiffness [N/m], or [N m/rad] for a tilt.
     """
-    motion = np.broadcast_to(motion, active.shape)
-    bound = np.where(active, np.inf, 0.0)
-    problem = BoundedProblem(-motion, -bound, bound)
-    solution = solve_bounded(compliance, problem, tolerance=STIFFNESS_RESIDUAL_TOL)
-    return float(np.vdot(solution.traction, motion)) * compliance.cell_area
+    traction = solve_on_set(compliance, active, motion)
+    return float(np.vdot(traction, np.broadcast_to(motion, active.shape))) * compliance.cell_area

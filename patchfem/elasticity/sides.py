@@ -24,7 +24,7 @@ from .elasticity import Layers, lame_constants
 from .lapack import dpotrf, dtrsm
 
 ORDER = 4  # Polynomial order of the bricks
-ELEMENT_RATIO = 0.25  # Ratio of the lengths of neighbouring elements towards a free side or a face
+DEPTH_RATIO = 0.25  # Ratio of the thicknesses of neighbouring bricks towards both faces
 # Smallest ratio of the depths of two element edges near an interface of layers; closer edges would make thin bricks
 MIN_EDGE_DEPTH_RATIO = 2.0
 CACHE_FOLDER_NAME = "patchfem-sides"
@@ -133,15 +133,51 @@ class Elements(NamedTuple):
             Whether the functions continue as even ones on the other side of 0, else as odd ones.
         """
         distance = np.abs(cell_edges)
-        coefficients = _make_shape_functions(self.order)
+        pieces = self._make_smooth_functions(is_even=is_even)
         primitive = np.zeros((distance.size, self.n_nodes))
-        for element, (start, stop) in enumerate(zip(self.edges[:-1], self.edges[1:])):
+        for start, stop, piece in zip(self.edges[:-1], self.edges[1:], pieces, strict=True):
             local = np.clip((distance - start) / (stop - start) * 2 - 1, -1, 1)
-            integrals = legendre.legval(local, legendre.legint(coefficients, lbnd=-1)).T
-            first = element * self.order
-            primitive[:, first : first + self.order + 1] += (stop - start) / 2 * integrals
+            nodes = np.flatnonzero(piece.any(axis=0))
+            integrals = legendre.legval(local, legendre.legint(piece[:, nodes], lbnd=-1)).T
+            primitive[:, nodes] += (stop - start) / 2 * integrals
         # The primitive of an even function is odd
         return np.diff(primitive * np.sign(cell_edges)[:, None] if is_even else primitive, axis=0)
+
+    def _make_smooth_functions(self, *, is_even: bool) -> list[np.ndarray]:
+        """Return the Legendre coefficients (order + 3, n) on each element of the shape functions with continuous slopes.
+
+        A kink of the displacement between two elements would cause a peak of the pressure there. Each function gets the
+        mean of its two slopes at an edge, that of the shorter element with the larger weight, by a polynomial that vanishes
+        at the nodes.
+        """
+        coefficients = _make_shape_functions(self.order)
+        if not self.order:
+            return [coefficients]
+        lengths = np.diff(self.edges)
+        reference_slopes = legendre.legval([-1.0, 1.0], legendre.legder(coefficients)).T
+
+        # Slopes (2, n) [1/m] of the functions at both ends of each element, and their means at the edges
+        slopes = np.zeros((lengths.size, 2, self.n_nodes))
+        values = np.zeros((lengths.size, self.order + 3, self.n_nodes))
+        for element, length in enumerate(lengths):
+            nodes = slice(element * self.order, (element + 1) * self.order + 1)
+            slopes[element, :, nodes] = reference_slopes * 2 / length
+            values[element, : self.order + 1, nodes] = coefficients
+        means = np.concatenate([slopes[:, 0], slopes[-1:, 1]])
+        weight = (lengths[1:] / (lengths[1:] + lengths[:-1]))[:, None]
+        means[1:-1] = weight * slopes[:-1, 1] + (1 - weight) * slopes[1:, 0]
+        if is_even:
+            means[0] = 0.0
+
+        # (1 - s) w/2 and (1 + s) w/2, where w vanishes at all nodes and has the slopes w'(-1) and w'(1)
+        bubble = legendre.legmul([1 / 3, 0, -1 / 3], legendre.legder([*self.order * [0], 1]))
+        bubble_slopes = legendre.legval([-1.0, 1.0], legendre.legder(bubble))
+        for element, length in enumerate(lengths):
+            changes = (means[element : element + 2] - slopes[element]) * length / 2
+            for end, side in enumerate((-1.0, 1.0)):
+                shape = legendre.legmul([0.5, 0.5 * side], bubble) / bubble_slopes[end]
+                values[element] += shape[:, None] * changes[end]
+        return list(values)
 
 
 def _make_shape_functions(order: int) -> np.ndarray:
@@ -177,9 +213,9 @@ def _make_elements(edges, order: int = ORDER) -> Elements:
     return Elements(edges, order, *matrices)
 
 
-def _grade_edges(length: float, n_elements: int) -> np.ndarray:
-    """Return edges (n + 1,) [m] from 0 to a length, between which the elements shrink towards the end."""
-    remainders = ELEMENT_RATIO ** np.arange(n_elements)
+def _grade_edges(length: float, n_elements: int, ratio: float) -> np.ndarray:
+    """Return edges (n + 1,) [m] from 0 to a length, between which each element is shorter than the last one by a ratio."""
+    remainders = ratio ** np.arange(n_elements)
     return length * (1 - np.append(remainders, 0.0))
 
 
@@ -190,8 +226,8 @@ def _grade_depths(stack: LayerStack, n_elements: int) -> np.ndarray:
     """
     height = sum(stack.thicknesses)
     interfaces = np.cumsum(stack.thicknesses)[:-1]
-    below_face = height * ELEMENT_RATIO ** np.arange(n_elements, 0, -1)
-    above_far_face = _grade_edges(height, n_elements - 1)[1:-1]
+    below_face = height * DEPTH_RATIO ** np.arange(n_elements, 0, -1)
+    above_far_face = _grade_edges(height, n_elements - 1, DEPTH_RATIO)[1:-1]
     depths = np.concatenate([below_face, above_far_face])
     for interface in interfaces:
         ratio = np.maximum(depths, interface) / np.minimum(depths, interface)
@@ -209,8 +245,8 @@ def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) ->
     shape : BlockShape
         Face of the block and its free sides.
     level : int
-        Refinement of the elements: level + 2 elements lie between the middle and a free side. The shortest ones are a
-        quarter as long as those of the level before.
+        Refinement of the elements. Between the middle and a free side lie level + 2 of them, or 4 (level + 1) in a plane
+        problem, whose lengths decrease by a ratio that grows from 1/4 with the level, so that all become shorter.
 
     Returns
     -------
@@ -222,12 +258,15 @@ def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) ->
 @lru_cache(maxsize=MAX_CHANGES_IN_MEMORY)
 def _get_side_change(stack: LayerStack, shape: BlockShape, level: int) -> SideChange:
     """Return the result of `compute_side_change`, once per process."""
-    n_elements = level + 2
-    x = _make_elements(_grade_edges(shape.length / 2, n_elements))
     is_plane = shape.free_sides == "x"
-    y_edges = [0.0, shape.width / 2] if is_plane else _grade_edges(shape.width / 2, n_elements)
+    n_elements = 4 * (level + 1) if is_plane else level + 2
+    ratio = (level + 1) / (level + 4)
+    x = _make_elements(_grade_edges(shape.length / 2, n_elements, ratio))
+    y_edges = [0.0, shape.width / 2]
+    if not is_plane:
+        y_edges = _grade_edges(shape.width / 2, n_elements, ratio)
     y = _make_elements(y_edges, 0 if is_plane else ORDER)
-    depths = _grade_depths(stack, n_elements)
+    depths = _grade_depths(stack, level + 2)
 
     # A plane problem takes less time than a file
     if is_plane:
