@@ -104,7 +104,7 @@ def solve_bounded(
     n_without_gain = 0
 
     direction = motion_direction = last_slope = None
-    last_square = 1.0
+    last_square = 0.0
     n_iterations = 0
     while n_iterations < max_iterations:
         n_iterations += 1
@@ -143,16 +143,17 @@ def solve_bounded(
         # Conjugate direction on the cells that can move, without a change of the resultants
         preconditioned, motion_change = holder.precondition(compliance, moving_slope, is_moving)
         square = float(np.vdot(moving_slope, preconditioned))
-        overlap = np.inf if direction is None else float(np.vdot(last_slope, preconditioned))
-        if abs(overlap) > MAX_SLOPE_OVERLAP * square:
-            direction = preconditioned
-            motion_direction = motion_change
-        else:
-            conjugate = (square - overlap) / last_square
-            direction = preconditioned + conjugate * np.where(is_moving, direction, 0.0)
-            motion_direction = motion_change + conjugate * motion_direction
+        direction_before = direction
+        direction = preconditioned
+        if direction_before is not None and last_square > 0:
+            overlap = float(np.vdot(last_slope, preconditioned))
+            if abs(overlap) <= MAX_SLOPE_OVERLAP * square:
+                conjugate = (square - overlap) / last_square
+                direction = direction + conjugate * np.where(is_moving, direction_before, 0.0)
+                motion_change = motion_change + conjugate * motion_direction
+        motion_direction = motion_change
         last_slope = moving_slope
-        last_square = max(square, np.finfo(float).tiny)
+        last_square = square
 
         # Exact step, cut at the bounds
         direction_displacement = compliance.product(direction)
