@@ -272,26 +272,19 @@ class _Quarter:
         They belong to the Lame constants lambda and mu, to a test function that is not or is differentiated along z, and to
         such a trial function. `along_x` and `along_y` hold the functions of the three displacements.
         """
+        # lambda div v div u + mu (grad v + grad v^T) : grad u, as (modulus, components of v and u, axes of their slopes)
         blocks = np.zeros((2, 2, 2, 3, 3), object)
-
-        def add(modulus: int, components: tuple[int, int], slopes: tuple[int, int]) -> None:
-            """Add the product of a slope of a test component with one of a trial component along two axes."""
-            (test, trial), (test_axis, trial_axis) = components, slopes
-            matrices = []
-            for axis, functions in enumerate((along_x, along_y)):
-                left = functions[test]
-                right = functions[trial].values[int(trial_axis == axis)]
-                weighted = left.values[int(test_axis == axis)] * left.weights[:, None]
-                matrices.append(weighted.T @ right)
-            slot = (modulus, int(test_axis == 2), int(trial_axis == 2), test, trial)
-            blocks[slot] = blocks[slot] + np.kron(*matrices)
-
-        # lambda div v div u + mu (grad v + grad v^T) : grad u
-        for a in range(3):
-            for b in range(3):
-                add(0, (a, b), (a, b))
-                add(1, (a, b), (b, a))
-                add(1, (a, a), (b, b))
+        for a, b in np.ndindex(3, 3):
+            terms = ((0, a, b, a, b), (1, a, b, b, a), (1, a, a, b, b))
+            for modulus, test, trial, test_axis, trial_axis in terms:
+                x_part, y_part = (
+                    functions[test].integrate(
+                        functions[trial], test_axis == axis, trial_axis == axis
+                    )
+                    for axis, functions in enumerate((along_x, along_y))
+                )
+                slot = (modulus, int(test_axis == 2), int(trial_axis == 2), test, trial)
+                blocks[slot] = blocks[slot] + np.kron(x_part, y_part)
         sizes = [n_x * n_y for n_x, n_y in self.shapes]
         out = np.zeros((2, 2, 2, sum(sizes), sum(sizes)))
         starts = np.cumsum([0, *sizes])
@@ -342,11 +335,10 @@ class _Quarter:
         ends = np.repeat(self.depths[sheet : sheet + 2], ORDER + 1)
         functions = _evaluate(BSpline(ends, np.eye(ORDER + 1), ORDER))
         factors = np.tensordot(self.moduli[sheet], in_plane, 1)
-        out = 0.0
-        for test, trial in np.ndindex(2, 2):
-            weighted = functions.values[test] * functions.weights[:, None]
-            out = out + np.kron(weighted.T @ functions.values[trial], factors[test, trial])
-        return out
+        return sum(
+            np.kron(functions.integrate(functions, test, trial), factors[test, trial])
+            for test, trial in np.ndindex(2, 2)
+        )
 
 
 class _Functions(NamedTuple):
@@ -358,6 +350,11 @@ class _Functions(NamedTuple):
 
     values: np.ndarray
     weights: np.ndarray
+
+    def integrate(self, other: "_Functions", slope: int, other_slope: int) -> np.ndarray:
+        """Return the integrals (n, n') of products of functions with others, or of their slopes where these are 1."""
+        weighted = self.values[int(slope)] * self.weights[:, None]
+        return weighted.T @ other.values[int(other_slope)]
 
 
 def _evaluate(spline: BSpline) -> _Functions:
