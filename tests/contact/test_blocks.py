@@ -68,7 +68,7 @@ def compute_stiffnesses(block, active):
     ],
 )
 def test_exact_flat_block_agrees_with_hexahedra(block, count, tolerance):
-    """Hexahedra are stiffer than flat blocks by less than their error, and two levels of the blocks differ by 1e-3 at most."""
+    """Hexahedra are stiffer than flat blocks by less than their error, and two levels differ by 1e-3 at most."""
     shape = BlockShape(block.length, block.width)
     active = np.ones((32, 32), bool)
     coarse, fine = (
@@ -295,7 +295,8 @@ def test_exact_shear_modes_diagonalise_the_compliance(n_modes=6):
 
 
 def test_exact_free_sides_are_cached_on_disk(monkeypatch):
-    """The change by free sides is computed once and then read, also by a new process; a damaged file is replaced."""
+    """The change by free sides is computed once and then read, also by a new process; a damaged file is replaced, and the
+    oldest files are removed beyond a number."""
     shape = BlockShape(9e-3, 8e-3)
     sides.compute_side_change.cache_clear()
     first = sides.compute_side_change(BARE, shape, 0)
@@ -307,7 +308,9 @@ def test_exact_free_sides_are_cached_on_disk(monkeypatch):
     assert np.array_equal(first.shear, again.shear)
 
     folder = sides.user_cache.find_cache_base() / sides.CACHE_FOLDER_NAME
+    monkeypatch.setattr(sides, "MAX_CACHED_BLOCKS", 1)
     for path in folder.glob("*.npz"):
         path.write_bytes(b"PK damaged")
     sides.compute_side_change.cache_clear()
     assert np.array_equal(sides.compute_side_change(BARE, shape, 0).normal, first.normal)
+    assert len(list(folder.glob("*.npz"))) == 1
