@@ -371,14 +371,14 @@ def estimate_errors(
         names = errors.keys() - UNPOOLED_MEASURES
         sizes = {name: find_size(name, fine) for name in names}
         parts = np.array([errors[name] / sizes[name] for name in names])
-        is_changed = (parts > MEASURE_CHANGE_ROUND_OFF) & (parts < 1)
-        squares = np.where(is_changed, parts, 0.0) ** 2
-        pooled = np.sqrt(squares.sum(axis=0) / np.fmax(is_changed.sum(axis=0), 1))
-        for name, part in zip(names, parts):
-            has_error = part > MEASURE_CHANGE_ROUND_OFF
-            errors[name] = errors[name] + POOLED_ERROR * pooled * sizes[name] * has_error
+        is_changed = parts > MEASURE_CHANGE_ROUND_OFF
+        squares = np.where(is_changed & (parts < 1), parts, 0.0) ** 2
+        mean = squares.sum(axis=0) / np.fmax(np.sign(squares).sum(axis=0), 1)
+        pooled = POOLED_ERROR * np.sqrt(mean)
+        added = dict(zip(names, pooled * is_changed))
         for name, error in errors.items():
-            errors[name] = total_error(name, fine, [error], repeat_error)
+            terms = [error, added[name] * sizes[name]] if name in added else [error]
+            errors[name] = total_error(name, fine, terms, repeat_error)
     return errors
 
 
@@ -518,7 +518,6 @@ def make_results(
         results.warnings[case] = [describe_ringing(ratio, limits, refined.march.extremes.shape[1])]
 
     # The steady amplitude is a measure if the motion still changes.
-    is_transient = results.outcome == str(Outcome.TRANSIENT)
     with np.errstate(invalid="ignore"):
         values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
             steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
@@ -535,20 +534,16 @@ def make_results(
             results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
             results.floors[name] = np.where(is_known, find_floor(name, values, scales), np.nan)
 
-    unresolved = np.flatnonzero(is_transient & np.isnan(values[STEADY_AMPLITUDE]))
-    _put_reason(results, STEADY_AMPLITUDE, unresolved, CHANGE_NOT_RESOLVED_REASON)
+    is_unresolved = np.isnan(values[STEADY_AMPLITUDE])
+    is_unresolved &= results.outcome == str(Outcome.TRANSIENT)
+    _put_reason(results, STEADY_AMPLITUDE, is_unresolved, CHANGE_NOT_RESOLVED_REASON)
 
     # The secant stiffness of a rigid stick is infinite at a reversal.
     first = models[0]
     if first.sticks_rigidly:
-        sticks = (
-            values["stick_fraction"]
-            > MOTION_TABLE["stick_fraction"].floor + errors["stick_fraction"]
-        )
-        moves = values[AMPLITUDE] > 0
-        _put_reason(
-            results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
-        )
+        least = MOTION_TABLE["stick_fraction"].floor + errors["stick_fraction"]
+        is_infinite = (values["stick_fraction"] > least) & (values[AMPLITUDE] > 0)
+        _put_reason(results, SECANT_STIFFNESS, is_infinite, STICKS_AT_REVERSAL_REASON)
 
     # Measures that a case lacks get the reasons that a single run states.
     drive = first.rig.drive.signal
@@ -564,18 +559,18 @@ def make_results(
     return results
 
 
-def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
+def _put_reason(results: CaseResults, name: str, is_missing: np.ndarray, reason: str) -> None:
     """Replace values of a measure by the reason why they are missing.
 
-    `name` is that of the measure, and `cases` are the indices of the cases. `results` is changed.
+    `name` is that of the measure, and `is_missing` (n,) is a mask of the cases. `results` is changed.
     """
-    if not cases.size:
+    if not is_missing.any():
         return
     results.add_measure(name, MOTION_TABLE[name].unit)
-    for column in (results.values[name], results.errors[name]):
-        column[cases] = np.nan
-    results.floors[name][cases] = MOTION_TABLE[name].floor
-    results.reasons.setdefault(name, {}).update(dict.fromkeys(cases.tolist(), reason))
+    results.values[name][is_missing] = results.errors[name][is_missing] = np.nan
+    results.floors[name][is_missing] = MOTION_TABLE[name].floor
+    cases = np.flatnonzero(is_missing).tolist()
+    results.reasons.setdefault(name, {}).update(dict.fromkeys(cases, reason))
 
 
 def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
@@ -666,8 +661,7 @@ def needs_single_run(
     results : CaseResults
         Results of the march.
     """
-    march = refined.march
-    values = march.values
+    values = refined.march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
