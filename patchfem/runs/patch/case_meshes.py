@@ -2,7 +2,7 @@
 
 In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
 together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
-are divided by the size of their contacts, and each part gets meshes that are graded to its own contacts. A case
+are divided by the ends of their contacts, and each part gets meshes that are graded to its own contacts. A case
 that is alone has the meshes of a single run, which ends with its tolerance or with the limit of the mesh.
 """
 
@@ -64,6 +64,13 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
     x = pressed.x
     crossings = x[edges.node] + edges.fraction * (x[edges.node + edges.side] - x[edges.node])
     return ContactPlaces(pressed.active[:, 0], np.where(edges.exists, crossings, np.nan))
+
+
+def find_outer_nodes(pressed: PressedCases) -> np.ndarray:
+    """Return the positions (n, 2) [m] of the first and the last node in contact."""
+    active = pressed.active
+    last = active.shape[1] - 1 - active[:, ::-1].argmax(axis=1)
+    return pressed.x[np.stack([active.argmax(axis=1), last], axis=1)]
 
 
 def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
@@ -137,7 +144,9 @@ class _CaseSolver:
         self.cases = cases
         self.tolerance = tolerance
         self.batch = Batch.blank(cases.n_cases)
-        self.areas = np.zeros(cases.n_cases)  # areas of the nodes in contact [m2]
+        self.ends = np.zeros(
+            (cases.n_cases, 2)
+        )  # positions [m] of the first and last node in contact
 
     def solve(self, numbers: np.ndarray) -> None:
         """Solve some cases (k,) on common meshes, and those that miss the tolerance on meshes of their own."""
@@ -146,8 +155,12 @@ class _CaseSolver:
                 self.solve_alone(number)
             return
         missing = self._solve_together(numbers)
-        order = missing[np.argsort(self.areas[missing], kind="stable")]
-        for part in np.array_split(order, 2):
+        if not missing.size:
+            return
+        # Cases whose contacts end at similar places get common meshes: the ends that differ most are sorted
+        ends = self.ends[missing]
+        side = np.ptp(ends, axis=0).argmax()
+        for part in np.array_split(missing[np.argsort(ends[:, side], kind="stable")], 2):
             self.solve(part)
 
     def solve_alone(self, number: int) -> None:
@@ -248,7 +261,7 @@ class _CaseSolver:
             pressed, errors = press_on_level(level, cases, start)
             values.append(collect_mesh_values(pressed))
             found_places.append(find_contact_places(pressed))
-            self.areas[numbers[rows]] = pressed.active @ level.strip.weight
+            self.ends[numbers[rows]] = find_outer_nodes(pressed)
             if is_judged:
                 own = [*(mesh.take(rows) for mesh in series), values[-1]]
                 is_missing[rows] = self._keep_measures(numbers[rows], pressed, own, errors)

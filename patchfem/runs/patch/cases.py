@@ -7,7 +7,6 @@ alone in its group is a single run.
 Letters of array shapes: n cases, p gap shapes, m interface nodes.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple
@@ -157,20 +156,6 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
         holders,
         fill(patch_model.gap.angle),
         np.array([fill(value) for value in amplitudes]).reshape(len(amplitudes), count).T,
-        half_steps,
-    )
-
-
-def stack_patches(patches: Sequence[PatchModel]) -> Cases:
-    """Return the cases of patch models with the same pieces, layer, mesh settings and kinds of shapes."""
-    parts = [make_cases(patch, 1) for patch in patches]
-    half_steps = None
-    if parts[0].half_steps is not None:
-        half_steps = np.concatenate([part.half_steps for part in parts])
-    return Cases(
-        HolderCases(*map(np.concatenate, zip(*(part.holders for part in parts)))),
-        np.concatenate([part.rotation for part in parts]),
-        np.concatenate([part.amplitudes for part in parts]),
         half_steps,
     )
 
