@@ -112,6 +112,14 @@ def _pack(law: Law, numbers, memory, load, stiffness=0.0, viscosity=0.0) -> Poin
     return PointLaw(law, rows[:first], rows[first:-3], *rows[-3:])
 
 
+def _limit_below(compliance):
+    """Return the compliances (m,) [m/N] of points, at least MIN_COMPLIANCE times the largest one.
+
+    A nearly rigid point would make Newton's method lose digits.
+    """
+    return np.maximum(compliance, MIN_COMPLIANCE * np.max(compliance))
+
+
 def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
     """Return points of a spring and a slider each.
 
@@ -189,7 +197,8 @@ def make_tanh(law, load, compliance=0.0) -> PointLaw:
     load = np.asarray(load, float)
     if np.any(compliance):
         # In a series of both, the spring limits the force of fast motions.
-        stiffness = 1 / np.maximum(compliance, MIN_COMPLIANCE * np.max(compliance))
+        compliance = _limit_below(compliance)
+        stiffness = 1 / compliance
         viscosity = 0.0
     else:
         stiffness = 0.0
@@ -204,7 +213,12 @@ def make_coulomb(law, load, compliance=0.0) -> PointLaw:
     A compliance [m/N] of a point makes it elastic-plastic, with a stiffness that does not follow the load.
     """
     if np.any(compliance):
-        return make_cells(law.static, law.static * load * compliance, load, is_fixed=True)
+        # The stiffness 1/compliance is that of the springs of a reference load, also at points that have no load yet.
+        reference = np.max(load)
+        length = law.static * reference * _limit_below(compliance)
+        stiffness = law.static * reference / length
+        numbers = (law.static, length, 1.0)
+        return _pack(Law.CELLS, numbers, (0.0, reference), load, stiffness)
     return _pack(Law.COULOMB, (law.static, law.kinetic), (0.0,), load)
 
 

@@ -168,20 +168,26 @@ def _find_redundant(rows, contact) -> np.ndarray:
     return redundant * is_rigid
 
 
+def find_stiffness(point_set) -> float:
+    """Return the stiffness [N/m] of points at rest, in series with the shear of their pieces; 0 for rigid points."""
+    law = point_set.law
+    if point_set.shear is None:
+        return float(law.stiffness.sum())
+    # 1^T (D^-1 + S K^-1 S^T)^-1 1 for the stiffnesses D of the points and K of the coordinates of shapes S
+    is_stiff = law.stiffness > 0
+    shape = np.asarray(point_set.shear.shape)[is_stiff]
+    compliance = np.diag(1 / law.stiffness[is_stiff])
+    compliance += (shape / point_set.shear.stiffness) @ shape.T
+    return float(np.linalg.solve(compliance, np.ones(len(shape))).sum())
+
+
 def _make_port_values(contact, n_ports: int) -> np.ndarray:
     """Return the rows of the ports, with stiffness and viscosity of their points at rest in series with the pieces."""
     values = np.zeros((len(Port), n_ports))
     for p, point_set in enumerate(contact.point_sets):
         law = point_set.law
         values[Port.VISCOSITY, p] = law.viscosity.sum()
-        values[Port.STIFFNESS, p] = law.stiffness.sum()
-        if point_set.shear is not None:
-            # 1^T (D^-1 + S K^-1 S^T)^-1 1 for the stiffnesses D of the points and K of the coordinates of shapes S
-            is_stiff = law.stiffness > 0
-            shape = np.asarray(point_set.shear.shape)[is_stiff]
-            compliance = np.diag(1 / law.stiffness[is_stiff])
-            compliance += (shape / point_set.shear.stiffness) @ shape.T
-            values[Port.STIFFNESS, p] = np.linalg.solve(compliance, np.ones(len(shape))).sum()
+        values[Port.STIFFNESS, p] = find_stiffness(point_set)
     return values
 
 

@@ -14,15 +14,21 @@ import numpy as np
 from ... import friction, slip
 from ...contact import contact_sets
 from ...contact.stiffness import tangential_stiffness
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_takes_stiffness_or_length
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import laws
 from ...time_steps.contacts import Contact, PointSet
+from ...time_steps.systems import find_stiffness
 from ..bench import shear
 from ..patch import faces
 from . import bond_lists, joints
+
+# Largest number of shear modes, and that of laws whose points have the compliance of the modes left out: for Coulomb's law
+# the loop area then has an error of 5e-4
+MAX_SOFT_MODES = 64
+MAX_MODES = 16
 
 
 class Surface(NamedTuple):
@@ -149,11 +155,12 @@ def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
             return [Surface(keys, total, force, compliance, rows[0])]
         # The strips are not coupled: each has its fraction of the width, and so a larger compliance.
         forces = patch.state.force
-        compliance = None if compliance is None else compliance * len(forces)
-        return [
-            Surface(keys, total, force, compliance, rows[k if is_apart else 0])
-            for k, force in enumerate(forces)
-        ]
+        if compliance is not None:
+            compliance = compliance * len(forces)
+        if not is_apart:
+            together = np.kron(np.eye(len(forces)), compliance)
+            return [Surface(keys, total, forces.ravel(), together, rows[0])]
+        return [Surface(keys, total, force, compliance, row) for force, row in zip(forces, rows)]
 
     surfaces = []
     for k, interface in enumerate(rig.friction.interfaces):
@@ -194,9 +201,9 @@ def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> Po
         has_nodes = moves and not law_has_trait(keys.law, "memoryless")
         if not has_nodes:
             load = model.point.evaluate(np.zeros(1)) if model.load_varies else surface.force.sum()
-            return PointSet(laws.make_point_law(keys.law, law, load), surface.row)
+            return PointSet(_make_law_points(surface, law, surface.force.sum(), load), surface.row)
         nodes = np.arange(surface.force.size)
-        points = laws.make_point_law(keys.law, law, surface.force)
+        points = _make_law_points(surface, law, surface.force, surface.force)
         return PointSet(points, surface.row, nodes)
 
     # The shear modes of nodes that may be pressed later are weighted with an added pressure.
@@ -206,14 +213,51 @@ def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> Po
         weight = force + shear.ADDED_WEIGHT_PRESSURE_FRACTION * force.mean()
     length = getattr(law, "length", None) or 0.0
     fall = shear.find_steepest_fall(law) if law_has_trait(keys.law, "bonds") else 0.0
-    modes = _choose_modes(model, numerics, surface.compliance, keys.static * weight, length, fall)
+    limit = keys.static * weight
+    most = MAX_MODES if keys.law in laws.STIFF_LAWS else MAX_SOFT_MODES
+    modes = _choose_modes(model, numerics, surface.compliance, limit, _Softness(length, fall, most))
     own = surface.compliance[np.ix_(modes.points, modes.points)]
     neglected = np.diag(own) - (modes.shape**2 / modes.stiffness).sum(axis=1)
-    points = laws.make_point_law(keys.law, law, force[modes.points], np.maximum(neglected, 0.0))
+    force = force[modes.points]
+    points = _make_law_points(surface, law, force, force, np.maximum(neglected, 0.0))
     return PointSet(points, surface.row, modes.points if moves else None, modes)
 
 
-def _choose_modes(model: Model, numerics, compliance, limit, length: float, fall: float):
+class _Softness(NamedTuple):
+    """Properties of a law that decide how many shear modes it needs.
+
+    - length: displacement over which the force grows to its limit [m], 0 for rigid friction
+    - fall: steepest fall of the friction force over the slip, relative to its limit [1/m]
+    - max_modes: largest number of modes
+    """
+
+    length: float
+    fall: float
+    max_modes: int
+
+
+def _make_law_points(surface: Surface, law, mean, load, compliance=0.0) -> laws.PointLaw:
+    """Return points with the law of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+        Interface or strip; a stiffness in its keys is that under the mean load, and does not follow a load that changes.
+    law : friction law
+        Law of the keys.
+    mean, load : float or (m,) array
+        Mean loads of the points, and their loads at the start [N].
+    compliance : float or (m,) array
+        Compliance of the shear modes left out [m/N].
+    """
+    keys = surface.keys
+    if keys.stiffness and law_takes_stiffness_or_length(keys.law):
+        points = laws.make_cells(law.static, law.length, mean, is_fixed=True)
+        return points._replace(load=np.broadcast_to(load, points.load.shape))
+    return laws.make_point_law(keys.law, law, load, compliance)
+
+
+def _choose_modes(model: Model, numerics, compliance, limit, softness: _Softness):
     """Return the shear modes of the pieces; their number is that of the numerics, the scene, or by the tolerance.
 
     Parameters
@@ -226,15 +270,14 @@ def _choose_modes(model: Model, numerics, compliance, limit, length: float, fall
         Shear compliance of the nodes [m/N].
     limit : (m,) array
         Friction limits [N].
-    length : float
-        Length of the law [m].
-    fall : float
-        Steepest fall of the friction force over the slip, relative to its limit [1/m].
+    softness : _Softness
+        Properties of the law.
     """
     count = numerics.shear_modes or model.accuracy.shear_modes
     if count is not None:
-        return slip.shear_modes.shear_modes(compliance, limit, count, fall)
+        return slip.shear_modes.shear_modes(compliance, limit, count, softness.fall)
     # Rigid friction is replaced by a short length, as its number of modes would have no bound.
+    length = softness.length
     if not length:
         slide = limit.sum() / tangential_stiffness(compliance, limit > 0)
         length = shear.MIN_BOND_LENGTH_RATIO * slide
@@ -244,20 +287,12 @@ def _choose_modes(model: Model, numerics, compliance, limit, length: float, fall
         length,
         slip.shear_modes.N_SHEAR_MODES,
         shear.SHEAR_MODES_ERROR_RATIO * model.accuracy.tolerance,
-        fall,
+        softness.fall,
+        softness.max_modes,
     )
 
 
 def _find_length(point_set: PointSet) -> float:
     """Return the displacement [m] over which the first interface stretches before it slips; 0 for a rigid one."""
-    law = point_set.law
-    stiffness = law.stiffness.sum()
-    if not stiffness:
-        return 0.0
-    length = float(law.limits.sum() / stiffness)
-    if point_set.shear is None:
-        return length
-    # Few modes have no inverse compliance. This is the mean displacement of the pieces under the friction limits.
-    shear = point_set.shear
-    bends = (law.limits @ shear.shape) ** 2 / shear.stiffness
-    return length + float(bends.sum() / law.limits.sum())
+    stiffness = find_stiffness(point_set)
+    return float(point_set.law.limits.sum() / stiffness) if stiffness else 0.0
