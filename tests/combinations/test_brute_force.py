@@ -46,6 +46,7 @@ LAWS = {
     "coulomb": "",
     "tanh": 'reference_speed = "5 mm/s"\n',
     "elastic-plastic": 'bond_length = "1 um"\n',
+    "stiffness": f'stiffness = "{STIFFNESS} N/m"\n',
     "nonlocal": 'bond_length = "1 um"\n',
     "iwan": f'stiffness = "{STIFFNESS} N/m"\nchi = -0.5\nbeta = 0.5\n',
     "bouc-wen": f'stiffness = "{STIFFNESS} N/m"\nexponent = 2.0\n',
@@ -57,7 +58,7 @@ LAWS = {
 
 def write_law(name: str) -> str:
     """Return the table of a friction law."""
-    law = {"dahl": "lugre"}.get(name, name)
+    law = {"dahl": "lugre", "stiffness": "elastic-plastic"}.get(name, name)
     return f'[friction]\nlaw = "{law}"\nstatic = {STATIC}\n{LAWS[name]}'
 
 
@@ -171,17 +172,29 @@ def test_tanh_rig_agrees_with_solve_ivp():
     assert found.values["relative_displacement_amplitude"] == pytest.approx(np.ptp(x) / 2, rel=2e-4)
 
 
-# Combinations that release 2.1 computes: name -> (scene without its law, steps per cycle, laws)
+# Combinations that run: name -> (scene without its law, steps per cycle, laws)
 SUPPORTED = {
     "rig": (POINT + "{}" + RIG, 2000, ("coulomb", "elastic-plastic", "iwan", "bouc-wen", "lugre")),
-    "load": (POINT + AMPLITUDE_OF_LOAD + "{}" + RIG, 2000, ("coulomb", "tanh", "nonlocal")),
+    "load": (
+        POINT + AMPLITUDE_OF_LOAD + "{}" + RIG,
+        8000,
+        ("coulomb", "tanh", "nonlocal", "stiffness", "iwan", "bouc-wen", "lugre"),
+    ),
     "load and cubic spring": (
         POINT + AMPLITUDE_OF_LOAD + "{}" + RIG.replace("[drive]", CUBIC),
         2000,
         ("elastic-plastic", "nonlocal", "coulomb"),
     ),
-    "shear": (PATCH + SHEAR + "{}" + RIG, 400, ("coulomb", "elastic-plastic", "nonlocal")),
-    "pitch": (PATCH + "{}" + PITCH, 400, ("coulomb", "tanh", "nonlocal")),
+    "shear": (
+        PATCH + SHEAR + "{}" + RIG,
+        400,
+        ("coulomb", "elastic-plastic", "nonlocal", "tanh", "iwan", "bouc-wen", "lugre"),
+    ),
+    "pitch": (
+        PATCH + "{}" + PITCH,
+        400,
+        ("coulomb", "tanh", "nonlocal", "stiffness", "iwan", "lugre"),
+    ),
     "pitch and shear": (PATCH + SHEAR + "{}" + PITCH, 400, ("elastic-plastic", "nonlocal")),
     "grooves": (POINT + GROOVES.format("normal") + "{}" + RIG, 2000, ("tanh", "elastic-plastic")),
     "grooves and cubic spring": (

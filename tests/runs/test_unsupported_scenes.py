@@ -79,7 +79,7 @@ REFUSALS = [
         "friction.stiffness: .*exclude each other",
     ),
     (
-        COULOMB_RIG,
+        BENCH,
         "friction.law=elastic-plastic; friction.stiffness=7e6 N/m; normal.amplitude=3 N; normal.frequency=50 Hz",
         "friction.stiffness: .*give bond_length in",
     ),
@@ -211,11 +211,6 @@ REFUSALS = [
     ),
     (
         STRIPS_RIG,
-        BONDS + "contact.shear={}",
-        r"contact\.strips: not supported yet with \[contact\.shear\]; leave one of the two out",
-    ),
-    (
-        STRIPS_RIG,
         "contact.shear={}; friction.kinetic=0.2",
         r"friction\.kinetic: 0\.2 below static = 0\.3 with \[contact\.shear\]",
     ),
@@ -298,11 +293,6 @@ REFUSALS = [
         CHAIN,
         f"{FACE}crown.radius=2 m; {FACE}crown.on=lower",
         "put the shapes on the upper piece",
-    ),
-    (
-        CHAIN,
-        "structure.interface.0.law=nonlocal; structure.interface.0.bond_length=1 um",
-        "or use law 'coulomb' or 'elastic-plastic'",
     ),
     (
         CHAIN,

@@ -57,7 +57,8 @@ def test_refuses_combination_without_meaning(text, sets, key, says):
 
 def test_refuses_unsupported_keys_at_their_lines():
     """Unsupported keys in a file are refused at their lines."""
-    text = RIG.replace("[friction]", "[contact.strips]\ncount = 4\n[contact.shear]\n[friction]")
+    patch = '[contact.strips]\ncount = 4\n[contact.shear]\n[contact.holder]\ntangential_stiffness = "1e7 N/m"\n'
+    text = RIG.replace("[friction]", f"{patch}[friction]")
     text += '[accuracy]\nmethod = "exact"\n'
     assert list_mistakes(text) == [
         f"a.toml:{find_line(text, '[contact.strips]')}: contact.strips: not supported yet with [contact.shear]; leave "

@@ -14,7 +14,7 @@ import numpy as np
 from ... import friction, slip
 from ...contact import contact_sets
 from ...contact.stiffness import tangential_stiffness
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_takes_stiffness_or_length
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...structure.drive_sizes import find_drive_omega
@@ -201,9 +201,9 @@ def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> Po
         has_nodes = moves and not law_has_trait(keys.law, "memoryless")
         if not has_nodes:
             load = model.point.evaluate(np.zeros(1)) if model.load_varies else surface.force.sum()
-            return PointSet(laws.make_point_law(keys.law, law, load), surface.row)
+            return PointSet(_make_law_points(surface, law, surface.force.sum(), load), surface.row)
         nodes = np.arange(surface.force.size)
-        points = laws.make_point_law(keys.law, law, surface.force)
+        points = _make_law_points(surface, law, surface.force, surface.force)
         return PointSet(points, surface.row, nodes)
 
     # The shear modes of nodes that may be pressed later are weighted with an added pressure.
@@ -218,7 +218,8 @@ def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> Po
     modes = _choose_modes(model, numerics, surface.compliance, limit, _Softness(length, fall, most))
     own = surface.compliance[np.ix_(modes.points, modes.points)]
     neglected = np.diag(own) - (modes.shape**2 / modes.stiffness).sum(axis=1)
-    points = laws.make_point_law(keys.law, law, force[modes.points], np.maximum(neglected, 0.0))
+    force = force[modes.points]
+    points = _make_law_points(surface, law, force, force, np.maximum(neglected, 0.0))
     return PointSet(points, surface.row, modes.points if moves else None, modes)
 
 
@@ -233,6 +234,27 @@ class _Softness(NamedTuple):
     length: float
     fall: float
     max_modes: int
+
+
+def _make_law_points(surface: Surface, law, mean, load, compliance=0.0) -> laws.PointLaw:
+    """Return points with the law of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+        Interface or strip; a stiffness in its keys is that under the mean load, and does not follow a load that changes.
+    law : friction law
+        Law of the keys.
+    mean, load : float or (m,) array
+        Mean loads of the points, and their loads at the start [N].
+    compliance : float or (m,) array
+        Compliance of the shear modes left out [m/N].
+    """
+    keys = surface.keys
+    if keys.stiffness and law_takes_stiffness_or_length(keys.law):
+        points = laws.make_cells(law.static, law.length, mean, is_fixed=True)
+        return points._replace(load=np.broadcast_to(load, points.load.shape))
+    return laws.make_point_law(keys.law, law, load, compliance)
 
 
 def _choose_modes(model: Model, numerics, compliance, limit, softness: _Softness):

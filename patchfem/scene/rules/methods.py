@@ -10,6 +10,7 @@ from ...effects import (
     has_return_map,
     law_has_trait,
     law_supports,
+    law_takes_stiffness_or_length,
     needs_bond_list,
     suggest_laws,
 )
@@ -178,7 +179,9 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if joint.compliance:
         return _has_elements(joint)
     if motion.load_change:
-        return law in VARYING_LAWS
+        # Regimes of the elastic-plastic law have springs that come and go with the load.
+        is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
+        return law in VARYING_LAWS and not is_fixed
     if law_has_trait(law, "bonds"):
         return not (needs_bond_list(joint.law) or motion.lower_shape)
     return True

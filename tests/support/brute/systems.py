@@ -242,7 +242,9 @@ def _make_points(tables: dict, time) -> tuple[Points, Loads]:
     numbers = np.concatenate([np.tile(part.numbers, (part.loads.size, 1)) for part in parts])
     limits = np.concatenate([part.limits for part in parts])
     point_loads = _make_loads(tables, time, values, parts[0])
-    values = point_loads.values[0]
+    # The springs of a given stiffness are those under the mean load.
+    is_fixed = (kind == CELLS) & (numbers[:, 1] > 0)
+    values = np.where(is_fixed, values, point_loads.values[0])
     is_cell = (kind == CELLS) | (kind == BOUC_WEN)
     for k in range(n_cells):
         memory[is_cell, 2 * k + 1] = values[is_cell]
