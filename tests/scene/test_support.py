@@ -14,7 +14,6 @@ from patchfem.scene.scene import SceneError
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 IWAN = "{law}.law=iwan {law}.stiffness=1e7_N/m {law}.chi=-0.5 {law}.beta=0.5"
-TANH = "{law}.law=tanh {law}.reference_speed=1_mm/s"
 BONDS = "{law}.law=nonlocal {law}.bond_length=1_um"
 GROOVES = "{load}.grooves.wavelength=80_um {load}.grooves.amplitude=1_um"
 OWN_PATCH = "{patch}.length=10_mm {patch}.width=10_mm {patch}.height=5_mm {patch}.load=60_N {patch}.substrate=steel"
@@ -33,16 +32,13 @@ SETS = {
     "grooves": GROOVES,
     "interface": "",
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
-    "law for a constant load": IWAN,
     "law for flat faces": IWAN,
     "law for one interface": "{law}.law=convolution {law}.bond_length=1_um",
     "law for rigid pieces": IWAN,
     "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
-    "law that sticks rigidly": "{law}.law=coulomb",
     "law with memory for a constant pressure": IWAN,
     "law with memory but without bonds": "{law}.law=elastic-plastic",
     "law without bonds": "{law}.law=coulomb",
-    "law without elements": TANH,
     "levels or sweep in time": "drive.waveform=levels drive.levels=['1_g','2_g']",
     "load on a point": "",
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
@@ -91,6 +87,8 @@ SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
+    "law for rigid pieces, partial slip, grooves": "{law}.law=tanh {law}.reference_speed=1_mm/s",
+    "patch.strips, strips that slip together, partial slip": "{patch}.holder.tangential_stiffness=1e7_N/m",
     "structure.measured=stuck, mode with yaw": "{patch}.strips.count=4",
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
@@ -132,7 +130,7 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
         return SINGLE + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if "patches of interfaces" in features:
         return FILE + FORCED, words | {"patch": "structure.interface.0.contact"}
-    if features & (MASS_FEATURES | {"patch of an interface", "law without elements"}):
+    if features & (MASS_FEATURES | {"patch of an interface"}):
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if "structure.masses" in features:
@@ -178,8 +176,6 @@ def test_refuses_each_row_of_support(names, instead):
 OVERLAPS = [
     ("patch.strips, law of an averaged pressure, partial slip", "contact.strips", "leave out this entry"),
     ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
-    ("law for one interface, several interfaces, partial slip", "structure.interface[1].law",
-     "leave out [structure.interface.contact.shear], or use law 'coulomb' or 'elastic-plastic'"),
     ("wear, patch.strips, shape on the lower piece, wear.start", "wear", "leave out [wear] or leave out wear.start"),
 ]  # fmt: skip
 

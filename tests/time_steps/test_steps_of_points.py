@@ -45,7 +45,10 @@ def make_points(name, row, load=LOADS, with_shear=True):
     length = laws.make_cells(STATIC, LENGTH, load if with_shear else load.sum())
     if not with_shear:
         return PointSet(
-            length if name == "elastic-plastic" else laws.make_point_law(name, LAWS[name], load.sum()), row
+            length
+            if name == "elastic-plastic"
+            else laws.make_point_law(name, LAWS[name], load.sum()),
+            row,
         )
     compliance = make_compliance()
     modes = shear_modes.shear_modes(compliance, STATIC * load, load.size - 1)

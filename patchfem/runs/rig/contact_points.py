@@ -25,7 +25,6 @@ from ..bench import shear
 from ..patch import faces
 from . import bond_lists, joints
 
-
 # Largest number of shear modes, and that of laws whose points have the compliance of the modes left out: for Coulomb's law
 # the loop area then has an error of 5e-4
 MAX_SOFT_MODES = 64
