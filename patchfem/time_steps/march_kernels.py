@@ -708,17 +708,22 @@ def return_ports(system):
 
 
 @njit(**NJIT_CALL)
-def gains_energy(system):
-    """Return whether rigid friction gained energy in the trial step, in which a port was reversed."""
+def has_event(system):
+    """Return whether a rigid port stops, is reversed or begins to slip in the trial step."""
     points = system.points
     moves = system.ports.values
     for block in range(points.law.size):
         if points.law[block] != Law.COULOMB:
             continue
         p = points.port[block]
-        force = moves[Port.FORCE, p]
-        round_off = RESIDUAL * abs(force * moves[Port.SLIDE, p])
-        if force * points.values[block, Value.SLIDE] < -round_off:
+        first = points.values[block, Value.START_VELOCITY]
+        is_held = points.values[block, Value.STRETCH] > 0
+        if is_held != (first == 0.0) or first * moves[Port.END_VELOCITY, p] < 0:
+            return True
+        # The force that holds a port at the end of the step follows from the means of the last two steps.
+        hold = 1.5 * moves[Port.FORCE, p] - 0.5 * moves[Port.LAST, p]
+        limit = points.numbers[block, 0] * points.values[block, Value.END_LOAD]
+        if is_held and abs(hold) > limit:
             return True
     return False
 
@@ -741,7 +746,7 @@ def commit(system, duration):
             is_any_rigid = True
             limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
             v = moves[Port.END_VELOCITY, p]
-            values[Value.VELOCITY] = v
+            values[Value.VELOCITY] = 0.0 if values[Value.STRETCH] > 0 else v
             values[Value.END] = limit * np.sign(v if v != 0 else values[Value.SLIDE])
         n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
         for j in range(n_lanes):
@@ -902,7 +907,7 @@ def try_step(system, level, row, begin, end, drive):
     Returns
     -------
     bool
-        False if Newton's method failed or rigid friction gained energy, and the step can be halved. Then the motion has
+        False if Newton's method failed or rigid friction jumps, and the step can be halved. Then the motion has
         not advanced. True after a step, and also if no contact set was found, in which case the counter
         `PRESENT_SLOT_INDEX` is -1.
     """
@@ -932,9 +937,9 @@ def try_step(system, level, row, begin, end, drive):
         find_loads(system, row, end, False)
     is_solved = solve_forces(system, level, step)
 
-    # A step without a solution, or with a gain of energy, is halved.
+    # A step without a solution, or in which rigid friction jumps, is halved.
     can_halve = level < system.structure.responses.shape[0] - 1
-    if can_halve and (not is_solved or gains_energy(system)):
+    if can_halve and (not is_solved or has_event(system)):
         return False
     if not is_solved:
         system.totals[Total.UNSOLVED] += 1

@@ -61,6 +61,8 @@ def test_refuses_unsupported_keys_at_their_lines():
     text = RIG.replace("[friction]", f"{patch}[friction]")
     text += '[accuracy]\nmethod = "exact"\n'
     assert list_mistakes(text) == [
+        f"a.toml:{find_line(text, '[contact.strips]')}: contact.strips: not supported yet with [contact.shear]; leave "
+        "one of the two out",
         f"a.toml:{find_line(text, 'method')}: accuracy.method: the motion cannot be computed from event to event for "
         "law 'nonlocal' with [contact.shear]; use 'march' or leave `method` out",
     ]

@@ -82,27 +82,40 @@ def make_contact(model: Model, numerics, patch) -> Contact:
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
+            if model.grooves is not None:
+                # The points carry the normal force on the flank.
+                climb = float(np.hypot(1.0, model.grooves.slope(0.0)))
+                surfaces = [part._replace(force=climb * part.force) for part in surfaces]
             sets = [
                 _make_points(model, numerics, part, moves="sets" in fields) for part in surfaces
             ]
 
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
+    if model.grooves is not None:
+        limit = model.grooves.max_force(fields["preload"], model.friction.static)
     length = _find_length(sets[0]) if sets else 0.0
     return Contact([*sets, *springs], limit or scale, length, **fields)
 
 
 def _needs_lists(model: Model, numerics) -> bool:
-    """Return whether a model has a list of bonds, grooves or a shape on the lower piece."""
+    """Return whether a model has a list of bonds, or a shape on the lower piece."""
     if model.friction is None:
         return False
     has_bonds = law_has_trait(model.friction.law, "bonds")
     has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
-    return has_list or model.grooves is not None or model.side == "lower"
+    return has_list or model.side == "lower"
 
 
 def _find_load(model: Model, patch) -> dict:
     """Return the fields of a Contact that describe a load that changes."""
+    if model.grooves is not None:
+        # The lifted mass is compared to the modal mass at the interface, m / (s . s).
+        modes = model.rig.modes
+        mass = modes.mass / float(modes.slide @ modes.slide)
+        model.grooves.check_lifted_mass(model.friction.static, mass)
+        load = model.point.load if patch is None else float(patch.pressure.load)
+        return {"grooves": model.grooves, "preload": load}
     if model.load_varies:
         return {
             "load": model.point.evaluate,
