@@ -10,9 +10,7 @@ from ..friction.laws.iwan import slider_cells
 from .step_rows_kernels import VECTOR, WIDTH, Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
-MIN_COMPLIANCE = (
-    1e-6  # smallest compliance of a point, relative to the largest one, in the stiffness of all
-)
+MIN_COMPLIANCE = 1e-2  # smallest compliance of modes left out at a point, relative to the largest
 # Cells of an Iwan model; the force of first loading is exact to 6e-5 of the friction limit for chi >= -0.5
 N_CELLS = 96
 NO_GROWTH = (-1.0, 0.0, 0.0, 0.0, 0.0)  # growth numbers of bonds of constant length

@@ -32,6 +32,10 @@ NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
     "pieces that are rigid in shear; run the scene in time instead"
 )
+NO_SOFT_LOOP = (
+    "a patch that slips part by part has a steady loop only under law 'coulomb' or 'elastic-plastic'; run the scene in "
+    "time instead"
+)
 MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
@@ -341,7 +345,12 @@ def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
     """
     rig = model.rig
     joints = list_joints(model, patch, numerics.meshed)
-    for joint in joints:
+    is_soft = [model.partial_slip] * len(joints)
+    if patch is None:
+        is_soft = [interface.partial_slip for interface in rig.friction.interfaces]
+    for joint, soft in zip(joints, is_soft):
+        if soft and joint.stiffness is None:
+            raise PatchfemError(NO_SOFT_LOOP)
         has_bonds = joint.stiffness is None and law_has_trait(joint.law.law, "bonds")
         if has_bonds and joint.law.rest_growth is not None:
             raise PatchfemError(NO_STEADY_LOOP)

@@ -189,11 +189,13 @@ class Joint(TableFacts):
     def can_slip_in_strips(self) -> bool:
         """Whether partial slip is supported in each strip separately.
 
-        That needs the shear of the pieces, and no spring that couples the strips.
+        That needs the shear of the pieces, no spring that couples the strips, no list of bonds and no shape on the lower
+        piece.
         """
         patch = self.contact
         is_coupled = patch.asperities.tangential_ratio or patch.holder.tangential_stiffness
-        return bool(self.kind == "rig" and patch.shear and not is_coupled)
+        is_like_points = not (self.needs_list or self.lower_shape)
+        return bool(self.kind == "rig" and patch.shear and is_like_points and not is_coupled)
 
     @property
     def is_read(self) -> bool:
