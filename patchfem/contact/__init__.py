@@ -5,42 +5,49 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
     w = g + theta x - delta + C f >= 0,    f >= 0,    f . w = 0.
 
-`gaps` has the shapes of the surfaces. `press.press_strips` presses one or more strips side by side, bare or with
-asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves by the methods of `active_set` and, if they fail,
-of `conjugate_gradients`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
-of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
+`gaps` has the shapes of the surfaces. `press_cases` presses many cases of a pair of pieces on a table of contact sets
+(`set_table`), from which `edges` derives where the contacts end. `press.press_strips` presses one or more strips side by
+side, bare or with asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves a patch as a single case, strips by
+the methods of `active_set` and, if these fail, of `bounded`, and checks the solution; `strip_compliance` holds C. Read
+`gaps`, `set_table`, `press_cases` and `press` first.
 
-`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`), and
-`half_space` serves rows of thousands of points.
+`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
+
+Faces that vary along both axes, and rows of thousands of points, are divided into equal cells: `waves` has the closed
+forms of layers, `cells` the compliance of the cells of two blocks, `bounded` the solver, `press_cells` the contact and
+`row_edges` the edges of a row. Read `cells` first.
 """
 
 # Names that other folders use, by module
 PUBLIC = {
-    "active_set": ("make_patch_problem",),
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
         "LinearAsperities",
     ),
-    "conjugate_gradients": ("fit_motion", "solve_by_gradients"),
+    "bounded": (
+        "BoundedProblem",
+        "BoundedSolution",
+        "solve_bounded",
+    ),
+    "cells": (
+        "BlockCompliance",
+        "make_block",
+    ),
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
+        "ContactEdges",
+        "EdgeCells",
         "contact_intervals",
         "compute_edge_offset",
+        "find_edges",
+        "find_intervals",
         "find_pressure_edges",
         "parabola_change",
         "snap_to_steps",
     ),
     "gaps": ("SHAPE_PROPERTIES",),
-    "half_space.layer": (
-        "end_compliance",
-        "layer_compliance",
-    ),
-    "half_space.point_compliance": (
-        "PointCompliance",
-        "smooth_modes",
-    ),
     "press": (
         "Holder",
         "StripLayout",
@@ -49,12 +56,24 @@ PUBLIC = {
         "split_into_strips",
         "compute_strip_offsets",
     ),
+    "press_cases": (
+        "HolderCases",
+        "press_on_table",
+    ),
+    "press_cells": (
+        "FaceLoading",
+        "solve_on_set",
+    ),
     "press_kernels": (
         "compute_energy",
         "find_set",
         "press_state",
     ),
     "press_path_kernels": ("path_mean",),
+    "row_edges": (
+        "compute_row_stiffness",
+        "find_row_edges",
+    ),
     "set_arrays": (
         "REFERENCE_LOAD_INDEX",
         "REFERENCE_MOMENT_INDEX",
@@ -62,10 +81,11 @@ PUBLIC = {
         "make_set_arrays",
         "hash_set",
     ),
-    "stiffness": (
-        "coupled_stiffness",
-        "tangential_stiffness",
+    "set_table": (
+        "SetTable",
+        "solve_set",
     ),
+    "stiffness": ("tangential_stiffness",),
     "strip_compliance": ("StripCompliance",),
     "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

@@ -35,6 +35,7 @@ SETS = {
     "grooves": GROOVES,
     "interface": "",
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
+    "law for a constant load": IWAN,
     "law for flat faces": IWAN,
     "law for one interface": "{law}.law=convolution {law}.bond_length=1_um",
     "law for rigid pieces": IWAN,
