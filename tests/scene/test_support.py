@@ -14,7 +14,6 @@ from patchfem.scene.scene import SceneError
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 IWAN = "{law}.law=iwan {law}.stiffness=1e7_N/m {law}.chi=-0.5 {law}.beta=0.5"
-TANH = "{law}.law=tanh {law}.reference_speed=1_mm/s"
 BONDS = "{law}.law=nonlocal {law}.bond_length=1_um"
 INTERLOCKING = "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
 EXPONENTIAL = "{patch}.asperities.law=exponential {patch}.asperities.decay_length=1_um"
@@ -46,7 +45,6 @@ SETS = {
     "law with memory for a constant pressure": IWAN,
     "law with memory but without bonds": "{law}.law=elastic-plastic",
     "law without bonds": "{law}.law=coulomb",
-    "law without elements": TANH,
     "load on a point": "",
     "joint without a single stiffness": "{change}",
     "nonlinear asperities": EXPONENTIAL,
@@ -86,6 +84,7 @@ SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
+    "law for rigid pieces, partial slip, grooves": "{law}.law=tanh {law}.reference_speed=1_mm/s",
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
     "patch.strips, strips that slip together, partial slip": "{patch}.holder.tangential_stiffness=1e7_N/m",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
@@ -125,7 +124,7 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     if features == {"law for one interface", "patch of an interface"}:
         law = "structure.interface.0"
         return SINGLE + FORCED, words | {"law": law, "patch": f"{law}.contact"}
-    if features & (MASS_FEATURES | {"patch of an interface", "law without elements"}):
+    if features & (MASS_FEATURES | {"patch of an interface"}):
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if features & POINT_FEATURES:
