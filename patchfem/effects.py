@@ -189,12 +189,16 @@ EFFECTS = {
     "contact.asperities.law=hertz": Effect(
         "patchfem.contact.asperity_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
     ),
-    "contact.tilt": Effect(GAP_MODULE, "g += angle x"),
+    "contact.tilt": Effect(GAP_MODULE, "g += angle x + roll y"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
-    "contact.crown": Effect(GAP_MODULE, "g += x^2/(2 radius)"),
+    "contact.crown": Effect(GAP_MODULE, "g += x^2/(2 radius) + y^2/(2 across)"),
     "contact.profile": Effect(
         "patchfem.surface.nodes",
         "g += z(x); z is levelled and averaged over the elements at each node",
+    ),
+    "contact.area": Effect(
+        "patchfem.contact.cells",
+        "u = sum_k c(k) p_k cos(k_x x) cos(k_y y) + free sides; 0 <= p <= hardness",
     ),
     "contact.strips": Effect(
         "patchfem.contact.press",

@@ -14,6 +14,11 @@ from .gap import N_DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap
 if TYPE_CHECKING:
     from ..mesh.pieces import Mesh
 
+# Largest number of cells along the longer side of a face that is only pressed, of one whose slip is followed by parallel
+# elements, and of one whose cells are contact points of a law with memory or wear in many jumps; each takes about 10 CPU s.
+MAX_STATIC_CELLS = 512
+MAX_SLIP_CELLS = 256
+MAX_POINT_CELLS = 64
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 EQUAL_LENGTHS_TOL = 1e-9  # largest relative difference of equal lengths
 
@@ -141,6 +146,7 @@ class PatchLoading:
     - can_rotate: whether the upper piece is free to rotate.
     - rotational_stiffness: stiffness [N m/rad] of the holder.
     - tangential_stiffness: stiffness [N/m] of the holder, None if it is rigid.
+    - across: distance [m] of the load line from the middle along y; None if the upper piece cannot rotate about x.
     """
 
     load: float | None
@@ -150,6 +156,7 @@ class PatchLoading:
     can_rotate: bool
     rotational_stiffness: float
     tangential_stiffness: float | None
+    across: float | None = None
 
     @property
     def moment(self) -> float | None:
@@ -157,6 +164,36 @@ class PatchLoading:
         if not self.can_rotate:
             return 0.0 if self.rotational_stiffness > 0 else None
         return self.line_moment if self.line_moment is not None else self.load * self.offset
+
+
+class PatchArea(NamedTuple):
+    """Face on which pressure and slip vary along x and y.
+
+    - cells: number of cells along the longer side; None: as many as the tolerance needs.
+    - hardness: largest pressure [Pa]; None without a limit.
+    - scan: measured heights over the face, or None.
+    - max_cells: largest number of cells along the longer side that is chosen without `cells`.
+    """
+
+    cells: int | None
+    hardness: float | None
+    scan: "ScanFile | None"
+    max_cells: int = MAX_SLIP_CELLS
+
+
+class ScanFile(NamedTuple):
+    """Areal scan of a face.
+
+    - path: file.
+    - at: place (x, y) [m] of the middle of the patch in the file; None for the middle of the scan.
+    - is_material: whether a peak closes the gap.
+    - file: name of the file in the scene.
+    """
+
+    path: Path
+    at: tuple[float, float] | None
+    is_material: bool
+    file: str
 
 
 class PatchStrips(NamedTuple):
@@ -248,6 +285,7 @@ class PatchModel:
     - loading: what presses them together.
     - interface: asperity layer, strips and shear compliance.
     - mesh: how they are meshed.
+    - area: cells of a face on which the pressure also varies along y; None for a plane patch.
     """
 
     pieces: PatchPieces
@@ -255,6 +293,7 @@ class PatchModel:
     loading: PatchLoading
     interface: PatchInterface
     mesh: PatchMesh
+    area: PatchArea | None = None
 
     @property
     def has_singular_ends(self) -> bool:
@@ -327,7 +366,7 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
     PatchModel
     """
     pieces = build_pieces(contact)
-    trace = contact.profile
+    trace = contact.profile if contact.area is None else None
     lengths = find_profile_lengths(contact, pieces)
     gap = Gap(
         shapes=list_gap_shapes(contact),
@@ -358,7 +397,23 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
             element_size=contact.element_size,
             file=find_mesh_file(contact, resolve_path),
         ),
+        area=_build_area(contact, resolve_path),
     )
+
+
+def _build_area(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchArea | None:
+    """Return the cells of a face that a table [contact] describes; None for a plane patch.
+
+    `resolve_path` turns a file name in the scene into a path.
+    """
+    if contact.area is None:
+        return None
+    profile = contact.profile
+    scan = None
+    if profile is not None:
+        is_material = profile.heights == "surface"
+        scan = ScanFile(resolve_path(profile.scan), profile.at, is_material, profile.scan)
+    return PatchArea(contact.area.cells, contact.area.hardness, scan)
 
 
 def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
@@ -433,9 +488,10 @@ def _build_loading(contact: Contact) -> PatchLoading:
         approach=contact.approach.distance if contact.approach is not None else None,
         offset=line.offset if line is not None else None,
         line_moment=line.moment if line is not None else None,
-        can_rotate=line is not None,
+        can_rotate=line is not None and (line.offset is not None or line.moment is not None),
         rotational_stiffness=(holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         tangential_stiffness=(holder.tangential_stiffness or None) if holder is not None else None,
+        across=line.across if line is not None else None,
     )
 
 

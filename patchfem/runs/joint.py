@@ -24,7 +24,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
-from .patch import mesh_levels, store
+from .patch import area_slip, mesh_levels, store
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -240,6 +240,8 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     bond_length : float
         Bond length of the law over its coefficient of friction [m].
     """
+    if patch.model.area is not None:
+        return area_slip.compute_stick_stiffness(patch, factor, bond_length)
     forces = [patch.pressure.sigma_n * patch.pieces.interface.weight]
     if patch.strips is not None:
         forces = patch.strips.force
@@ -280,7 +282,8 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
     such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """
-    if patch.strips is None and not bond_length:
+    is_plane = patch.model.area is None
+    if is_plane and patch.strips is None and not bond_length:
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
 
     def excess(log_factor: float) -> float:
@@ -296,6 +299,8 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     factor = np.exp(
         brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
     )
+    if not is_plane:
+        return patch.slip_compliance.scale(factor)
     return frozen_array(factor * patch.slip_compliance)
 
 

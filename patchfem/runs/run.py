@@ -22,7 +22,7 @@ from . import joint, memory, refine
 from .balances import mark_unbalanced
 from .bench import result as bench_result
 from .findings import find_missed_measures
-from .patch import faces, mesh_levels, store, strength
+from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
 from .results.interfaces import Face, merge_sentences
@@ -265,6 +265,8 @@ class _Passes:
         # Static measures come first, and those of wear last.
         if run_plan.kind != "patch":
             result = _add_static_measures(result, moved.faces)
+            if run_plan.model.patch is not None and run_plan.model.patch.area is not None:
+                result = area_motion.add_reversal_measure(result, moved.coarse[0])
         if run_plan.model.wear is not None:
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, self.estimate

@@ -11,6 +11,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
 from ...runs.pieces import compute_pieces
+from . import image
 from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
 
@@ -66,7 +67,10 @@ def _label_units(grid) -> None:
 
 
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI."""
+    """Return frames of a run with a patch as pyvista.MultiBlock objects, or as pyvista.ImageData of a face, in SI."""
+    if result.patch.model.area is not None:
+        frames = image.collect_face_frames(result)
+        return [image.make_image_grid(frames, number) for number in numbers]
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
     return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]

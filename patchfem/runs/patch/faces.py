@@ -129,7 +129,11 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
-                SlipRule(law.numbers.static * face.patch.pressure.sigma_n),
+                SlipRule(
+                    law.numbers.static * face.patch.pressure.sigma_n
+                    if face.model.patch.area is None
+                    else None
+                ),
             )
         out.append(face._replace(fields=fields))
     return tuple(out)

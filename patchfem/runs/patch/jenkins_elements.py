@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...slip import shear_modes
-from . import store
+from . import area_slip, store
 from .press import Patch
 
 
@@ -39,11 +39,15 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     length : float
         Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
     """
-    limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
-    return store.get_or_compute(
-        ("elements", patch, static, length),
-        lambda: shear_modes.make_jenkins_set(patch.slip_compliance, limit, length),
-    )
+
+    def make():
+        """Make the elements, which the cache keeps for all runs of the patch."""
+        if patch.model.area is not None:
+            return area_slip.make_area_elements(patch, static, length)
+        limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
+        return shear_modes.make_jenkins_set(patch.slip_compliance, limit, length)
+
+    return store.get_or_compute(("elements", patch, static, length), make)
 
 
 def list_elements(patch: Patch, static: float, length: float) -> tuple[PatchElements, ...]:
@@ -64,6 +68,8 @@ def list_elements(patch: Patch, static: float, length: float) -> tuple[PatchElem
     if patch.strips is None and patch.pressure.load > 0:
         found = elements(patch, static, length)
         return (PatchElements(found.stiffness, found.yield_displacement, found),)
+    if patch.model.area is not None:
+        return (PatchElements(np.ones(1), np.zeros(1)),)
     # The compliance of a strip is inversely proportional to its fraction of the width.
     slip_compliance = patch.slip_compliance * len(patch.state.force)
 

@@ -129,7 +129,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
             limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             warnings.append(words.format(strain) + limit)
 
-    if contact_reaches_steep_end(patch):
+    if patch_model.area is None and contact_reaches_steep_end(patch):
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
@@ -200,6 +200,10 @@ def notes_on_neglected_effects(face) -> list[str]:
         )
     if patch.strips is not None:
         out.append(NEGLECTED_SHEAR_NOTE)
+
+    # A face has no plane state, and its unequal pieces do not slip.
+    if patch_model.area is not None:
+        return out
 
     # Coupling of shear and normal motion, which acts only between dissimilar pieces.
     if patch.pair.coupling > MIN_REPORTED_NORMAL_COUPLING_RATIO:

@@ -70,7 +70,8 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         length = 0.0 if reduction is None else friction.record.make_law(f).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
-        rule = SlipRule(f.static * sigma)
+        if model.patch.area is None:
+            rule = SlipRule(f.static * sigma)
     else:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)

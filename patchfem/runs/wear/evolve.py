@@ -20,6 +20,7 @@ from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
+from ..patch import area
 from ..patch.measures import with_static_measures
 from ..patch.press import (
     Patch,
@@ -104,7 +105,7 @@ class _SlipPathFunction:
 
     def __init__(self, model, patch):
         self.model = model
-        self.pair = patch.pair
+        self.patch = patch
         self.frames = choose_frame_count(model.accuracy.tolerance)
         self.same = (
             model.grooves is None
@@ -118,7 +119,7 @@ class _SlipPathFunction:
         """Return the slip path (m,) [m] per cycle at a worn depth [m]; (s, m) for strips."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
-            patch = solve_patch_contact(self.model.patch, self.pair, worn)
+            patch = solve_worn(self.patch, worn)
             slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
@@ -131,8 +132,8 @@ def compute_mean_worn_depth(patch, depth) -> float:
 
     `depth` [m] is the worn depth (m,), or (s, m) for strips.
     """
-    area = patch.pieces.interface.weight
-    return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
+    weight = patch.pieces.interface.weight
+    return float(np.atleast_2d(depth).mean(axis=0) @ weight / weight.sum())
 
 
 def make_worn_model(model, patch, depth):
@@ -197,7 +198,7 @@ def compute_wear(
 
     motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
-        make_contact_force_function(patch_model, patch.pair),
+        _make_force_function(patch),
         motion,
         nodal_areas(patch_model, patch.pieces.interface),
         model.wear.coefficient,
@@ -214,7 +215,7 @@ def compute_wear(
             state = make_initial_wear_state(problem, earlier_depth)
             moments = (_record_moment(patch, state, motion),)
         else:
-            patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
+            patch = solve_worn(patch, frozen_array(state.depth))
     except _UnboundedMotion as reason:
         stop_reason = f"nothing was worn: {reason}"
 
@@ -229,7 +230,7 @@ def compute_wear(
                 f"wear was computed only up to cycle {state.cycle:.6g} of {n_cycles:.6g}: {reason}"
             )
             break
-        patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
+        patch = solve_worn(patch, frozen_array(state.depth))
         moments = (*moments, _record_moment(patch, state, motion))
         if store is not None:
             store(state, moments)
@@ -243,7 +244,8 @@ def compute_wear(
             replayed.append(_replay_wear(patch_model, model, patch, mesh, moments))
 
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
-    patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
+    add_measures = with_static_measures if patch_model.area is None else area.with_face_measures
+    patch, *worn = add_measures((patch, *worn), model.accuracy.tolerance)
     return WornPatch(
         patch,
         tuple(worn),
@@ -399,15 +401,29 @@ def _add_earlier_wear(model, patch):
     if earlier_run is None:
         return patch
     earlier_run.require_same_surfaces(patch.x, patch.unloaded_gap)
-    area = nodal_areas(model.patch, patch.pieces.interface)
-    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
+    areas = nodal_areas(model.patch, patch.pieces.interface)
+    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, areas))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
             f"{earlier_run.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
             "run in which this coating was not worn through",
             "wear.start",
         )
-    return solve_patch_contact(model.patch, patch.pair, depth)
+    return solve_worn(patch, depth)
+
+
+def solve_worn(patch, worn):
+    """Solve the contact of a patch again on its mesh or cells, with a worn depth [m] added to its unworn gap."""
+    if patch.model.area is not None:
+        return area.press_worn(patch, worn)
+    return solve_patch_contact(patch.model, patch.pair, worn)
+
+
+def _make_force_function(patch):
+    """Return a function of worn depth and softening that computes the contact forces [N] (`wear.depth.Press`)."""
+    if patch.model.area is not None:
+        return area.make_force_function(patch)
+    return make_contact_force_function(patch.model, patch.pair)
 
 
 def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
@@ -474,32 +490,34 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     moments : sequence of WearMoment
         States after each jump of the run.
     """
-    area = nodal_areas(patch_model, other_patch.pieces.interface)
+    areas = nodal_areas(patch_model, other_patch.pieces.interface)
     width = patch_model.pieces.width
-    offsets = compute_strip_offsets(width, len(np.atleast_2d(area)))
+    offsets = compute_strip_offsets(width, len(np.atleast_2d(areas)))
 
     def interpolate_path(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch.
 
         Without strips there is a single row.
         """
+        if patch_model.area is not None:
+            return area.transfer_to_grid(path, patch, other_patch)
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
         row_offsets = compute_strip_offsets(width, len(rows))
         columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
-        return np.array(columns).T.reshape(area.shape)
+        return np.array(columns).T.reshape(areas.shape)
 
     # Cycles of each jump, and the slip path with which the run wore the patch
     jumps = []
     for before, after in pairwise(moments):
         jumps.append((after.cycle - before.cycle, interpolate_path(after.used)))
     depth = replay_jumps(
-        make_contact_force_function(patch_model, other_patch.pair),
-        area,
+        _make_force_function(other_patch),
+        areas,
         model.wear.coefficient,
         jumps,
-        model.wear.compute_earlier_depth(other_patch.x, area),
+        model.wear.compute_earlier_depth(other_patch.x, areas),
     )
-    return solve_patch_contact(patch_model, other_patch.pair, frozen_array(depth)), depth
+    return solve_worn(other_patch, frozen_array(depth)), depth
 
 
 def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:

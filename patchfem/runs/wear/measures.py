@@ -13,7 +13,7 @@ from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors
-from ..patch.press import nodal_areas, solve_patch_contact
+from ..patch.press import nodal_areas
 from ..patch.result import UNCOUPLED_STRIPS_WARNING
 from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
@@ -24,6 +24,7 @@ from .evolve import (
     compute_worn_volume_and_depth,
     find_worn_through_coating,
     list_worn_pieces,
+    solve_worn,
 )
 from .slip import compute_point_slip_path
 
@@ -125,6 +126,8 @@ def _note_on_worn_through_coating(model, evolved) -> list[str]:
     coating = find_worn_through_coating(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
     place = f"x = {format_length(float(evolved.patch.x[node]), 3)}"
+    if model.patch.area is not None:
+        place += f", y = {format_length(float(evolved.patch.y[node]), 3)}"
     if model.patch.interface.strips is not None:
         offset = float(evolved.patch.strips.offsets[strip])
         place += f" of the strip at y = {format_length(offset, 3)}"
@@ -149,11 +152,8 @@ def _widen_errors_by_jumps(result, evolved):
     evolved : WornPatch
         The worn patch with its jumps, also on the coarser meshes.
     """
-    patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
-    coarse = compute_static_values(
-        solve_patch_contact(patch_model, evolved.patch.pair, coarse_depth)
-    )
+    coarse = compute_static_values(solve_worn(evolved.patch, coarse_depth))
     fine_values = compute_static_values(evolved.patch)
     measures = dict(result.measures)
     for name, value in fine_values.items():
