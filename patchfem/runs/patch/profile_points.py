@@ -1,36 +1,24 @@
 """Contact under a measured profile, solved on equally spaced points.
 
 In: a `PatchModel` with a profile. Out: static measures with error estimates, and the pressure at
-the points. The compliance of infinite elastic layers is known in closed form for waves along the
-interface; finite elements compute only its smooth change due to the free ends of the pieces. The
-number of points is doubled from level to level. Errors follow from the changes when the points are
-doubled and when the cells at the ends are halved.
+the points, which are one row of cells (`contact.cells`). The number of points is doubled from level to level. Errors
+follow from the changes when the points are doubled and when the elements of the free ends are refined.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.active_set import make_patch_problem
-from ...contact.conjugate_gradients import fit_motion, solve_by_gradients
+from ...contact import row_edges
+from ...contact.cells import BlockCompliance, make_block
 from ...contact.edges import contact_intervals
-from ...contact.half_space.layer import end_compliance, layer_compliance
-from ...contact.half_space.point_compliance import (
-    PointCompliance,
-    find_edges,
-    set_stiffness,
-    smooth_modes,
-)
+from ...contact.press_cells import FaceLoading, press_cells, solve_on_set
 from ...core import NotConverged
-from ...elasticity.elasticity import Piece
 from ...elasticity.lapack import use_one_blas_thread
-from ...mesh.grading import Layout, divide_into_columns
-from ...mesh.grid import TensorGrid
+from ...elasticity.sides import BlockShape, make_stack
 from ...model import profile
-from ...model.patch import PatchPiece
 from ...model.pieces import make_elastic_layers
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
-from .grids import divide_piece_into_rows
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     PRESSURE_PEAK_MEASURES,
@@ -49,25 +37,20 @@ MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
 MAX_POINT_ITERATIONS = 2.5e7
 MIN_COARSEST_LEVEL_POINTS = 500  # Smallest number of points of the coarsest level.
-# Ratio of the cell length at the ends to the length of the interface, on level 0.
-END_CELL_LENGTH_RATIO = 1e-4
-MIDDLE_CELL_LENGTH_RATIO = 1 / 30  # The same ratio in the middle of the interface.
-POINT_CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
+# Refinements of the elements of the free ends, from coarse to fine (`elasticity.sides`); the shortest element of the
+# last one is 5e-4 of the length of the interface.
+SIDE_LEVELS = (2, 3, 4)
 # Largest relative residual at which the contact problem counts as solved.
 CONTACT_RESIDUAL_TOL = 3e-8
-MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
 CORNER_REGION_LENGTH_RATIO = 1e-3
 # Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
 MIN_CORNER_PRESSURE_RATIO = 0.2
-# Largest ratio of overlap to elastic displacement of a solved contact.
-MAX_OVERLAP_RATIO = 1e-6
 
 
 class PointLevel(NamedTuple):
     """Contact solution on the equally spaced points of one refinement level.
 
-    - force (n,): nodal forces [N].
     - surface: pressure and gap at the points.
     - intervals (k, 2): contact intervals [m].
     - values: static measures by name.
@@ -77,7 +60,6 @@ class PointLevel(NamedTuple):
       the ends do not resolve.
     """
 
-    force: np.ndarray
     surface: Surface
     intervals: np.ndarray
     values: Values
@@ -86,33 +68,17 @@ class PointLevel(NamedTuple):
     has_corner_peak: bool
 
 
-class FreeEnds(NamedTuple):
-    """Change of the compliance of infinite elastic layers due to the free ends of the pieces.
+class PointState(NamedTuple):
+    """Resultants of the pressure at equally spaced points, and position of the holder.
 
-    - x (k,): positions [m].
-    - normal, tangential (k, k): changes [m2/N] of the normal and of the tangential compliance.
-    """
-
-    x: np.ndarray
-    normal: np.ndarray
-    tangential: np.ndarray
-
-
-class PointForces(NamedTuple):
-    """Nodal forces at equally spaced points, with the state of the holder.
-
-    - force (n,): nodal forces [N].
     - load, moment: sum [N] and moment [N m] of the forces.
     - approach, rotation: [m] and [rad]. The rotation includes that of the gap.
-    - n_iterations: iterations of the solver.
     """
 
-    force: np.ndarray
     load: float
     moment: float
     approach: float
     rotation: float
-    n_iterations: int
 
 
 def can_use_points(patch_model) -> bool:
@@ -150,20 +116,18 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     solution = None
     with use_one_blas_thread():
         try:
-            # Finer compliances of the free ends on the coarsest points, then the last of them on more and more points
-            ends = [
-                _compute_free_end_compliance(patch_model, level)
-                for level in range(MIN_POINT_LEVELS)
-            ]
-            end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
+            # Finer elements of the free ends on the coarsest points, then the last of them on more and more points
+            end_levels = [_solve_level(patch_model, level, count) for level in SIDE_LEVELS]
 
             # The points are doubled until the tolerance is met.
             point_levels = end_levels[-1:]
             while solution is None or not (
                 meets_tolerance(solution) or _is_next_level_expensive(point_levels[-1])
             ):
-                force = point_levels[-1].force
-                point_levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
+                pressure = point_levels[-1].surface.sigma_n
+                point_levels.append(
+                    _solve_level(patch_model, SIDE_LEVELS[-1], 2 * pressure.size, pressure)
+                )
                 if len(point_levels) >= MIN_POINT_LEVELS:
                     estimates = _combine_refinement_series(end_levels, point_levels)
                     solution = PointSolution(
@@ -182,7 +146,7 @@ def _count_first_level_points(patch_model) -> int:
 
 def _is_next_level_expensive(level: PointLevel) -> bool:
     """Return whether the next level would exceed the largest number of points or the largest work."""
-    count = level.force.size
+    count = level.surface.x.size
     return 2 * count > MAX_PROFILE_POINTS or 3 * level.n_iterations * count > MAX_POINT_ITERATIONS
 
 
@@ -191,8 +155,8 @@ def _combine_refinement_series(
 ) -> Measures:
     """Combine two series of refinements into one estimate of each measure.
 
-    The first series (`end_levels`) halves the cells by which the compliance of the free ends is computed. The second
-    (`point_levels`) doubles the points, with the shortest of these cells. With the limits p of the points and e of the
+    The first series (`end_levels`) refines the elements by which the compliance of the free ends is computed. The second
+    (`point_levels`) doubles the points, with the finest of these elements. With the limits p of the points and e of the
     ends, and the value e_n of the last end level, a measure is p + (e - e_n); the errors of both limits add up. A peak
     that may be at a free corner is left out, because the points do not resolve it.
     """
@@ -220,139 +184,87 @@ def _combine_refinement_series(
     return out
 
 
-def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
-    """Compute the change of compliance due to the free ends, with the cells of a given level."""
-    length = patch_model.pieces.length
-    half = length / 2
-    cell = END_CELL_LENGTH_RATIO * length
-    middle_cell = MIDDLE_CELL_LENGTH_RATIO * length
-
-    # Short columns only at both ends, where the compliance differs from that of infinite layers.
-    bands = ((-half, -half, cell), (half, half, cell))
-    layout = Layout(
-        start=-half,
-        stop=half,
-        bands=bands,
-        span=(-half, half),
-        max_loaded_length=middle_cell,
-        max_length=middle_cell,
-        slope=POINT_CELL_GROWTH,
-    ).scale_cells(0.5**level)
-    x = divide_into_columns(layout)
-
-    # Two equal pieces count twice.
-    changes = 0.0
-    for piece, multiplicity in _distinct_pieces(patch_model):
-        middle_row = piece.height * layout.max_length / length
-        rows = divide_piece_into_rows(
-            piece,
-            first_row=layout.bands[0][2],
-            last_row=middle_row / 2,
-            coating_row=piece.thickness * layout.slope / 4,
-            max_row=2 * middle_row,
-            growth=layout.slope,
-        )
-        body = Piece(TensorGrid(x, *rows), make_elastic_layers(patch_model, piece))
-        changes = changes + multiplicity * np.array(end_compliance(body))
-    return FreeEnds(x, *changes)
-
-
-def _distinct_pieces(patch_model) -> list[tuple[PatchPiece, int]]:
-    """Return (piece, number of times it occurs) for the pieces of a patch: one pair if both are alike, else two."""
-    pieces = patch_model.pieces
-    return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
-
-
-def make_point_compliances(
-    patch_model, ends: FreeEnds, count: int
-) -> tuple[PointCompliance, PointCompliance]:
+def make_point_compliances(patch_model, side_level: int, count: int) -> BlockCompliance:
     """Return the normal and the tangential compliance of equally spaced points.
 
     Parameters
     ----------
     patch_model : PatchModel
         Patch whose pieces and coatings the points are on.
-    ends : FreeEnds
-        Ends of the pieces that are free sides.
+    side_level : int
+        Refinement of the elements of the free ends.
     count : int
         Number of points.
-
-    Returns
-    -------
-    normal, tangential : PointCompliance
     """
-    length = patch_model.pieces.length
-    width = patch_model.pieces.width * patch_model.pieces.pairs
-    x = ((np.arange(count) + 0.5) / count - 0.5) * length
-    k = np.arange(count) * np.pi / length
-    waves = 0
-    for piece, multiplicity in _distinct_pieces(patch_model):
-        layers = make_elastic_layers(patch_model, piece)
-        wave_compliance = layer_compliance(k, piece.height, piece.thickness, layers)
-        waves = waves + multiplicity * np.array(wave_compliance)
-    out = []
-    for wave, change in zip(waves, (ends.normal, ends.tangential)):
-        modes, sizes = smooth_modes(ends.x, change, x)
-        out.append(PointCompliance(x, length / count * width, wave, modes, sizes / width))
-    normal, tangential = out
-    return normal, tangential
+    pieces = patch_model.pieces
+    stacks = tuple(
+        make_stack(piece.height, piece.thickness, make_elastic_layers(patch_model, piece))
+        for piece in (pieces.upper, pieces.lower)
+    )
+    shape = BlockShape(pieces.length, pieces.width * pieces.pairs, "x")
+    return make_block(shape, stacks, (count, 1), side_level)
 
 
-def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
+def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointLevel:
     """Solve the contact problem of a patch on equally spaced points.
 
     Parameters
     ----------
     patch_model : PatchModel
         Pieces and loading.
-    ends : FreeEnds
-        Correction of the compliance for the free ends of the pieces.
+    side_level : int
+        Refinement of the elements of the free ends.
     count : int
         Number of points.
     start : (count/2,) array, optional
-        Forces [N] on the level with half as many points, from which the solution starts.
+        Pressure [Pa] on the level with half as many points, from which the solution starts.
     """
     length = patch_model.pieces.length
-    normal, shear = make_point_compliances(patch_model, ends, count)
+    normal, shear = make_point_compliances(patch_model, side_level, count)
     x = normal.x
     half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(half_points).heights[1::2]
 
-    # Opening of the interface: gap + rotation x - approach + deflection, not below 0.
-    solution = _solve_nodal_forces(patch_model, normal, gap, start)
-    force = solution.force
-    deflection = normal.product(force)
-    turn = solution.rotation - patch_model.gap.angle
-    opening = gap + turn * x - solution.approach + deflection
-    largest_deflection = np.abs(deflection).max()
-    active = force > 0
-    if not opening.min() >= -MAX_OVERLAP_RATIO * largest_deflection:
-        raise NotConverged(
-            f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m"
-        )
+    pressed = press_cells(
+        normal,
+        gap[None],
+        _make_loading(patch_model.loading),
+        None if start is None else np.repeat(start, 2)[None],
+        CONTACT_RESIDUAL_TOL,
+    )
+    pressure = pressed.pressure[0]
+    opening = pressed.gap[0]
+    active = pressure > 0
     if not active.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
+    force = pressure * normal.cell_area
+    state = PointState(
+        float(force.sum()),
+        float(force @ x),
+        approach=pressed.approach,
+        rotation=patch_model.gap.angle + pressed.tilt_x,
+    )
 
-    opening = np.where(active, 0.0, np.maximum(opening, 0.0))
-    sigma = force / normal.area
+    # The edges between the points follow from the pressure at the points in contact.
     unit = np.ones(count)
-
-    # The edges between the points follow from the forces on the points in contact.
-    contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
+    pressure_rate = solve_on_set(normal, active[None], unit)[0]
+    contact_edges = row_edges.find_row_edges(normal, pressure, opening, pressure_rate)
     # A loaded point at an end of the interface is in contact as far as this end.
-    intervals = contact_intervals(half_points[[0, -1]], force[[0, -1]], contact_edges)
+    intervals = contact_intervals(half_points[[0, -1]], pressure[[0, -1]], contact_edges)
     are_alike = patch_model.pieces.are_alike
+    compute_stiffness = row_edges.compute_row_stiffness
     edge_values = EdgeValues(
         length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
-        normal=set_stiffness(normal, active, unit, contact_edges),
-        tangential=set_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
-        rotational=set_stiffness(normal, active, x, contact_edges),
+        normal=compute_stiffness(normal, active, unit, contact_edges),
+        tangential=compute_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
+        rotational=compute_stiffness(normal, active, x, contact_edges),
     )
 
     # At an end of the interface the pressure is that of the point there.
-    peak = estimate_peak_pressure(x, sigma, node_fraction=unit)
-    values = assemble_static_values(length, normal.area * count, solution, peak, edge_values)
+    peak = estimate_peak_pressure(x, pressure, node_fraction=unit)
+    area = normal.cell_area * count
+    values = assemble_static_values(length, area, state, peak, edge_values)
     # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
     # displacement, which is not computed here.
     if not are_alike:
@@ -367,58 +279,26 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         edge_cells=cell * len(contact_edges),
         edge_offset=MIN_CONTACT_EDGE_ERROR_IN_CELLS,
         can_rotate=patch_model.loading.moment is not None,
-        closing=float(np.ptp(gap) + largest_deflection),
+        closing=float(np.ptp(gap) + np.abs(normal.product(pressed.pressure)).max()),
     )
     n_corner = max(1, round(CORNER_REGION_LENGTH_RATIO * count))
-    corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
+    corner_pressure = max(pressure[:n_corner].max(), pressure[-n_corner:].max())
 
     return PointLevel(
-        force,
-        Surface(x, np.full(count, normal.area), sigma, opening, gap),
+        Surface(x, np.full(count, normal.cell_area), pressure, opening, gap),
         intervals,
         values,
         resolution,
-        solution.n_iterations,
-        bool(corner_force > MIN_CORNER_PRESSURE_RATIO * force.max()),
+        pressed.n_iterations,
+        bool(corner_pressure > MIN_CORNER_PRESSURE_RATIO * pressure.max()),
     )
 
 
-def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
-    """Solve for the nodal forces of a refinement level under the prescribed load or approach.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Pieces and loading.
-    normal : PointCompliance
-        Normal compliance of the n points of the level.
-    gap : (n,) array
-        Gap of the unloaded pieces [m].
-    start : (n/2,) array or None
-        Forces [N] on the level with half as many points.
-    """
-    x = normal.x
-    loading = patch_model.loading
-    initial_force = None if start is None else np.repeat(start, 2) / 2
-    offset = float(gap.min()) if loading.approach is None else loading.approach
-    problem = make_patch_problem(
-        x, gap - offset, loading.load, loading.moment, loading.rotational_stiffness
-    )
-    force, n_iterations = solve_by_gradients(
-        normal, problem, CONTACT_RESIDUAL_TOL, MAX_CONTACT_ITERATIONS, initial_force
-    )
-
-    # Approach and rotation follow from the rigid motion of the loaded points, as far as it is free (least squares).
-    active = force > 0
-    closing = gap - offset + normal.product(force)
-    motion = np.zeros(2)
-    motion[: problem.target.size] = fit_motion(problem.motions[active], closing[active])
-    approach, slope = motion.tolist()
-    return PointForces(
-        force,
-        float(force.sum()),
-        float(force @ x),
-        approach=offset + approach,
-        rotation=patch_model.gap.angle - slope,
-        n_iterations=n_iterations,
-    )
+def _make_loading(loading) -> FaceLoading:
+    """Return the loading of a face with a `loading` of a patch, whose moment belongs to a free rotation."""
+    if loading.load is None:
+        return FaceLoading(approach=loading.approach)
+    if loading.moment is None:
+        return FaceLoading(loading.load)
+    line = loading.moment / loading.load
+    return FaceLoading(loading.load, line_x=line, spring_x=loading.rotational_stiffness)

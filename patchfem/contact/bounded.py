@@ -1,0 +1,330 @@
+"""Quadratic program of contact with bounds: minimise t . C t/2 + g . t for lower <= t <= upper and prescribed resultants.
+
+Normal contact has the bounds 0 and the hardness, partial slip has minus and plus the friction limit, and a linear system
+on a set of cells has no bounds there and zeros elsewhere. The motions q of the holder are the multipliers of the
+resultants: with the motions R as columns, C t + g - R q vanishes between the bounds, and R . t + K q has prescribed values,
+where K are springs of the holder.
+
+The method is that of Polonsky and Keer (Wear 231, 1999, 206): conjugate gradients on the cells between the bounds, cut at
+the bounds, and gradient steps for cells that leave a bound. It is preconditioned by the stiffness of the waves on the
+cells between the bounds. Its directions are conjugate by the formula of Polak and Ribiere as long as the cuts leave the
+slopes orthogonal. The energy is monitored: where it does not fall for several steps, a projected gradient step follows,
+which cannot fail.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Number of steps without a lower energy after which a projected gradient step follows. A changed set of cells takes two or
+# three steps to lower the energy.
+MAX_STEPS_WITHOUT_GAIN = 8
+# Largest scalar product of two successive slopes, relative to the square of the last one, at which the directions are
+# conjugate; beyond it the last direction is forgotten (Powell, Math. Program. 12, 1977, 241)
+MAX_SLOPE_OVERLAP = 0.2
+# Rounding error of a slope, relative to the largest gap of the cells between the bounds
+GAP_ROUND_OFF = 1e-15
+# Largest error of a resultant, relative to the largest prescribed one, at which the tractions are not restored again
+RESULTANT_TOL = 1e-12
+MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
+
+
+class BoundedProblem(NamedTuple):
+    """Quadratic program of n cells and r free motions of the holder; arrays over cells have any one shape.
+
+    - gap (ny, nx): Linear term g [m].
+    - lower, upper: Bounds [Pa] of the traction, (ny, nx) or numbers; -inf and inf for none.
+    - motions (r, ny, nx): Closing of each cell per unit of each free motion; ones for the approach, x and y for tilts.
+    - target (r,): Prescribed sums of motion times traction, [Pa] or [Pa m].
+    - springs (r,): Decrease of these sums per unit of the motion, by springs of the holder.
+    """
+
+    gap: np.ndarray
+    lower: np.ndarray | float
+    upper: np.ndarray | float
+    motions: np.ndarray = ()
+    target: np.ndarray = ()
+    springs: np.ndarray = ()
+
+
+class BoundedSolution(NamedTuple):
+    """Solution of a bounded problem.
+
+    - traction (ny, nx): [Pa], within the bounds and with the prescribed resultants.
+    - motion (r,): Free motions q of the holder.
+    - slope (ny, nx): C t + g - R q [m]: 0 between the bounds, >= 0 at the lower and <= 0 at the upper one.
+    - n_iterations: Number of steps.
+    - residual: Largest wrong slope over the largest displacement.
+    """
+
+    traction: np.ndarray
+    motion: np.ndarray
+    slope: np.ndarray
+    n_iterations: int
+    residual: float
+
+
+def solve_bounded(
+    compliance,
+    problem: BoundedProblem,
+    start: np.ndarray | None = None,
+    tolerance: float = 1e-8,
+    max_iterations: int = 2000,
+) -> BoundedSolution:
+    """Solve a bounded problem by preconditioned conjugate gradients.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Operator C: `product`, `precondition` and `self_compliance`.
+    problem : BoundedProblem
+        Gap, bounds and free motions.
+    start : (ny, nx) ndarray, optional
+        Traction [Pa] to start from.
+    tolerance : float
+        Largest residual.
+    max_iterations : int
+        Number of steps after which the tractions are returned as they are.
+
+    Returns
+    -------
+    BoundedSolution
+    """
+    holder = _Holder(problem, compliance.self_compliance)
+    if start is None:
+        start = np.full(problem.gap.shape, holder.uniform_traction)
+    everywhere = np.ones(start.shape, bool)
+    state = holder.load(compliance, holder.project(start, np.zeros(holder.n_motions), everywhere))
+    best = state
+    n_without_gain = 0
+
+    direction = motion_direction = last_slope = None
+    last_square = 1.0
+    n_iterations = 0
+    while n_iterations < max_iterations:
+        n_iterations += 1
+        traction = state.traction
+        raw_slope = state.displacement + problem.gap
+        is_free = holder.find_free_cells(traction)
+        motion = holder.fit_motion(raw_slope, state.motion, is_free)
+        slope = raw_slope - holder.move(motion)
+        is_leaving = holder.find_leaving_cells(traction, slope)
+        is_moving = is_free | is_leaving
+        moving_slope = np.where(is_moving, slope, 0.0)
+
+        # Optimality: the slope vanishes between the bounds and has the right sign at them
+        noise = GAP_ROUND_OFF * np.abs(problem.gap[is_free]).max(initial=0.0)
+        scale = max(np.abs(state.displacement).max(), np.finfo(float).tiny)
+        residual = max(np.abs(moving_slope).max() - noise, 0.0) / scale
+        if residual <= tolerance:
+            break
+
+        # The energy may rise while the set of cells between the bounds changes, but not for long. A projected gradient step
+        # of this length always lowers it.
+        n_without_gain += 1
+        if state.energy < best.energy:
+            best = state
+            n_without_gain = 0
+        if n_without_gain > MAX_STEPS_WITHOUT_GAIN:
+            largest_eigenvalue = compliance.product(np.ones(traction.shape)).max()
+            gradient = best.displacement + problem.gap - holder.move(best.motion)
+            moved = best.traction - gradient / largest_eigenvalue
+            state = holder.load(compliance, holder.project(moved, best.motion, everywhere))
+            best = state
+            n_without_gain = 0
+            direction = None
+            continue
+
+        # Conjugate direction on the cells that can move, without a change of the resultants
+        preconditioned, motion_change = holder.precondition(compliance, moving_slope, is_moving)
+        square = float(np.vdot(moving_slope, preconditioned))
+        overlap = np.inf if direction is None else float(np.vdot(last_slope, preconditioned))
+        if abs(overlap) > MAX_SLOPE_OVERLAP * square:
+            direction = preconditioned
+            motion_direction = motion_change
+        else:
+            conjugate = (square - overlap) / last_square
+            direction = preconditioned + conjugate * np.where(is_moving, direction, 0.0)
+            motion_direction = motion_change + conjugate * motion_direction
+        last_slope = moving_slope
+        last_square = max(square, np.finfo(float).tiny)
+
+        # Exact step, cut at the bounds
+        direction_displacement = compliance.product(direction)
+        curvature = float(np.vdot(direction, direction_displacement))
+        curvature += float(holder.springs @ motion_direction**2)
+        step = float(np.vdot(moving_slope, direction)) / curvature if curvature > 0 else 0.0
+        moved = traction - step * direction
+        motion = motion - step * motion_direction
+        projected = holder.project(moved, motion, is_moving)
+        state = holder.load(compliance, projected)
+    return BoundedSolution(traction, motion / holder.scale, slope, n_iterations, residual)
+
+
+class _State(NamedTuple):
+    """Admissible tractions [Pa] and motions, their displacement [m], and their energy per cell area [Pa m]."""
+
+    traction: np.ndarray
+    motion: np.ndarray
+    displacement: np.ndarray | None = None
+    energy: float = np.inf
+
+
+class _Holder:
+    """Bounds of the cells and motions of the holder, scaled to a largest closing of 1.
+
+    Parameters
+    ----------
+    problem : BoundedProblem
+        Bounds, motions, resultants and springs.
+    self_compliance : float
+        Displacement of a cell per traction on it [m/Pa].
+    """
+
+    def __init__(self, problem: BoundedProblem, self_compliance: float):
+        shape = problem.gap.shape
+        self.lower = np.broadcast_to(problem.lower, shape)
+        self.upper = np.broadcast_to(problem.upper, shape)
+        self.self_compliance = self_compliance
+        self.n_motions = len(problem.motions)
+        rigid = np.reshape(problem.motions, (self.n_motions, problem.gap.size)).astype(float)
+        self.scale = np.abs(rigid).max(axis=1, initial=0.0)
+        self.rigid = rigid / self.scale[:, None]
+        self.target = np.asarray(problem.target, float) / self.scale
+        self.springs = np.asarray(problem.springs, float) / self.scale**2
+        self.gap = problem.gap
+
+        # Tractions that displace the cells between the bounds by each motion, for the set of these cells
+        self.known_set = None
+        self.motion_tractions = np.empty_like(self.rigid)
+
+    @property
+    def uniform_traction(self) -> float:
+        """Traction [Pa] of all cells that has the prescribed sum; 0 without free motions."""
+        return self.target[0] / self.gap.size if self.n_motions else 0.0
+
+    def find_free_cells(self, traction: np.ndarray) -> np.ndarray:
+        """Return which cells lie between their bounds."""
+        return (traction > self.lower) & (traction < self.upper)
+
+    def find_leaving_cells(self, traction: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """Return which cells at a bound lower the energy as they leave it."""
+        is_leaving = ((traction <= self.lower) & (slope < 0)) | (
+            (traction >= self.upper) & (slope > 0)
+        )
+        return is_leaving & (self.upper > self.lower)
+
+    def move(self, motion: np.ndarray) -> np.ndarray:
+        """Return the closing of the cells [m] by motions (r,)."""
+        return (motion @ self.rigid).reshape(self.gap.shape)
+
+    def fit_motion(self, slope, motion, is_free) -> np.ndarray:
+        """Return motions (r,) whose part without springs is fitted to the slope of the cells between the bounds.
+
+        Motions against springs remain, because they follow from the resultants.
+        """
+        is_fitted = self.springs == 0
+        if not is_fitted.any() or not is_free.any():
+            return motion
+        held = np.where(is_fitted, 0.0, motion)
+        remainder = (slope - self.move(held))[is_free]
+        rigid = self.rigid[is_fitted][:, is_free.ravel()]
+        fitted = np.linalg.lstsq(rigid @ rigid.T, rigid @ remainder, rcond=1e-13)[0]
+        held[is_fitted] = fitted
+        return held
+
+    def load(self, compliance, state: _State) -> _State:
+        """Return a state with its displacement and energy."""
+        traction, motion, *_ = state
+        displacement = compliance.product(traction)
+        energy = float(np.vdot(traction, displacement / 2 + self.gap))
+        energy += float(self.springs @ motion**2) / 2
+        return _State(traction, motion, displacement, energy)
+
+    def precondition(self, compliance, slope, is_free):
+        """Return about the tractions (ny, nx) and motions (r,) that cause a slope between the bounds.
+
+        They change no resultant: the tractions of a fitted motion of the holder are subtracted.
+        """
+        preconditioned = np.where(is_free, compliance.precondition(slope), 0.0)
+        if not self.n_motions:
+            return preconditioned, np.zeros(0)
+        if self.known_set is None or not np.array_equal(is_free, self.known_set):
+            self.known_set = is_free
+            for k, rigid in enumerate(self.rigid):
+                moved = np.where(is_free, rigid.reshape(slope.shape), 0.0)
+                held = np.where(is_free, compliance.precondition(moved), 0.0)
+                self.motion_tractions[k] = held.ravel()
+        stiffness = self.motion_tractions @ self.rigid.T + np.diag(self.springs)
+        motion = np.linalg.lstsq(stiffness, self.rigid @ preconditioned.ravel(), rcond=1e-13)[0]
+        held = (motion @ self.motion_tractions).reshape(slope.shape)
+        return preconditioned - held, -motion
+
+    def project(self, traction, motion, is_movable) -> _State:
+        """Cut tractions at their bounds and shift them until the resultants are the prescribed ones.
+
+        The nearest such tractions are those of a shift by a motion of the holder before the cut. Newton's method finds
+        this motion, with steps that are halved or doubled until the resultants come nearer.
+
+        Parameters
+        ----------
+        traction : (ny, nx) ndarray
+            Tractions [Pa], also beyond their bounds.
+        motion : (r,) ndarray
+            Motions of the holder, which its springs resist.
+        is_movable : (ny, nx) bool ndarray
+            Cells that may be shifted; the others stay. All may where these cannot carry the resultants.
+        """
+        if not self.n_motions:
+            return _State(np.clip(traction, self.lower, self.upper), motion)
+        shifted = self._shift(traction, motion, is_movable & (self.upper > self.lower))
+        if shifted is None:
+            shifted = self._shift(traction, motion, self.upper > self.lower)
+        if shifted is None:
+            return _State(np.clip(traction, self.lower, self.upper), motion)
+        return shifted
+
+    def _shift(self, traction, motion, is_movable) -> _State | None:
+        """Return shifted tractions and motions (see `project`), or None if they miss the resultants."""
+        movable = np.flatnonzero(is_movable)
+        rigid = self.rigid[:, movable]
+        lower = self.lower.flat[movable]
+        upper = self.upper.flat[movable]
+        start = traction.flat[movable]
+        fixed = np.where(is_movable, 0.0, np.clip(traction, self.lower, self.upper))
+        target = self.target - self.rigid @ fixed.ravel()
+        tolerance = RESULTANT_TOL * np.abs(self.target).max()
+
+        def find_error(shift):
+            """Return the missing resultants (r,) after a shift (r,) by motions of the holder."""
+            cut = np.clip(start + shift @ rigid / self.self_compliance, lower, upper)
+            return target - rigid @ cut - self.springs * (motion + shift)
+
+        shift = np.zeros(self.n_motions)
+        error = find_error(shift)
+        for _ in range(MAX_RESTORATIONS):
+            if np.abs(error).max() <= tolerance:
+                out = np.clip(traction, self.lower, self.upper)
+                out.flat[movable] = np.clip(
+                    start + shift @ rigid / self.self_compliance, lower, upper
+                )
+                return _State(out, motion + shift)
+            moved = start + shift @ rigid / self.self_compliance
+            inside = rigid[:, (moved > lower) & (moved < upper)]
+            if inside.shape[1] < self.n_motions:
+                inside = rigid
+            response = inside @ inside.T / self.self_compliance + np.diag(self.springs)
+            direction = np.linalg.lstsq(response, error, rcond=1e-13)[0]
+
+            # The derivative of the concave dual function along the direction falls from a positive value through 0
+            slope = float(direction @ error)
+            length = 1.0
+            for _ in range(MAX_RESTORATIONS):
+                new_error = find_error(shift + length * direction)
+                new_slope = float(direction @ new_error)
+                if abs(new_slope) <= 0.9 * slope:
+                    break
+                length *= 2.0 if new_slope > 0 else 0.5
+            shift = shift + length * direction
+            error = new_error
+        return None

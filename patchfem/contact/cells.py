@@ -1,0 +1,230 @@
+"""Compliance of equal cells that cover the face of two pressed blocks.
+
+u = H p + S p: H multiplies each cosine wave of the traction by its closed form (`waves`), which takes two cosine
+transforms; S is the smooth change by the free sides (`elasticity.sides`). Arrays over the cells are (ny, nx): rows along y,
+columns along x. A profile that does not vary across the width is a single row, ny = 1.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import dctn, idctn
+
+from ..elasticity import sides
+from ..elasticity.sides import BlockShape, LayerStack
+from .waves import compute_wave_compliance
+
+# Smallest compliance of a mode of the free sides, relative to the largest, that is kept
+MIN_KEPT_COMPLIANCE_RATIO = 1e-9
+
+
+class SideCompliance(NamedTuple):
+    """Change of the compliance of the cells by free sides: u = sum of N E N^T p over even and odd loads.
+
+    - along_x (nx, 2 m_x), along_y (ny, p m_y): Integrals [m] of the shape functions over columns and rows, the even ones
+      first; p is 1 for loads that do not vary along y, else 2.
+    - change (2, p, m_x m_y, m_x m_y): Compliance E [m/N] of the nodes.
+    """
+
+    along_x: np.ndarray
+    along_y: np.ndarray
+    change: np.ndarray
+
+    def product(self, traction: np.ndarray, cell_area: float) -> np.ndarray:
+        """Return the mean displacement (ny, nx) [m] of cells of an area [m2] under a traction (ny, nx) [Pa]."""
+        # A quarter of the block carries a quarter of the forces of each parity
+        force = self.along_y.T @ traction @ self.along_x / 4
+        n_x, n_y, n_nodes, _ = self.change.shape
+        parts = force.reshape(n_y, len(force) // n_y, n_x, -1).transpose(2, 0, 3, 1)
+        moved = self.change @ parts.reshape(n_x, n_y, n_nodes, 1)
+        nodal = moved.reshape(parts.shape).transpose(1, 3, 0, 2).reshape(force.shape)
+        return self.along_y @ nodal @ self.along_x.T / cell_area
+
+
+@dataclass(frozen=True, eq=False)
+class CellCompliance:
+    """Compliance of (ny, nx) cells under uniform tractions.
+
+    - length, width: Lengths of the face along x and y [m].
+    - waves (ny, nx): Compliance [m/Pa] for a traction cos(j pi x/length) cos(i pi y/width).
+    - sides: Change by free sides; None between guides.
+    """
+
+    length: float
+    width: float
+    waves: np.ndarray
+    sides: SideCompliance | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of cells (ny, nx)."""
+        return self.waves.shape
+
+    @property
+    def cell_area(self) -> float:
+        """Area of a cell [m2]."""
+        return self.length * self.width / self.waves.size
+
+    @cached_property
+    def x(self) -> np.ndarray:
+        """Centres (nx,) [m] of the columns; 0 in the middle of the face."""
+        return _find_centres(self.length, self.shape[1])
+
+    @cached_property
+    def y(self) -> np.ndarray:
+        """Centres (ny,) [m] of the rows; 0 in the middle of the face."""
+        return _find_centres(self.width, self.shape[0])
+
+    @cached_property
+    def self_compliance(self) -> float:
+        """Mean displacement of a cell per traction on it alone [m/Pa], without the free sides."""
+        return float(self.waves.mean())
+
+    @cached_property
+    def _stiffness(self) -> np.ndarray:
+        """Traction per displacement (ny, nx) [Pa/m] of each wave."""
+        return 1 / self.waves
+
+    def product(self, traction: np.ndarray) -> np.ndarray:
+        """Return the displacement (ny, nx) [m] of the cells under a traction (ny, nx) [Pa]."""
+        displacement = _multiply_waves(self.waves, traction)
+        if self.sides is not None:
+            displacement += self.sides.product(traction, self.cell_area)
+        return displacement
+
+    def precondition(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the traction (ny, nx) [Pa] that displaces all cells of a guided block by (ny, nx) [m]."""
+        return _multiply_waves(self._stiffness, displacement)
+
+
+def _find_centres(length: float, count: int) -> np.ndarray:
+    """Return the centres (count,) [m] of equal cells of a length whose middle is 0."""
+    return ((np.arange(count) + 0.5) / count - 0.5) * length
+
+
+def _multiply_waves(factors: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Multiply the cosine waves of cell values (ny, nx) by factors (ny, nx)."""
+    axes = (0, 1) if len(values) > 1 else (1,)
+    waves = dctn(values, axes=axes, norm="ortho")
+    waves *= factors
+    return idctn(waves, axes=axes, norm="ortho", overwrite_x=True)
+
+
+class BlockCompliance(NamedTuple):
+    """Compliance of the cells of two pressed blocks.
+
+    - normal: Under normal tractions.
+    - shear: Under shear tractions along x, without their coupling to normal displacements; exact for equal pieces.
+    """
+
+    normal: CellCompliance
+    shear: CellCompliance
+
+
+def make_block(
+    shape: BlockShape,
+    stacks: tuple[LayerStack, LayerStack],
+    cells: tuple[int, int],
+    side_level: int | None = 1,
+) -> BlockCompliance:
+    """Make the compliance of the cells between two coated blocks.
+
+    Parameters
+    ----------
+    shape : BlockShape
+        Length and width of the face [m] and the sides that are free.
+    stacks : tuple of LayerStack
+        Layers of the upper and of the lower block, from the face to the far face.
+    cells : tuple of int
+        Number of cells (nx, ny); ny = 1 for a face that does not vary across its width.
+    side_level : int, optional
+        Refinement of the elements of the free sides (`elasticity.sides.compute_side_change`); None for guides at all
+        sides.
+
+    Returns
+    -------
+    BlockCompliance
+    """
+    # Waves between guides; equal pieces count twice
+    n_x, n_y = cells
+    k_x = np.arange(n_x) * np.pi / shape.length
+    k_y = np.arange(n_y)[:, None] * np.pi / shape.width
+    k = np.hypot(k_x, k_y)
+    along_fraction = np.divide(k_x**2, k**2, out=np.ones(k.shape), where=k > 0)
+    normal = np.zeros(k.shape)
+    shear = np.zeros(k.shape)
+    multiplicities = {stack: stacks.count(stack) for stack in stacks}
+    for stack, multiplicity in multiplicities.items():
+        waves = compute_wave_compliance(k, stack)
+        normal += multiplicity * waves.normal
+        shear += multiplicity * waves.across
+        shear += multiplicity * along_fraction * (waves.along - waves.across)
+
+    normal_sides = shear_sides = None
+    if side_level is not None:
+        normal_sides, shear_sides = _place_sides(shape, multiplicities, cells, side_level)
+    return BlockCompliance(
+        CellCompliance(shape.length, shape.width, normal, normal_sides),
+        CellCompliance(shape.length, shape.width, shear, shear_sides),
+    )
+
+
+def _place_sides(
+    shape: BlockShape, multiplicities: dict[LayerStack, int], cells: tuple[int, int], level: int
+) -> tuple[SideCompliance, SideCompliance]:
+    """Return the changes of the normal and of the shear compliance of cells (nx, ny) by free sides.
+
+    `multiplicities` holds how often each stack of layers occurs.
+    """
+    normal = 0.0
+    shear = 0.0
+    for stack, multiplicity in multiplicities.items():
+        change = sides.compute_side_change(stack, shape, level)
+        normal = normal + multiplicity * change.normal
+        shear = shear + multiplicity * change.shear
+
+    # The elements along both axes do not depend on the layers
+    n_x, n_y = cells
+    x_edges = np.linspace(-shape.length / 2, shape.length / 2, n_x + 1)
+    y_edges = np.linspace(-shape.width / 2, shape.width / 2, n_y + 1)
+    along_x = [change.x.integrate(x_edges, is_even=is_even) for is_even in (True, False)]
+    y_parities = (True, False)[: normal.shape[1]]
+    along_y = [change.y.integrate(y_edges, is_even=is_even) for is_even in y_parities]
+    along_y = np.concatenate(along_y, axis=1)
+    if change.y.n_nodes == 1:
+        return tuple(
+            _select_modes(along_x, along_y, change.x.mass, part) for part in (normal, shear)
+        )
+    along_x = np.concatenate(along_x, axis=1)
+    return SideCompliance(along_x, along_y, normal), SideCompliance(along_x, along_y, shear)
+
+
+def _select_modes(
+    along_x: list[np.ndarray], along_y: np.ndarray, mass: np.ndarray, change: np.ndarray
+) -> SideCompliance:
+    """Return a change of compliance that does not vary along y in its few modes along x.
+
+    Parameters
+    ----------
+    along_x : list of (nx, m) ndarray
+        Integrals [m] of the even and of the odd shape functions over columns.
+    along_y : (ny, 1) ndarray
+        Lengths of the rows [m].
+    mass : (m, m) ndarray
+        Integrals of products of two shape functions [m].
+    change : (2, 1, m, m) ndarray
+        Change of the compliance [m/N] for even and odd loads.
+    """
+    # Combinations of the shape functions whose squares have the integral 1
+    combinations = np.linalg.inv(np.linalg.cholesky(mass)).T
+    inverse = np.linalg.inv(combinations)
+    compliances, vectors = np.linalg.eigh(inverse @ change[:, 0] @ inverse.T)
+    size = np.abs(compliances)
+    n_kept = int((size > MIN_KEPT_COMPLIANCE_RATIO * size.max()).sum(axis=1).max())
+    kept = np.argsort(size)[:, -n_kept:]
+    modes = np.take_along_axis(vectors, kept[:, None], axis=2)
+    diagonal = np.take_along_axis(compliances, kept, axis=1)[:, None, :, None] * np.eye(n_kept)
+    parts = [part @ combinations @ mode for part, mode in zip(along_x, modes, strict=True)]
+    return SideCompliance(np.concatenate(parts, axis=1), along_y, diagonal)

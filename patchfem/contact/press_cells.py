@@ -1,0 +1,182 @@
+"""Pressing of two faces that are divided into cells, by a load or an approach, with free or fixed tilts."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import NotConverged
+from .bounded import BoundedProblem, solve_bounded
+from .cells import CellCompliance
+
+MAX_ITERATIONS = 4000  # Largest number of steps; a hard case takes about 200
+# Largest residual of the equations of a contact set; it enters a stiffness squared, and edges of the set linearly
+SET_RESIDUAL_TOL = 1e-9
+
+
+class FaceLoading(NamedTuple):
+    """Load and prescribed motions of the holder of a face.
+
+    - load: Normal load [N]; None under a prescribed approach.
+    - approach: Approach [m] in place of a load, at fixed tilts.
+    - line_x, line_y: Position of the load [m]; the tilt along that axis is free. None: the tilt is fixed.
+    - spring_x, spring_y: Stiffness [N m/rad] of the holder against a free tilt along each axis, unloaded at the tilt that
+      the gap contains.
+    - hardness: Largest pressure [Pa].
+    """
+
+    load: float | None = None
+    approach: float = 0.0
+    line_x: float | None = None
+    line_y: float | None = None
+    spring_x: float = 0.0
+    spring_y: float = 0.0
+    hardness: float = np.inf
+
+
+class PressedCells(NamedTuple):
+    """Pressed cells.
+
+    - pressure, gap (ny, nx): Pressure [Pa] and gap under load [m].
+    - approach: Approach of the holder [m].
+    - tilt_x, tilt_y: Tilts [rad] that the holder adds to those in the gap: positive ones open the gap at +x and at +y. A
+      tilt along x turns the holder about y.
+    - n_iterations: Number of steps of the solver.
+    - residual: Largest wrong gap over the largest displacement.
+    """
+
+    pressure: np.ndarray
+    gap: np.ndarray
+    approach: float
+    tilt_x: float
+    tilt_y: float
+    n_iterations: int
+    residual: float
+
+
+def press_cells(
+    compliance: CellCompliance,
+    gap: np.ndarray,
+    loading: FaceLoading,
+    start: np.ndarray | None = None,
+    tolerance: float = 1e-8,
+) -> PressedCells:
+    """Press two faces.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Normal compliance of the cells.
+    gap : (ny, nx) ndarray
+        Gap of the unloaded faces [m], with fixed tilts.
+    loading : FaceLoading
+        Load or approach, load line, springs and hardness.
+    start : (ny, nx) ndarray, optional
+        Pressure [Pa] of a similar problem.
+    tolerance : float
+        Largest wrong gap over the largest displacement.
+
+    Returns
+    -------
+    PressedCells
+
+    Raises
+    ------
+    NotConverged
+        If the tolerance is not met.
+    """
+    problem = _make_problem(compliance, gap, loading)
+    solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
+    if not solution.residual <= tolerance:
+        raise NotConverged(
+            f"contact: the pressure did not converge; after {solution.n_iterations} steps the gap "
+            f"is wrong by {solution.residual:.1e} of the displacement, more than {tolerance:.1e}"
+        )
+
+    # Approach and tilts of the holder; those that are not free stay
+    motion = iter(solution.motion.tolist())
+    approach = float((gap - problem.gap).flat[0]) + next(motion, 0.0)
+    is_loaded = loading.load is not None
+    tilt_x = -next(motion) if is_loaded and loading.line_x is not None else 0.0
+    tilt_y = -next(motion) if is_loaded and loading.line_y is not None else 0.0
+    open_gap = np.where(solution.traction > 0, 0.0, np.maximum(solution.slope, 0.0))
+    return PressedCells(
+        solution.traction,
+        open_gap,
+        approach,
+        tilt_x,
+        tilt_y,
+        solution.n_iterations,
+        solution.residual,
+    )
+
+
+def _make_problem(compliance: CellCompliance, gap, loading: FaceLoading) -> BoundedProblem:
+    """Return the bounded problem of a loading, with a gap [m] from its lowest point or from the approach."""
+    if loading.load is None:
+        return BoundedProblem(gap - loading.approach, 0.0, loading.hardness)
+    x = np.broadcast_to(compliance.x, gap.shape)
+    y = np.broadcast_to(compliance.y[:, None], gap.shape)
+    axes = [
+        (np.ones(gap.shape), 1.0, 0.0),
+        (x, loading.line_x, loading.spring_x),
+        (y, loading.line_y, loading.spring_y),
+    ]
+    motions, lines, springs = zip(*(axis for axis in axes if axis[1] is not None))
+    area = compliance.cell_area
+    target = loading.load / area * np.array(lines)
+    return BoundedProblem(
+        gap - gap.min(),
+        0.0,
+        loading.hardness,
+        np.array(motions),
+        target,
+        np.array(springs) / area,
+    )
+
+
+def solve_on_set(
+    compliance: CellCompliance, active: np.ndarray, motion: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """Solve for the tractions on a contact set that cause a motion of its cells.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Normal or shear compliance.
+    active : (ny, nx) bool ndarray
+        Cells in contact.
+    motion : (ny, nx) ndarray or float
+        Displacement of the cells [m].
+
+    Returns
+    -------
+    (ny, nx) ndarray
+        Traction [Pa], 0 outside the set.
+    """
+    motion = np.broadcast_to(motion, active.shape)
+    bound = np.where(active, np.inf, 0.0)
+    problem = BoundedProblem(-motion, -bound, bound)
+    return solve_bounded(compliance, problem, tolerance=SET_RESIDUAL_TOL).traction
+
+
+def compute_set_stiffness(
+    compliance: CellCompliance, active: np.ndarray, motion: np.ndarray | float = 1.0
+) -> float:
+    """Compute the stiffness of a contact set against a motion of its cells.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Normal or shear compliance.
+    active : (ny, nx) bool ndarray
+        Cells in contact.
+    motion : (ny, nx) ndarray or float
+        Displacement of the cells per unit: 1 for a translation, x or y for a tilt.
+
+    Returns
+    -------
+    float
+        Stiffness [N/m], or [N m/rad] for a tilt.
+    """
+    traction = solve_on_set(compliance, active, motion)
+    return float(np.vdot(traction, np.broadcast_to(motion, active.shape))) * compliance.cell_area
