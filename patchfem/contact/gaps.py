@@ -31,13 +31,15 @@ SHAPE_PROPERTIES = {
 }
 
 
-def tilt(x: np.ndarray, angle: float, roll: float = 0.0, y: np.ndarray | float = 0.0) -> np.ndarray:
+def tilt(
+    x: np.ndarray, angle: float, roll: float | None = None, y: np.ndarray | float = 0.0
+) -> np.ndarray:
     """Return the gap [m] of a tilted upper piece: the angle times x, plus the angle `roll` times y.
 
     An angle [rad] > 0 opens the gap at +x, and a roll > 0 at +y. The positions x and y [m] broadcast; y is 0 in a plane
     patch.
     """
-    return angle * x + roll * y
+    return angle * x if roll is None else angle * x + roll * y
 
 
 def crown(

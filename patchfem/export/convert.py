@@ -175,7 +175,7 @@ def _open_window(frames: "Frames | image.FaceFrames", number: int, title: str) -
 
     plotter = pv.Plotter(title=f"patchfem: {title}")
     if isinstance(frames, image.FaceFrames):
-        grid = image.make_image_grid(frames, number)
+        grid = grids.make_image_grid(frames, number)
         plotter.add_mesh(grid, scalar_bar_args={"title": "normal stress [Pa]"})
         plotter.view_xy()
         plotter.show()

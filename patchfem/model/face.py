@@ -68,6 +68,16 @@ def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedG
     return ShapedGap(heights, notes, seconds)
 
 
+def read_scan(path) -> Areal:
+    """Read the areal scan in a file; PatchfemError for a trace."""
+    scan = read_surface(path)
+    if not isinstance(scan, Areal):
+        raise PatchfemError(
+            f"{path}: a trace, but an areal scan is needed: give it as contact.profile.file"
+        )
+    return scan
+
+
 @cache_by_file
 def read_face(path, at: tuple[float, float] | None, length: float, width: float) -> Areal:
     """Read the part of an areal scan that lies over a face, levelled and without spikes.
@@ -91,11 +101,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     PatchfemError
         If the file is not an areal scan, or covers less than half of the face.
     """
-    scan = read_surface(path)
-    if not isinstance(scan, Areal):
-        raise PatchfemError(
-            f"{path}: a trace, but an areal scan is needed: give it as contact.profile.file"
-        )
+    scan = read_scan(path)
     spikes = find_scan_spikes(scan)
     scan = replace(scan, z=np.where(spikes, np.nan, scan.z))
     middle = at or ((scan.x[0] + scan.x[-1]) / 2, (scan.y[0] + scan.y[-1]) / 2)

@@ -16,7 +16,6 @@ from ..mesh import files
 from ..scene.files import file_exists, list_named_files
 from ..scene.keys.tables import Tables
 from ..scene.rules.structure import MATRIX_KEYS
-from ..surface.files.read import read_surface
 from . import (
     drive,
     earlier_wear,
@@ -164,7 +163,7 @@ def _check_scan(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     If the `tables` of the scene are valid (`is_valid`), it must also cover half of the face.
     """
     if not is_valid:
-        read_surface(path)
+        face.read_scan(path)
         return ()
     contact = tables.contact
     return face.read_face(path, contact.profile.at, contact.length, contact.width).notes

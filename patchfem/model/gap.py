@@ -86,7 +86,8 @@ class Gap:
     @property
     def roll(self) -> float:
         """Prescribed angle [rad] of the upper piece about x."""
-        return next((keys.roll for keys, _ in self._values("angle") if keys.on == "upper"), 0.0)
+        angles = (keys.roll for keys, _ in self._values("angle") if keys.on == "upper")
+        return next(angles, 0.0) or 0.0
 
     @property
     def tilt(self) -> float | None:

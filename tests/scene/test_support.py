@@ -63,6 +63,7 @@ SETS = {
     ),
     "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
     "patch.holder.tangential_stiffness": "{patch}.holder.tangential_stiffness=1e7_N/m",
+    "patch.area": "{patch}.area.cells=64",
     "patch.strips": "{patch}.strips.count=4",
     "patches of interfaces": OWN_PATCH,
     "sensor apart from the output": "structure.mode.second.gauge=0.3",

@@ -24,8 +24,9 @@ class Chart:
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "face" (a map of the last frame over x and
-        y), "overlay" (a line for each element of the first dimension) or "film" (a map with a slider). Of a sweep: "relative" (measures divided by their first value),
-        "menu" (one measure at a time) or "maps" (the same over two keys).
+        y), "overlay" (a line for each element of the first dimension) or "film" (a map with a slider). Of a sweep:
+        "relative" (measures divided by their first value), "menu" (one measure at a time) or "maps" (the same over two
+        keys).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str

@@ -140,22 +140,6 @@ def export_image(frames: FaceFrames, out: Path, number: int) -> None:
     write_rows(out, [columns, *zip(*columns.values())])
 
 
-def make_image_grid(frames: FaceFrames, number: int):
-    """Return one frame of the fields over a face as a pyvista.ImageData, in SI units."""
-    import pyvista as pv
-
-    grid = pv.ImageData(
-        dimensions=(frames.x.size, frames.y.size, 1),
-        spacing=(frames.x[1] - frames.x[0], frames.y[1] - frames.y[0], 1.0),
-        origin=(frames.x[0], frames.y[0], 0.0),
-    )
-    for name, values in frames.fields.items():
-        grid.cell_data[name] = values[number].ravel()
-    grid.field_data["TimeValue"] = [frames.times[number]]
-    grid.set_active_scalars("normal_stress")
-    return grid
-
-
 def draw_face(frames: FaceFrames, number: int, title: str = "", onto=None):
     """Draw the fields over a face in one frame, and return the figure.
 

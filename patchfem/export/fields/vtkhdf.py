@@ -13,7 +13,6 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import add_yielding_notes, compute_pieces, number_distinct_frames
-from . import image
 from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 
 VTKHDF_FILE = "fields.vtkhdf"  # name of the file in a results folder
@@ -50,9 +49,6 @@ def write_fields(result, path: Path) -> None:
     path : Path
         File to write.
     """
-    if result.patch.model.area is not None:
-        image.write_image(image.collect_face_frames(result), path)
-        return
     pieces = compute_pieces(result)
     add_yielding_notes(result, pieces)
     write_blocks(path, make_blocks(pieces), pieces.time)

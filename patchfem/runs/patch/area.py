@@ -40,7 +40,7 @@ SIDE_LEVEL = 1  # level of the bricks of the free sides; the level before gives 
 # 65, 2017).
 BOUNDARY_SIDE_FRACTION = (np.pi - 1 + np.log(2)) / 24
 MIN_RELATIVE_ERROR = 1e-7  # smallest relative error that is stated; the contact is solved to 1e-8
-FREE_EDGE_REASON = "the largest pressure is at a free side of the face, where it converges too slowly over equal cells to be stated"
+FREE_EDGE_REASON = "the largest pressure is at a free side of the face, where it converges too slowly over equal cells"
 NO_HALF_WIDTH_REASON = "a contact over a face has no half-width; contact_area is its area"
 
 
@@ -640,8 +640,8 @@ def describe_plane_strain(patch_model: PatchModel | None) -> list[str]:
         stiffness[free_sides] = [faces.compute_set_stiffness(one, everywhere) for one in cells]
     normal, shear = (100 * (plane / block - 1) for plane, block in zip(*stiffness.values()))
     return [
-        f"plane strain makes flat pieces {normal:.2g} % stiffer under the load and {shear:.2g} % stiffer in shear than blocks "
-        f"{ratio:.2g} times as wide as tall, whose four sides are free; [contact.area] computes the blocks"
+        f"plane strain makes flat pieces {normal:.2g} % stiffer under the load and {shear:.2g} % stiffer in shear than "
+        f"blocks {ratio:.2g} times as wide as tall, whose four sides are free; [contact.area] computes the blocks"
     ]
 
 

@@ -95,9 +95,7 @@ def _slip_to(cells, limit: np.ndarray, displacement: float, start=None) -> np.nd
 
     `start` are the tractions at a smaller displacement, or None.
     """
-    none = np.zeros((0, *limit.shape))
-    gap = np.full(limit.shape, -displacement)
-    problem = BoundedProblem(gap, -limit, limit, none, np.zeros(0), np.zeros(0))
+    problem = BoundedProblem(np.full(limit.shape, -displacement), -limit, limit)
     return solve_bounded(cells, problem, start, 1e-7).traction
 
 

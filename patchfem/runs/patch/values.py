@@ -15,7 +15,6 @@ from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
 from ..results.patch_rows import Values
-from . import area
 from .press import Patch
 
 # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
@@ -152,8 +151,6 @@ def compute_static_values(patch: Patch) -> Values:
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
     this node on either side of the step. `patch_rows` defines the measures.
     """
-    if patch.model.area is not None:
-        return area.compute_face_values(patch).copy()
     return _compute_static_values(patch).copy()
 
 

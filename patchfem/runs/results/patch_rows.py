@@ -158,7 +158,8 @@ PATCH_MEASURE_ROWS = (
         "stick_area_fraction",
         "1",
         1e-3,
-        "fraction of the area in contact that sticks at the last reversal of the slide; needs [contact.area] and partial slip",
+        "fraction of the area in contact that sticks at the last reversal of the slide; needs [contact.area] and partial "
+        "slip",
         group="patch",
         minimum=0.0,
     ),

@@ -419,6 +419,13 @@ def solve_worn(patch, worn):
     return solve_patch_contact(patch.model, patch.pair, worn)
 
 
+def compute_values(patch) -> Values:
+    """Return the values of all static measures of a patch by name, in SI units."""
+    if patch.model.area is not None:
+        return area.compute_face_values(patch)
+    return compute_static_values(patch)
+
+
 def _make_force_function(patch):
     """Return a function of worn depth and softening that computes the contact forces [N] (`wear.depth.Press`)."""
     if patch.model.area is not None:
@@ -434,7 +441,7 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     """
     model = motion.model
     worn = make_worn_model(model, patch, state.depth)
-    measures = compute_static_values(patch) | motion.last.values
+    measures = compute_values(patch) | motion.last.values
     measures |= compute_worn_volume_and_depth(model.patch, patch, state.depth)
 
     # Wear changes the grooves and, by a table, the friction law.

@@ -15,12 +15,12 @@ from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors
 from ..patch.press import nodal_areas
 from ..patch.result import UNCOUPLED_STRIPS_WARNING
-from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (
     WORN_THROUGH_FRACTION,
     compute_mean_worn_depth,
+    compute_values,
     compute_worn_volume_and_depth,
     find_worn_through_coating,
     list_worn_pieces,
@@ -153,8 +153,8 @@ def _widen_errors_by_jumps(result, evolved):
         The worn patch with its jumps, also on the coarser meshes.
     """
     coarse_depth = frozen_array(evolved.state.coarse_depth)
-    coarse = compute_static_values(solve_worn(evolved.patch, coarse_depth))
-    fine_values = compute_static_values(evolved.patch)
+    coarse = compute_values(solve_worn(evolved.patch, coarse_depth))
+    fine_values = compute_values(evolved.patch)
     measures = dict(result.measures)
     for name, value in fine_values.items():
         measure = measures.get(name)
@@ -287,7 +287,7 @@ def _measure_worn_friction(model, evolved, motion: Measures, error: float | None
         return measures
 
     # Rate of a measure: change per change of the mean worn depth in a jump.
-    static_names = compute_static_values(evolved.patch)
+    static_names = compute_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
             continue

@@ -40,7 +40,6 @@ _OTHER_WAVEFORM_KEYS = " ".join(
 )
 ALTERNATIVE_KEYS = {  # keys of which a table always needs one
     contact.Contact: "load|approach",
-    contact.Tilt: "angle/roll",
     contact.LoadLine: "offset/moment/across",
     contact.ProfileFile: "file|scan",
     contact.Holder: "rotational_stiffness/tangential_stiffness",

@@ -125,11 +125,11 @@ class Tilt(Table):
     angle: key(
         SmallAngle,
         "angle between the pieces; an angle > 0 opens the gap at +x; the gap is this angle times x, so it must be small",
-    ) = 0.0
-    roll: key(
+    )
+    roll: optional(
         SmallAngle,
-        "angle between the pieces about x, beside [contact.area]; an angle > 0 opens the gap at +y",
-    ) = 0.0
+        "angle between the pieces about x, beside [contact.area]; an angle > 0 opens the gap at +y; default: 0",
+    )
     on: key(
         Piece,
         "piece that is tilted; during the slide the pressure distribution moves with this piece",

@@ -111,7 +111,7 @@ def _check_strips(patch: TableFacts) -> None:
 
 
 def _check_area(patch: TableFacts) -> None:
-    """Report a load across the width that a patch cannot carry, a hardness below its pressure, and unequal pieces that slip."""
+    """Report a load line outside a face, a hardness below the mean pressure, and unequal pieces that slip."""
     line = patch.load_line.across
     if abs(line) >= patch.width / 2:
         patch.add_mistake(
