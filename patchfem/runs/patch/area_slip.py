@@ -28,8 +28,9 @@ COMPUTED_MODES_RATIO = 2
 class LevelForces:
     """Forces of cells as a linear function of the stretches of parallel elements, like a matrix (a, t).
 
-    By Masing's rule every state is a superposition of first loadings: the forces change with the displacement y at which
-    elements yield as those of the first loading do, times the slope of the stretches over y.
+    By Masing's rule every state is a superposition of first loadings: between two displacements of the first loading, each
+    cell gets its part of the force of the elements that yield between them. So the forces of the cells add up to that of
+    the elements.
 
     Parameters
     ----------
@@ -37,19 +38,28 @@ class LevelForces:
         Displacements [m] of the first loading, from 0.
     force : (n + 1, a) array
         Forces [N] of the cells at them.
-    yields : (t,) array
-        Yield displacements [m] of the elements, increasing.
+    stiffness, yields : (t,) array
+        Stiffnesses [N/m] and yield displacements [m] of the elements, increasing.
     """
 
-    def __init__(self, displacement, force, yields):
-        self.displacement = displacement
-        self.rate = np.diff(force, axis=0) / np.diff(displacement)[:, None]
-        self.yields = yields
+    def __init__(self, displacement, force, stiffness, yields):
+        self.change = np.diff(force, axis=0)
+        # While elements stick up to their yield displacement, the slope of the curve is the stiffness that remains.
+        self.slope = np.cumsum(stiffness[::-1])[::-1]
+        steps = np.diff(yields, prepend=0.0)
+        middle = yields - steps / 2
+        self.level = np.clip(np.searchsorted(displacement, middle), 1, displacement.size - 1) - 1
+        self.total = self._sum_by_level(steps)
+
+    def _sum_by_level(self, steps: np.ndarray) -> np.ndarray:
+        """Return the change (n,) [N] of the force between the displacements for steps (t,) [m] of the stretch."""
+        return np.bincount(self.level, self.slope * steps, len(self.change))
 
     def __matmul__(self, stretch: np.ndarray) -> np.ndarray:
         """Return the forces (a,) [N] of the cells at stretches (t,) [m] of the elements."""
-        levels = np.interp(self.displacement, np.append(0.0, self.yields), np.append(0.0, stretch))
-        return np.diff(levels) @ self.rate
+        carried = self._sum_by_level(np.diff(stretch, prepend=0.0))
+        share = np.divide(carried, self.total, out=np.zeros(carried.size), where=self.total > 0)
+        return share @ self.change
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +86,8 @@ class AreaElements:
         last = self.yield_displacement[-1]
         if self.compliance.cells is None:
             force = np.stack([np.zeros(self.limit.size), self.limit])
-            return LevelForces(np.array([0.0, last]), force, self.yield_displacement)
+            ends = np.array([0.0, last])
+            return LevelForces(ends, force, self.stiffness, self.yield_displacement)
         share = np.linspace(0.0, 1.0, N_LOADING_LEVELS + 1)
         displacement = last * share**2 * (3 - 2 * share)
         force = np.zeros((displacement.size, self.limit.size))
@@ -87,7 +98,7 @@ class AreaElements:
             own = displacement[level] / self.compliance.factor - self.compliance.holder * carried
             traction = _slip_to(self.compliance.cells, self.pressure_limit, own, traction)
             force[level] = traction.ravel()[self.points] * self.compliance.weight
-        return LevelForces(displacement, force, self.yield_displacement)
+        return LevelForces(displacement, force, self.stiffness, self.yield_displacement)
 
 
 def _slip_to(cells, limit: np.ndarray, displacement: float, start=None) -> np.ndarray:
