@@ -382,7 +382,7 @@ def new(kind: str, /) -> str:
     Parameters
     ----------
     kind : str
-        "patch", "joint", "bench", "rig", "beam", "damper", "shroud", "linear", "misalignment" or "wear".
+        "patch", "area", "joint", "bench", "rig", "beam", "damper", "shroud", "linear", "misalignment" or "wear".
 
     Returns
     -------
