@@ -591,7 +591,7 @@ COMPARE_CHARTS = (
         "pressure_before@x_pressed_before pressure_after@x_pressed_after",
         x_label="x of the patch",
         y_label="normal stress",
-        caption="Normal stress of the pressed patch with each of the two surfaces; the mean over strips.",
+        caption="Normal stress of the pressed patch with each of the two surfaces; of a face at y = 0.",
     ),
     Chart(
         "Friction loops",

@@ -51,12 +51,15 @@ def read_patch(folder: Path) -> PatchRun:
             f"{folder}: result.nc contains no {' and no '.join(missing)}; run the scene again"
         )
 
-    # A field of a patch with strips has a row for each strip, or one row that is valid for all of them.
+    # A field over a face has a row for each y, and one of a patch with strips for each strip, or one for all of them.
     x = data["x"].values
-    y = data["strip_offset"].values if "strip_offset" in data else None
+    rows = data.get("y", data.get("strip_offset"))
+    y = None if rows is None else rows.values
     shape = x.shape if y is None else (y.size, x.size)
     depth = worn_depths(answer)[-1] if "wear" in scene else np.zeros(x.size)
-    weight = data["weight"].values if y is None else data["weight"].values / y.size
+    weight = data["weight"].values
+    if "strip_offset" in data:
+        weight = weight / y.size
     fields = (weight, data["unloaded_gap"].values, depth)
     try:
         area, gap, depth = (np.broadcast_to(field, shape) for field in fields)
