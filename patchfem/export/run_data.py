@@ -119,20 +119,11 @@ RUN_VARIABLES = {
     ),
     "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
     "period": Row("", "s", "period of the drive", "motion.period"),
-    "strip_offset": Row(
-        "strip", "m", "position of the strip across the width", "patch.strips.offsets"
-    ),
-    "strip_normal_stress": Row(
-        "strip x",
-        "Pa",
-        "normal stress of each strip, compression positive",
-        "patch.strips.pressure",
-    ),
     "event_time": Row("event", "s", "time of the event", "motion.events.time"),
     "event_interface": Row(
         "event",
         "1",
-        "number of the interface or strip from 1; 0 for a change of the drive",
+        "number of the interface or band from 1; 0 for a change of the drive",
         "motion.events.interface",
     ),
     "event_kind": Row(
@@ -374,7 +365,7 @@ def _collect_patch(result: Result) -> Variables:
         fields = {name: values[count:] for name, values in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
     text = "gap of the unloaded surfaces, wear included"
-    data |= make_columns("strip x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
+    data |= make_columns("x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
     data |= _collect_frames(fields, surface)
     if result.patch.model.area is None:
         return data
@@ -441,14 +432,13 @@ def _list_code_meanings(name: str) -> tuple[str, ...]:
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
-    """Return a field along x over frames, and over strips if it has three dimensions.
+    """Return a field along x over frames.
 
     The `values` are in SI units. `name` is a key of `INTERFACE_FIELDS`, and `frame` the name of the dimension of the
     frames.
     """
     unit, text = INTERFACE_FIELDS[name]
-    dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
-    return Variable(dims, np.asarray(values), unit, text, _list_code_meanings(name))
+    return Variable((frame, "x"), np.asarray(values), unit, text, _list_code_meanings(name))
 
 
 def _collect_face(face) -> Variables:

@@ -196,22 +196,9 @@ class ScanFile(NamedTuple):
     file: str
 
 
-class PatchStrips(NamedTuple):
-    """Strips of a patch across its width.
-
-    - roll: angle [rad] about the x axis.
-    - offset: lateral position [m] of the load line, None if the piece cannot roll.
-    - count: number of equal strips.
-    """
-
-    count: int
-    roll: float
-    offset: float | None
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchInterface:
-    """Interface of a patch: asperity layer, strips and shear compliance.
+    """Interface of a patch: asperity layer and shear compliance.
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
@@ -219,7 +206,6 @@ class PatchInterface:
     """
 
     skin: Asperities | None
-    strips: PatchStrips | None
     has_shear: bool
     partial_slip: str
 
@@ -283,7 +269,7 @@ class PatchModel:
     - pieces: shape and material of both pieces.
     - gap: gap between them before they are loaded.
     - loading: what presses them together.
-    - interface: asperity layer, strips and shear compliance.
+    - interface: asperity layer and shear compliance.
     - mesh: how they are meshed.
     - area: cells of a face on which the pressure also varies along y; None for a plane patch.
     """
@@ -335,7 +321,7 @@ class PatchModel:
         """Return a copy of the patch with an element size [m]; None: the mesh is refined to the tolerance."""
         gap = self.gap
         if not gap.is_rough and self.mesh.file is None:
-            lengths = _average_over_cells(size, self.interface.strips, self.pieces)
+            lengths = _average_over_cells(size, self.pieces)
             gap = replace(gap, average=lengths.average, limit=lengths.limit)
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
@@ -384,15 +370,12 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)
         skin = peaks.complete_asperities(skin, resolve_path, cutoff)
-    strips = contact.strips
-    if strips is not None:
-        strips = PatchStrips(strips.count, strips.roll, strips.offset)
 
     return PatchModel(
         pieces=pieces,
         gap=gap,
         loading=_build_loading(contact),
-        interface=PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key),
+        interface=PatchInterface(skin, contact.shear is not None, contact.compliance_key),
         mesh=PatchMesh(
             element_size=contact.element_size,
             file=find_mesh_file(contact, resolve_path),
@@ -507,18 +490,18 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
         return ProfileLengths(average, None)
     if contact.mesh is not None:
         return ProfileLengths(None, 0.0)
-    return _average_over_cells(contact.element_size, contact.strips, pieces)
+    return _average_over_cells(contact.element_size, pieces)
 
 
-def _average_over_cells(size: float | None, strips, pieces: PatchPieces) -> ProfileLengths:
+def _average_over_cells(size: float | None, pieces: PatchPieces) -> ProfileLengths:
     """Return the lengths over which a profile is averaged on a mesh with an element size [m], or on an automatic one.
 
-    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart (strips, pieces that reach
-    beyond the interface), its cells are those of an even mesh at most.
+    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart (pieces that reach beyond the
+    interface), its cells are those of an even mesh at most.
     """
     if size:
         return ProfileLengths(size, size)
-    if strips is None and not pieces.has_overhang:
+    if not pieces.has_overhang:
         return ProfileLengths(None, None)
     return ProfileLengths(None, pieces.length / N_DEFAULT_CELLS)
 

@@ -242,17 +242,11 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     """
     if patch.model.area is not None:
         return area_slip.compute_stick_stiffness(patch, factor, bond_length)
-    forces = [patch.pressure.sigma_n * patch.pieces.interface.weight]
-    if patch.strips is not None:
-        forces = patch.strips.force
-    # The compliance of a strip is inversely proportional to its fraction of the width.
-    compliance = factor * len(forces) * patch.slip_compliance
-    total = 0.0
-    for force in forces:
-        points = np.flatnonzero(force > 0)
-        nodal = compliance[np.ix_(points, points)] + np.diag(bond_length / force[points])
-        total += float(np.linalg.solve(nodal, np.ones(points.size)).sum())
-    return total
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    points = np.flatnonzero(force > 0)
+    nodal = factor * patch.slip_compliance[np.ix_(points, points)]
+    nodal += np.diag(bond_length / force[points])
+    return float(np.linalg.solve(nodal, np.ones(points.size)).sum())
 
 
 def _match_stiffness(
@@ -279,11 +273,11 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
 
     `bond_length` [m] is that of the friction law, whose bonds are in series with the pieces; 0 for rigid contact.
-    Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
+    Nodes at the edges of a contact have soft bonds; the whole compliance of
     such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """
     is_plane = patch.model.area is None
-    if is_plane and patch.strips is None and not bond_length:
+    if is_plane and not bond_length:
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
 
     def excess(log_factor: float) -> float:
@@ -293,7 +287,7 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
 
-    # scipy.optimize takes half a second to import, and most joints have no bonds and no strips.
+    # scipy.optimize takes half a second to import, and most joints have no bonds.
     from scipy.optimize import brentq
 
     factor = np.exp(

@@ -335,7 +335,7 @@ def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     """Return a Result that begins with the static measures of all pressed interfaces, such as their peak pressures."""
     static: Measures = {}
     for face in pressed:
-        for name, measure in patch_result.static_measures(face.model, face.patch).items():
+        for name, measure in face.patch.measures.items():
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
     return replace(result, measures=static | motion)
@@ -425,8 +425,8 @@ def _complete_result(done: FinishedPass) -> Result:
     patch = result.patch
     if patch is not None:
         patch = replace(patch, frames=result.fields)
-    # A number after the name of a measure counts the strips of a patch, or else the interfaces.
-    part = "interface" if model.patch is None else "strip"
+    # A number after the name of a measure counts the bands of a face, or else the interfaces.
+    part = "interface" if model.patch is None else "band"
     described = {}
     for name, measure in result.measures.items():
         described[name] = replace(measure, text=describe_measure(name, part))

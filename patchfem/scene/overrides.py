@@ -49,7 +49,9 @@ PLAIN_KEYS = {
 
 # Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a loaded patch, alone or in a rig, or a rig with one
 # contact point. The rig has modes and a sinusoidal base motion.
-_LOADED_PATCH = "!wear & contact.load & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
+_LOADED_PATCH = (
+    "!wear & contact.load & !contact.load_line & !contact.area & !contact.grooves & !contact.holder"
+)
 _MOVED_BASE = (
     "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
     "!drive.duration & !friction.temperature & !friction.spread"

@@ -21,7 +21,7 @@ MIN_HEIGHT_RANGE = 1e-12  # range of heights [m] below which an unworn surface i
 
 
 class PatchState(NamedTuple):
-    """Surface of a patch at the end of a run; fields are (m,), or (s, m) with strips.
+    """Surface of a patch at the end of a run; fields are (m,), or (s, m) over a face.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class PatchState(NamedTuple):
     x : (m,) array
         Nodes [m].
     y : (s,) array or None
-        Middles of the strips [m].
+        Middles of the rows of cells [m].
     area, gap, depth : array
         Areas of the nodes [m2]; gap of the unloaded surfaces with wear, and worn depth so far [m].
     measures : dict
@@ -59,7 +59,7 @@ class Wear(NamedTuple):
     depth : array
         Depth [m] worn between them.
     values, track : dict of str to Quantity
-        Quantities of the patch, and of its worn part ({} with strips).
+        Quantities of the patch, and of its worn part ({} over a face).
     hidden : tuple of float
         Hidden wear [m] at the ends or corners of the patch.
     error : float

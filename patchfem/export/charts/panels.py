@@ -146,9 +146,8 @@ def _find_x(data: Variables, chart: Chart) -> str:
 
 
 def _as_floats(variable: Variable) -> np.ndarray:
-    """Return the values of a variable as floats, averaged over its dimension `strip` if it has one."""
-    values = np.asarray(variable.values, float)
-    return values.mean(axis=variable.dims.index("strip")) if "strip" in variable.dims else values
+    """Return the values of a variable as floats."""
+    return np.asarray(variable.values, float)
 
 
 def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:

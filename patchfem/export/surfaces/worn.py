@@ -185,7 +185,7 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
         ends = np.array([wear.track[name].value for name in ("from", "to")])
         data |= make_variables("track_end", track_end=ends)
 
-    # Pressure of the last frame, on a face that at y = 0, and the loop of a patch without strips.
+    # Pressure of the last frame, on a face that at y = 0, and the loop of a single interface.
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
         variables, x = run.answer.data, f"x_pressed_{side}"
         last = np.atleast_2d(variables["normal_stress"].values[-1])

@@ -165,12 +165,10 @@ class AreaPatch:
     measures: Measures | None = None
     frames: Arrays = field(default_factory=dict)
 
-    # What a face has not: profiles at points of their own, averages of traces, variants of a step, strips
+    # What a face has not: profiles at points of their own, averages of traces, variants of a step, meshes
     points = None
     averaging = None
     step_variants = ()
-    strips = None
-    has_unequal_strips = False
     pair = None
 
     @property

@@ -43,6 +43,7 @@ class LevelForces:
     """
 
     def __init__(self, displacement, force, stiffness, yields):
+        self.displacement = displacement
         self.change = np.diff(force, axis=0)
         # While elements stick up to their yield displacement, the slope of the curve is the stiffness that remains.
         self.slope = np.cumsum(stiffness[::-1])[::-1]
@@ -168,6 +169,33 @@ def make_area_elements(patch: AreaPatch, static: float, length: float) -> AreaEl
     curve = first_loading.FirstLoading(displacement, force)
     sliders = first_loading.make_spring_sliders(curve)
     return AreaElements(*sliders, points, forces, compliance, limit)
+
+
+def list_band_elements(
+    elements: AreaElements, numbers: np.ndarray, count: int
+) -> "list[first_loading.SpringSliders]":
+    """Return the elements of bands of a face, each with its part of the force while the whole face slides.
+
+    Parameters
+    ----------
+    elements : AreaElements
+        Elements of the whole face.
+    numbers : (m,) array
+        Number of the band of each cell.
+    count : int
+        Number of bands; one without load yields at once.
+    """
+    levels = elements.force_matrix
+    out = []
+    for band in range(count):
+        is_own = numbers[elements.points] == band
+        force = np.append(0.0, np.cumsum(levels.change[:, is_own].sum(axis=1)))
+        if force[-1] > 0:
+            curve = first_loading.FirstLoading(levels.displacement, force)
+            out.append(first_loading.make_spring_sliders(curve))
+        else:
+            out.append(first_loading.SpringSliders(np.ones(1), np.zeros(1)))
+    return out
 
 
 def compute_stick_stiffness(patch: AreaPatch, factor: float, bond_length: float) -> float:

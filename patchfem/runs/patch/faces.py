@@ -15,7 +15,7 @@ from ...slip import fields as slip_fields
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
 from . import mesh_levels, store
-from .jenkins_elements import PatchElements, join_elements, list_elements
+from .jenkins_elements import PatchElements, make_elements
 from .press import Patches
 
 
@@ -78,7 +78,7 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> P
     """
     patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
     length = record.make_law(interface.numbers, interface.load).length
-    return join_elements(list_elements(patch, interface.numbers.static, length))
+    return make_elements(patch, interface.numbers.static, length)
 
 
 def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:

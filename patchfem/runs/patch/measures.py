@@ -339,7 +339,7 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
         return ""
     x = patch.x
     cells = np.diff(x)
-    is_loaded = patch.active if patch.strips is None else patch.strips.pressure.any(axis=0)
+    is_loaded = patch.active
     if patch.model.has_singular_ends and is_loaded[[0, -1]].any():
         return (
             "unbounded: a sharp corner of one piece presses on the longer face of the other piece"

@@ -167,7 +167,7 @@ def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
     gap = patch_model.gap
     if tilt is None or patch_model.area is not None:
         return []
-    if gap.profile is not None or patch_model.interface.strips is not None or len(gap.shapes) > 1:
+    if gap.profile is not None or len(gap.shapes) > 1:
         return [
             f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
             "pieces are not flat"

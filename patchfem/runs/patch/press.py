@@ -16,20 +16,16 @@ from ...contact.press import (
     StripLayout,
     StripModel,
     StripsState,
-    compute_strip_offsets,
     press_strips,
     split_into_strips,
 )
 from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
-from ...model.patch import PatchModel, PatchStrips
+from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
-
-# Largest difference of the loads of strips, relative to their mean, that counts as round-off
-EQUAL_STRIP_LOAD_TOL = 1e-9
 
 
 class Surface(NamedTuple):
@@ -39,7 +35,7 @@ class Surface(NamedTuple):
     - weight (n,): areas [m2].
     - sigma_n (n,): normal stress [Pa].
     - gap (n,): gap under load [m].
-    - unloaded_gap: gap without load (n,), or (s, n) of strips [m].
+    - unloaded_gap: gap without load (n,) [m].
     """
 
     x: np.ndarray
@@ -75,14 +71,14 @@ class Patch:
 
     - model: PatchModel.
     - pair: condensed pieces.
-    - pieces: Compliance including the asperity layer of a patch without strips, a nonlinear layer being linearised
+    - pieces: Compliance including the asperity layer of the patch, a nonlinear layer being linearised
       at the operating point.
-    - pressure: ContactState; for strips its mean over the width.
-    - state: StripsState; a patch without strips is a single one.
+    - pressure: ContactState.
+    - state: StripsState of a single strip.
     - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
       the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
       holder spring, which is equal in all entries.
-    - unloaded_gap (m,): gap of the unloaded surfaces [m]; (s, m) for worn strips.
+    - unloaded_gap (m,): gap of the unloaded surfaces [m].
     - notes: notes on the gap and on the pressure.
     - seconds: CPU seconds by name.
     - averaging: length [m] over which a profile in contact is averaged; None without a profile.
@@ -116,12 +112,12 @@ class Patch:
 
     @property
     def normal_stress(self) -> np.ndarray:
-        """Pressure at the nodes (m,) [Pa], averaged over the strips."""
+        """Pressure at the nodes (m,) [Pa]."""
         return self.pressure.sigma_n
 
     @property
     def gap(self) -> np.ndarray:
-        """Gap under load at the nodes (m,) [m]; for strips their smallest gap."""
+        """Gap under load at the nodes (m,) [m]."""
         return self.pressure.gap
 
     @property
@@ -166,19 +162,6 @@ class Patch:
     def has_smooth_skin(self) -> bool:
         """Whether the pieces carry pressure at every separation, through a nonlinear asperity layer."""
         return self.has_skin and self.model.interface.skin.law != "linear"
-
-    @property
-    def strips(self) -> StripsState | None:
-        """Contact state of a patch that is divided into strips, else None."""
-        return None if self.model.interface.strips is None else self.state
-
-    @property
-    def has_unequal_strips(self) -> bool:
-        """Whether the pressure varies across the width, so that the neglected coupling of the strips has an effect."""
-        if self.strips is None:
-            return False
-        loads = self.strips.force.sum(axis=1)
-        return bool(np.ptp(loads) > EQUAL_STRIP_LOAD_TOL * loads.mean())
 
     @property
     def layer_compliance(self) -> np.ndarray | None:
@@ -305,7 +288,7 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
             pressure > edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max(), pressure, 0.0
         )
 
-    # The fields of a patch are means over its strips; the gap is the smallest one.
+    # The patch is a single strip.
     mean_state = ContactState(
         frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),
@@ -318,10 +301,10 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
         state.residuals,
     )
 
-    # Without strips, the layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
+    # The layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
     pieces = pair.compliance
     layer_shear = 0.0
-    if skin is not None and interface.strips is None:
+    if skin is not None:
         layer = np.diag(compute_layer_compliance(skin, state)[0])
         if skin.tangential_ratio is not None:
             layer_shear = layer / skin.tangential_ratio
@@ -346,19 +329,11 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
     )
 
 
-def nodal_areas(patch_model, interface) -> np.ndarray:
-    """Return the nodal areas (m,) [m2] of an interface; (s, m) for a patch in strips."""
-    if patch_model.interface.strips is None:
-        return interface.weight
-    count = patch_model.interface.strips.count
-    return np.repeat(interface.weight[None] / count, count, axis=0)
-
-
 def make_contact_force_function(patch_model, pair: CondensedPair):
     """Return a function that computes the contact forces between worn surfaces.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
-    to the diagonal of the compliance, to nodal forces (m,) [N]. For strips all arrays are (s, m).
+    to the diagonal of the compliance, to nodal forces (m,) [N].
 
     Raises
     ------
@@ -380,8 +355,7 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
 def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -> StripsState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
-    A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
-    fraction of the width (`contact.press`).
+    The patch is the only strip of `contact.press`.
 
     Parameters
     ----------
@@ -401,9 +375,8 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
     StripsState
     """
     loading = patch_model.loading
-    count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
-    strip = split_into_strips(pieces, count)
-    offsets = compute_strip_offsets(patch_model.pieces.width, count)
+    strip = split_into_strips(pieces, 1)
+    offsets = np.zeros(1)
 
     strips = StripModel(
         StripCompliance(strip.normal, added),
@@ -416,10 +389,8 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
         load=loading.load,
         approach=loading.approach,
         moment=loading.moment,
-        roll_moment=None if offset is None else loading.load * offset,
         spring=loading.rotational_stiffness,
         rotation=patch_model.gap.angle,
-        roll=roll,
     )
     return press_strips(strips, gap, holder, start)
 

@@ -179,12 +179,6 @@ def _compute_static_values(patch: Patch) -> Values:
         edge_values,
     )
 
-    if patch.strips is not None:
-        out |= {
-            "pressure_centre_lateral": state.centre_y,
-            "roll_moment": state.roll_moment,
-            "roll": state.position.roll,
-        }
     return {name: float(value) for name, value in out.items()}
 
 
@@ -249,8 +243,8 @@ def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray
 
 
 def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
-    """Return the contact edges between nodes as a list of `ContactEdge`; [] for a patch in strips."""
-    if patch.strips is not None or not patch.active.any():
+    """Return the contact edges between nodes as a list of `ContactEdge`."""
+    if not patch.active.any():
         return []
     return _find_ends(patch, 0, edges.SetFactor(patch.pieces.normal, patch.active))
 

@@ -117,13 +117,6 @@ PATCH_MEASURE_ROWS = (
         minimum=0.0,
     ),
     MeasureDefinition(
-        "pressure_centre_lateral",
-        "m",
-        1e-12,
-        "position across the width of the resultant of the pressure; needs [contact.strips]",
-        group="patch",
-    ),
-    MeasureDefinition(
         "contact_area",
         "m2",
         0.0,
@@ -244,17 +237,6 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
     row = PATCH_TABLE[name]
     error = None if error is None else float(error)
     return Measure(float(value), row.unit, error, row.floor, engine=engine)
-
-
-def list_prescribed_measures(patch_model) -> set[str]:
-    """Return the names of the static measures that a PatchModel with strips prescribes: load or approach, and rotations."""
-    loading = patch_model.loading
-    names = {"normal_load" if loading.approach is None else "approach"}
-    is_roll_free = patch_model.interface.strips.offset is not None
-    names |= {"roll_moment", "pressure_centre_lateral"} if is_roll_free else {"roll"}
-    if not loading.rotational_stiffness:
-        names |= {"moment", "pressure_centre"} if loading.can_rotate else {"rotation"}
-    return names
 
 
 def find_unknown_measures(measures: Measures) -> list[str]:

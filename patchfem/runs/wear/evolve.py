@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.press import compute_strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
@@ -26,17 +25,16 @@ from ..patch.press import (
     Patch,
     Patches,
     make_contact_force_function,
-    nodal_areas,
     solve_patch_contact,
 )
 from ..patch.values import compute_static_values
 from ..results.patch_rows import Values
 from .slip import (
     CycleSlip,
+    bands_slide_independently,
     choose_frame_count,
     compute_cycle_slip,
     slips_uniformly,
-    strips_slide_independently,
 )
 
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
@@ -50,10 +48,9 @@ class WearMoment(NamedTuple):
     """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
-    - depth: worn depth (m,) [m], (s, m) for strips.
-    - used: slip path per cycle (m,) [m] in the last jump, (s, m) for strips.
-    - pressure, gap (m,): pressure [Pa] and gap under load [m]; for strips the mean pressure and
-      the smallest gap over the width.
+    - depth: worn depth (m,) [m].
+    - used: slip path per cycle (m,) [m] in the last jump.
+    - pressure, gap (m,): pressure [Pa] and gap under load [m].
     - miss: relative error of the slip path due to the finite number of frames.
     - values: measures of the patch and of the motion by name.
     """
@@ -74,7 +71,7 @@ class WornPatch:
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
     - state: final state; None if nothing was worn.
     - moments: WearMoment before any wear and after each jump.
-    - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
+    - depths: worn depths (k,) [m] on the nodes of each coarser mesh.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
     """
@@ -110,13 +107,13 @@ class _SlipPathFunction:
         self.same = (
             model.grooves is None
             and model.wear.friction is None
-            and not strips_slide_independently(model)
+            and not bands_slide_independently(model)
             and slips_uniformly(model)
         )
         self.last: CycleSlip | None = None
 
     def __call__(self, worn) -> np.ndarray:
-        """Return the slip path (m,) [m] per cycle at a worn depth [m]; (s, m) for strips."""
+        """Return the slip path (m,) [m] per cycle at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = solve_worn(self.patch, worn)
@@ -130,10 +127,10 @@ class _SlipPathFunction:
 def compute_mean_worn_depth(patch, depth) -> float:
     """Return the mean worn depth [m] of a patch, i.e. worn volume divided by area.
 
-    `depth` [m] is the worn depth (m,), or (s, m) for strips.
+    `depth` [m] is the worn depth (m,).
     """
     weight = patch.pieces.interface.weight
-    return float(np.atleast_2d(depth).mean(axis=0) @ weight / weight.sum())
+    return float(depth @ weight / weight.sum())
 
 
 def make_worn_model(model, patch, depth):
@@ -147,7 +144,7 @@ def make_worn_model(model, patch, depth):
         Unworn model with [wear].
     patch : Patch
         Patch on whose nodes the depth is given.
-    depth : (m,) or (s, m)
+    depth : (m,)
         Worn depth [m].
     """
     wear = model.wear
@@ -200,7 +197,7 @@ def compute_wear(
     problem = WearProblem(
         _make_force_function(patch),
         motion,
-        nodal_areas(patch_model, patch.pieces.interface),
+        patch.pieces.interface.weight,
         model.wear.coefficient,
         n_cycles,
     )
@@ -273,7 +270,7 @@ class WornCoating(NamedTuple):
 def find_worn_through_coating(model, depth) -> WornCoating | None:
     """Return the coating that is worn through at a worn depth, or None if there is none.
 
-    `depth` [m] is the worn depth of both pieces together (m,), or (s, m) for strips.
+    `depth` [m] is the worn depth of both pieces together (m,).
     """
     coating = _most_worn_coating(model, depth)
     return coating if coating.fraction >= 1 - WORN_THROUGH_FRACTION else None
@@ -401,7 +398,7 @@ def _add_earlier_wear(model, patch):
     if earlier_run is None:
         return patch
     earlier_run.require_same_surfaces(patch.x, patch.unloaded_gap)
-    areas = nodal_areas(model.patch, patch.pieces.interface)
+    areas = patch.pieces.interface.weight
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, areas))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
@@ -469,27 +466,27 @@ def compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
     Parameters
     ----------
     patch_model : PatchModel
-        Model of the patch, with its number of strips.
+        Model of the patch.
     patch : Patch
         Patch on whose nodes the depth is given.
-    depth : (m,) or (s, m)
+    depth : (m,)
         Worn depth [m].
     """
     return {
-        "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
+        "worn_volume": float(np.vdot(depth, patch.pieces.interface.weight)),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
 
 
 def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
-    """Repeat the jumps of a run on another mesh or with another number of strips.
+    """Repeat the jumps of a run on another mesh.
 
     The slip paths are interpolated. Returns the worn patch and its worn depth [m].
 
     Parameters
     ----------
     patch_model : PatchModel
-        Model of the other patch, which has its number of strips.
+        Model of the other patch.
     model : Model
         Model of the run.
     patch, other_patch : Patch
@@ -497,21 +494,13 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     moments : sequence of WearMoment
         States after each jump of the run.
     """
-    areas = nodal_areas(patch_model, other_patch.pieces.interface)
-    width = patch_model.pieces.width
-    offsets = compute_strip_offsets(width, len(np.atleast_2d(areas)))
+    areas = other_patch.pieces.interface.weight
 
     def interpolate_path(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of the other patch.
-
-        Without strips there is a single row.
-        """
+        """Interpolate a slip path to the nodes or cells of the other patch."""
         if patch_model.area is not None:
             return area.transfer_to_grid(path, patch, other_patch)
-        rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
-        row_offsets = compute_strip_offsets(width, len(rows))
-        columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
-        return np.array(columns).T.reshape(areas.shape)
+        return np.interp(other_patch.x, patch.x, path)
 
     # Cycles of each jump, and the slip path with which the run wore the patch
     jumps = []

@@ -32,8 +32,6 @@ from .values import TomlValue
 Piece = Literal["upper", "lower"]
 LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
 MAX_EQUAL_PATCHES = 1_000_000  # largest number of equal patches, far more than any joint has
-# Largest number of strips over the width; the pressures of more strips do not fit into memory.
-MAX_STRIPS = 10_000
 # Smallest and largest number of cells along the longer side of an area; the grids of the error estimate have a half and a
 # quarter of them, and more cells than 1024 take minutes.
 MIN_AREA_CELLS = 32
@@ -333,28 +331,6 @@ class Area(Table):
     )
 
 
-def compute_outermost_strip_distance(width: float, count: int) -> float:
-    """Return the distance [m] from the middle of the patch to the middle of its outermost strip.
-
-    `count` equal strips lie side by side over the width [m]. A load line must lie within this distance.
-    """
-    return width / 2 * (1 - 1 / count)
-
-
-class Strips(Table):
-    """The patch is divided over its width into equal parallel strips."""
-
-    count: key(whole_number(1, MAX_STRIPS), "number of equal parallel strips over the width")
-    roll: key(
-        SmallAngle,
-        "angle by which the holder is rotated about x, which shifts the pressure sideways",
-    ) = 0.0
-    offset: optional(
-        Position,
-        "lateral position of the load line; if this key is given, the upper piece is free to rotate about x",
-    )
-
-
 class Contact(Table):
     """Two pieces pressed together. The keys of this table hold for both pieces; its sub-tables change one piece or the
     gap, or add compliance."""
@@ -403,7 +379,6 @@ class Contact(Table):
     asperities: Asperities | None = None
     shear: Shear | None = None
     area: Area | None = None
-    strips: Strips | None = None
     grooves: Grooves | None = None
 
     @property

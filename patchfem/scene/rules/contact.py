@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ...effects import GAP_SHAPES
-from ..keys.contact import Contact, compute_outermost_strip_distance
+from ..keys.contact import Contact
 from ..keys.removed import describe_removed
 from .facts import TableFacts
 from .outlines import PIECE_KEYS_OF_PATCH, check_outlines, find_flat_length
@@ -41,7 +41,6 @@ def check_patches(draft: SceneDraft) -> None:
         flat_length = find_flat_length(patch)
         _check_sizes(patch, flat_length)
         _check_mesh(patch, flat_length)
-        _check_strips(patch)
         _check_area(patch)
         _check_load_line(patch, flat_length / 2)
         _check_coatings(patch)
@@ -89,25 +88,6 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
             f"elements of {size:g} m on a length of {patch.length:g} m are more than {MAX_INTERFACE_ELEMENTS}; use at least "
             f"{patch.length / MAX_INTERFACE_ELEMENTS:.3g} m, or leave this key out",
         )
-
-
-def _check_strips(patch: TableFacts) -> None:
-    """Report an offset of the load across the width that the strips of a patch cannot carry."""
-    if not (patch.strips and patch.has("strips.offset")):
-        return
-    if patch.strips.count < 2:
-        patch.add_mistake(
-            "strips.offset",
-            f"{patch.strips.count} strip cannot resist a rotation about x: raise contact.strips.count",
-        )
-    elif patch.strips.count:
-        max_offset = compute_outermost_strip_distance(patch.width, patch.strips.count)
-        if abs(patch.strips.offset) >= max_offset:
-            patch.add_mistake(
-                "strips.offset",
-                f"{patch.strips.offset} m lies beyond the middle of the outermost strip: |offset| < {max_offset:.6g} m "
-                "is needed; raise contact.strips.count or lower the offset",
-            )
 
 
 def _check_area(patch: TableFacts) -> None:
