@@ -120,9 +120,16 @@ def read_image(path: Path) -> FaceFrames:
 
 
 def export_image(frames: FaceFrames, out: Path, number: int) -> None:
-    """Write the fields over a face as .vtkhdf of all frames, or as .csv of the frame with a number.
+    """Write the fields over a face as .vtkhdf of all frames, or as .csv of one frame.
 
-    PatchfemError is raised for another suffix.
+    Parameters
+    ----------
+    frames : FaceFrames
+        Fields over the face.
+    out : Path
+        File whose suffix chooses the format; PatchfemError for another one.
+    number : int
+        Number of the frame of a .csv.
     """
     if out.suffix == ".vtkhdf":
         write_image(frames, out)

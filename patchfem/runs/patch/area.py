@@ -568,7 +568,7 @@ def list_cell_counts(patch_model: PatchModel) -> tuple[int, ...]:
     """Return the numbers of cells along the longer side of a face, from coarse to fine."""
     area = patch_model.area
     if area.cells is not None:
-        return (area.cells // 4, area.cells // 2, area.cells)
+        return tuple(area.cells // divisor for divisor in (4, 2, 1))
     counts = [min(FIRST_CELLS, area.max_cells // 4)]
     while counts[-1] < area.max_cells:
         counts.append(2 * counts[-1])
@@ -581,7 +581,7 @@ def count_cells(patch_model: PatchModel) -> int:
 
 
 def solve_face_on_grids(
-    patch_model: PatchModel, tolerance: float, with_errors: bool = True
+    patch_model: PatchModel, tolerance: float, *, with_errors: bool = True
 ) -> "tuple[AreaPatch | None, ...]":
     """Solve a face on grids of cells that are halved until the static measures meet the tolerance.
 
@@ -674,7 +674,8 @@ def make_force_function(patch: AreaPatch):
 def transfer_to_grid(values: np.ndarray, patch: AreaPatch, other: AreaPatch) -> np.ndarray:
     """Interpolate values (m,) at the cells of a face linearly to those of another grid, (k,)."""
     rows = values.reshape(patch.shape)
-    fine, coarse = patch.cells.normal, other.cells.normal
+    fine = patch.cells.normal
+    coarse = other.cells.normal
     along_x = np.array([np.interp(coarse.x, fine.x, row) for row in rows])
     return np.array([np.interp(coarse.y, fine.y, column) for column in along_x.T]).T.ravel()
 

@@ -118,6 +118,11 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
         if face.partial_slip and snapshots:
             jenkins_set = make_patch_elements(law, model.accuracy.tolerance).jenkins_set
 
+        # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
+        limit = None
+        if face.model.patch.area is None:
+            limit = law.numbers.static * face.patch.pressure.sigma_n
+
         # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
@@ -129,11 +134,7 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
-                SlipRule(
-                    law.numbers.static * face.patch.pressure.sigma_n
-                    if face.model.patch.area is None
-                    else None
-                ),
+                SlipRule(limit),
             )
         out.append(face._replace(fields=fields))
     return tuple(out)

@@ -61,7 +61,7 @@ def solve_with_coarser(
     """
     mesh = patch_model.mesh
     if patch_model.area is not None:
-        return solved or area.solve_face_on_grids(patch_model, tolerance, with_errors)
+        return solved or area.solve_face_on_grids(patch_model, tolerance, with_errors=with_errors)
     if mesh.shared is None and mesh.is_automatic:
         return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
     levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
