@@ -211,3 +211,14 @@ def test_always_roll_costs_more_stiffness_and_work_than_tilt(both):
     lost = [100 * (1 - case["work"] / flat["work"]) for case in cases[1:]]
     assert lost == pytest.approx([11, 16, 23], abs=1)
     assert "11, 16 and 23 %" in both.__doc__
+
+
+rolled = make_study_fixture("misalignment/roll.py")
+
+
+def test_always_roll_moves_the_pressure_as_stated(rolled):
+    """Centre of pressure and yaw moment under a roll are those stated."""
+    centre = rolled.find_centre(1e-4, cells=64)
+    assert abs(centre.value + 5.28e-3) <= centre.error + 0.01e-3
+    moment = 1e3 * rolled.FRICTION * rolled.LOAD * abs(centre.value)
+    assert moment == pytest.approx(183, abs=1) and "183 N mm" in rolled.__doc__
