@@ -1,7 +1,7 @@
 """Lazy imports: a module of the package is loaded when one of its attributes is first used.
 
-A command therefore loads only the code that its scene requires. After ``from ..contact import half_space``, the module
-is loaded when one of its attributes is read. The import of a name from a module (``from ..contact.half_space import
+A command therefore loads only the code that its scene requires. After ``from ..contact import cells``, the module
+is loaded when one of its attributes is read. The import of a name from a module (``from ..contact.cells import
 pressure``) loads the module immediately, as does the import of a kernel module, whose source is compiled by numba.
 
 The table PUBLIC in the `__init__` of a folder lists the names for other folders. Tests and scripts import these names

@@ -81,7 +81,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     "patch": (
         PATCH,
         "contact.press contact.unilateral mesh.grid",
-        "compiled contact.asperity_laws contact.conjugate_gradients elasticity.mortar "
+        "compiled contact.asperity_laws contact.bounded elasticity.mortar "
         "elasticity.recovery export mesh.pieces mesh.checks response scipy skfem",
     ),
     "skin": (

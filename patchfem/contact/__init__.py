@@ -7,22 +7,32 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
 `gaps` has the shapes of the surfaces. `press.press_strips` presses one or more strips side by side, bare or with
 asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves by the methods of `active_set` and, if they fail,
-of `conjugate_gradients`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
+of `bounded`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
 of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
 
-`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`), and
-`half_space` serves rows of thousands of points.
+`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
+
+Faces that vary along both axes, and rows of thousands of points, are divided into equal cells: `waves` has the closed
+forms of layers, `cells` the compliance of the cells of two blocks, `bounded` the solver, `press_cells` the contact and
+`row_edges` the edges of a row. Read `cells` first.
 """
 
 # Names that other folders use, by module
 PUBLIC = {
-    "active_set": ("make_patch_problem",),
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
         "LinearAsperities",
     ),
-    "conjugate_gradients": ("fit_motion", "solve_by_gradients"),
+    "bounded": (
+        "BoundedProblem",
+        "BoundedSolution",
+        "solve_bounded",
+    ),
+    "cells": (
+        "BlockCompliance",
+        "make_block",
+    ),
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
@@ -33,14 +43,6 @@ PUBLIC = {
         "snap_to_steps",
     ),
     "gaps": ("SHAPE_PROPERTIES",),
-    "half_space.layer": (
-        "end_compliance",
-        "layer_compliance",
-    ),
-    "half_space.point_compliance": (
-        "PointCompliance",
-        "smooth_modes",
-    ),
     "press": (
         "Holder",
         "StripLayout",
@@ -49,12 +51,20 @@ PUBLIC = {
         "split_into_strips",
         "compute_strip_offsets",
     ),
+    "press_cells": (
+        "FaceLoading",
+        "solve_on_set",
+    ),
     "press_kernels": (
         "compute_energy",
         "find_set",
         "press_state",
     ),
     "press_path_kernels": ("path_mean",),
+    "row_edges": (
+        "compute_row_stiffness",
+        "find_row_edges",
+    ),
     "set_arrays": (
         "REFERENCE_LOAD_INDEX",
         "REFERENCE_MOMENT_INDEX",

@@ -16,6 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .active_set import ContactProblem
+from .strip_compliance import StripCompliance
+
+# Largest residual of nodal forces, from which the methods of active sets go on
+NODAL_RESIDUAL_TOL = 1e-11
 # Number of steps without a lower energy after which a projected gradient step follows. A changed set of cells takes two or
 # three steps to lower the energy.
 MAX_STEPS_WITHOUT_GAIN = 8
@@ -98,8 +103,7 @@ def solve_bounded(
     best = state
     n_without_gain = 0
 
-    direction = motion_direction = last_slope = None
-    last_square = 1.0
+    directions = _Directions()
     n_iterations = 0
     while n_iterations < max_iterations:
         n_iterations += 1
@@ -120,7 +124,7 @@ def solve_bounded(
             break
 
         # The energy may rise while the set of cells between the bounds changes, but not for long. A projected gradient step
-        # of this length always lowers it.
+        # of this length always lowers it where tractions displace all cells inwards.
         n_without_gain += 1
         if state.energy < best.energy:
             best = state
@@ -132,22 +136,12 @@ def solve_bounded(
             state = holder.load(compliance, holder.project(moved, best.motion, everywhere))
             best = state
             n_without_gain = 0
-            direction = None
+            directions = _Directions()
             continue
 
         # Conjugate direction on the cells that can move, without a change of the resultants
-        preconditioned, motion_change = holder.precondition(compliance, moving_slope, is_moving)
-        square = float(np.vdot(moving_slope, preconditioned))
-        overlap = np.inf if direction is None else float(np.vdot(last_slope, preconditioned))
-        if abs(overlap) > MAX_SLOPE_OVERLAP * square:
-            direction = preconditioned
-            motion_direction = motion_change
-        else:
-            conjugate = (square - overlap) / last_square
-            direction = preconditioned + conjugate * np.where(is_moving, direction, 0.0)
-            motion_direction = motion_change + conjugate * motion_direction
-        last_slope = moving_slope
-        last_square = max(square, np.finfo(float).tiny)
+        steepest = holder.precondition(compliance, moving_slope, is_moving)
+        direction, motion_direction = directions.find_next(steepest, moving_slope, is_moving)
 
         # Exact step, cut at the bounds
         direction_displacement = compliance.product(direction)
@@ -159,6 +153,84 @@ def solve_bounded(
         projected = holder.project(moved, motion, is_moving)
         state = holder.load(compliance, projected)
     return BoundedSolution(traction, motion / holder.scale, slope, n_iterations, residual)
+
+
+class _Direction(NamedTuple):
+    """Change of the tractions (ny, nx) [Pa] and of the motions (r,)."""
+
+    traction: np.ndarray
+    motion: np.ndarray
+
+
+class _Directions:
+    """Conjugate directions of successive steps."""
+
+    def __init__(self):
+        self.last = None
+        self.last_slope = None
+        self.last_square = 0.0
+
+    def find_next(
+        self, steepest: _Direction, slope: np.ndarray, is_moving: np.ndarray
+    ) -> _Direction:
+        """Return the next direction, conjugate to the last one by the formula of Polak and Ribiere.
+
+        Parameters
+        ----------
+        steepest : _Direction
+            Preconditioned slope.
+        slope : (ny, nx) ndarray
+            Slope of the cells that move, 0 elsewhere [m].
+        is_moving : (ny, nx) bool ndarray
+            Cells that move.
+        """
+        direction = steepest
+        square = float(np.vdot(slope, steepest.traction))
+        if self.last_square > 0:
+            overlap = float(np.vdot(self.last_slope, steepest.traction))
+            if abs(overlap) <= MAX_SLOPE_OVERLAP * square:
+                factor = (square - overlap) / self.last_square
+                direction = _Direction(
+                    steepest.traction + factor * np.where(is_moving, self.last.traction, 0.0),
+                    steepest.motion + factor * self.last.motion,
+                )
+        self.last = direction
+        self.last_slope = slope
+        self.last_square = square
+        return direction
+
+
+def solve_nodal_forces(compliance: StripCompliance, problem: ContactProblem) -> BoundedSolution:
+    """Solve the contact problem of the nodes of strips; its tractions are nodal forces [N].
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the n nodes.
+    problem : ContactProblem
+        Gap [m], motions, loads and springs.
+
+    Returns
+    -------
+    BoundedSolution
+        Forces (n,) [N] in place of tractions.
+    """
+    bounded = BoundedProblem(
+        problem.gap, 0.0, np.inf, problem.motions.T, problem.target, problem.springs
+    )
+    return solve_bounded(_NodalCompliance(compliance), bounded, tolerance=NODAL_RESIDUAL_TOL)
+
+
+class _NodalCompliance:
+    """Compliance of the nodes of strips as an operator of `solve_bounded`."""
+
+    def __init__(self, compliance: StripCompliance):
+        self.product = compliance.product
+        self.self_compliance = compliance.node_compliance
+
+    def precondition(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the forces (n,) [N] of nodes without coupling for displacements (n,) [m]."""
+        return displacement / self.self_compliance
 
 
 class _State(NamedTuple):
@@ -221,7 +293,14 @@ class _Holder:
     def fit_motion(self, slope, motion, is_free) -> np.ndarray:
         """Return motions (r,) whose part without springs is fitted to the slope of the cells between the bounds.
 
-        Motions against springs remain, because they follow from the resultants.
+        Parameters
+        ----------
+        slope : (ny, nx) ndarray
+            C t + g [m].
+        motion : (r,) ndarray
+            Motions; those against springs remain, because they follow from the resultants.
+        is_free : (ny, nx) bool ndarray
+            Cells between the bounds.
         """
         is_fitted = self.springs == 0
         if not is_fitted.any() or not is_free.any():
@@ -241,24 +320,33 @@ class _Holder:
         energy += float(self.springs @ motion**2) / 2
         return _State(traction, motion, displacement, energy)
 
-    def precondition(self, compliance, slope, is_free):
-        """Return about the tractions (ny, nx) and motions (r,) that cause a slope between the bounds.
+    def precondition(self, compliance, slope, is_moving) -> _Direction:
+        """Return about the tractions and motions that cause a slope.
 
         They change no resultant: the tractions of a fitted motion of the holder are subtracted.
+
+        Parameters
+        ----------
+        compliance : CellCompliance
+            Operator with `precondition`.
+        slope : (ny, nx) ndarray
+            Slope [m] of the cells that move, 0 elsewhere.
+        is_moving : (ny, nx) bool ndarray
+            Cells that move.
         """
-        preconditioned = np.where(is_free, compliance.precondition(slope), 0.0)
+        preconditioned = np.where(is_moving, compliance.precondition(slope), 0.0)
         if not self.n_motions:
-            return preconditioned, np.zeros(0)
-        if self.known_set is None or not np.array_equal(is_free, self.known_set):
-            self.known_set = is_free
+            return _Direction(preconditioned, np.zeros(0))
+        if self.known_set is None or not np.array_equal(is_moving, self.known_set):
+            self.known_set = is_moving
             for k, rigid in enumerate(self.rigid):
-                moved = np.where(is_free, rigid.reshape(slope.shape), 0.0)
-                held = np.where(is_free, compliance.precondition(moved), 0.0)
+                moved = np.where(is_moving, rigid.reshape(slope.shape), 0.0)
+                held = np.where(is_moving, compliance.precondition(moved), 0.0)
                 self.motion_tractions[k] = held.ravel()
         stiffness = self.motion_tractions @ self.rigid.T + np.diag(self.springs)
         motion = np.linalg.lstsq(stiffness, self.rigid @ preconditioned.ravel(), rcond=1e-13)[0]
         held = (motion @ self.motion_tractions).reshape(slope.shape)
-        return preconditioned - held, -motion
+        return _Direction(preconditioned - held, -motion)
 
     def project(self, traction, motion, is_movable) -> _State:
         """Cut tractions at their bounds and shift them until the resultants are the prescribed ones.

@@ -16,9 +16,6 @@ from ..elasticity import sides
 from ..elasticity.sides import BlockShape, LayerStack
 from .waves import compute_wave_compliance
 
-# Smallest compliance of a mode of the free sides, relative to the largest, that is kept
-MIN_KEPT_COMPLIANCE_RATIO = 1e-9
-
 
 class SideCompliance(NamedTuple):
     """Change of the compliance of the cells by free sides: u = sum of N E N^T p over even and odd loads.
@@ -185,46 +182,9 @@ def _place_sides(
         normal = normal + multiplicity * change.normal
         shear = shear + multiplicity * change.shear
 
-    # The elements along both axes do not depend on the layers
+    # The splines along both axes do not depend on the layers
     n_x, n_y = cells
     x_edges = np.linspace(-shape.length / 2, shape.length / 2, n_x + 1)
     y_edges = np.linspace(-shape.width / 2, shape.width / 2, n_y + 1)
-    along_x = [change.x.integrate(x_edges, is_even=is_even) for is_even in (True, False)]
-    y_parities = (True, False)[: normal.shape[1]]
-    along_y = [change.y.integrate(y_edges, is_even=is_even) for is_even in y_parities]
-    along_y = np.concatenate(along_y, axis=1)
-    if change.y.n_nodes == 1:
-        return tuple(
-            _select_modes(along_x, along_y, change.x.mass, part) for part in (normal, shear)
-        )
-    along_x = np.concatenate(along_x, axis=1)
-    return SideCompliance(along_x, along_y, normal), SideCompliance(along_x, along_y, shear)
-
-
-def _select_modes(
-    along_x: list[np.ndarray], along_y: np.ndarray, mass: np.ndarray, change: np.ndarray
-) -> SideCompliance:
-    """Return a change of compliance that does not vary along y in its few modes along x.
-
-    Parameters
-    ----------
-    along_x : list of (nx, m) ndarray
-        Integrals [m] of the even and of the odd shape functions over columns.
-    along_y : (ny, 1) ndarray
-        Lengths of the rows [m].
-    mass : (m, m) ndarray
-        Integrals of products of two shape functions [m].
-    change : (2, 1, m, m) ndarray
-        Change of the compliance [m/N] for even and odd loads.
-    """
-    # Combinations of the shape functions whose squares have the integral 1
-    combinations = np.linalg.inv(np.linalg.cholesky(mass)).T
-    inverse = np.linalg.inv(combinations)
-    compliances, vectors = np.linalg.eigh(inverse @ change[:, 0] @ inverse.T)
-    size = np.abs(compliances)
-    n_kept = int((size > MIN_KEPT_COMPLIANCE_RATIO * size.max()).sum(axis=1).max())
-    kept = np.argsort(size)[:, -n_kept:]
-    modes = np.take_along_axis(vectors, kept[:, None], axis=2)
-    diagonal = np.take_along_axis(compliances, kept, axis=1)[:, None, :, None] * np.eye(n_kept)
-    parts = [part @ combinations @ mode for part, mode in zip(along_x, modes, strict=True)]
-    return SideCompliance(np.concatenate(parts, axis=1), along_y, diagonal)
+    integrals = (change.x.integrate(x_edges), change.y.integrate(y_edges))
+    return SideCompliance(*integrals, normal), SideCompliance(*integrals, shear)

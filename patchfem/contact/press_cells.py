@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import NotConverged
+from ..core import NotConverged, PatchfemError
 from .bounded import BoundedProblem, solve_bounded
 from .cells import CellCompliance
 
@@ -81,9 +81,17 @@ def press_cells(
 
     Raises
     ------
+    PatchfemError
+        If the hardness times the area of the face is below the load.
     NotConverged
         If the tolerance is not met.
     """
+    largest_load = loading.hardness * compliance.cell_area * gap.size
+    if loading.load is not None and loading.load >= largest_load:
+        raise PatchfemError(
+            "contact.area.hardness: a pressure of at most the hardness carries "
+            f"{largest_load:.4g} N on the face, less than the load of {loading.load:.4g} N; raise the hardness"
+        )
     problem = _make_problem(compliance, gap, loading)
     solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
     if not solution.residual <= tolerance:

@@ -40,12 +40,6 @@ class StripCompliance:
         mean_added = 0.0 if self.added is None else self.added.mean()
         return float(self.common.diagonal().mean() + mean_added)
 
-    @property
-    def eigenvalue_bound(self) -> float:
-        """Upper bound of the largest eigenvalue [m/N]."""
-        max_added = 0.0 if self.added is None else self.added.max()
-        return float(np.abs(self.common).sum(axis=1).max() + max_added)
-
     def product(self, force: np.ndarray) -> np.ndarray:
         """Return the displacements C f (n,) [m] under forces f (n,) [N]."""
         strips = force.reshape(-1, len(self.common))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import NotConverged
-from . import conjugate_gradients
+from . import bounded
 from .active_set import (
     OPENING_ROUND_OFF,
     ContactProblem,
@@ -81,7 +81,7 @@ def _solve_by_fallbacks(
     if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
         return solution, n_first
 
-    force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
+    force, _, _, n_second, _ = bounded.solve_nodal_forces(compliance, problem)
     # Smaller forces are remainders that the gradient steps have not yet removed.
     is_loaded = force > 1e-9 * force.max()
     solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)

@@ -11,6 +11,7 @@ compliance of the interface is the inverse of the Schur complement S = K_ss - K_
 - `fronts` eliminates the inside of a piece.
 - `mortar` joins pieces whose interface nodes do not match.
 - `recovery` computes stresses and their errors, `coating_traction` the traction below a coating.
+- `sides` computes what the free sides of a block change in the compliance of its face.
 - `lapack` loads BLAS and LAPACK quickly; `sparse_factor` serves matrices that do not come from a mesh.
 """
 
@@ -25,7 +26,6 @@ PUBLIC = {
         "Piece",
         "compute_displacement",
         "compute_interface_compliance",
-        "lame_constants",
         "von_mises",
     ),
     "lapack": (
@@ -49,6 +49,11 @@ PUBLIC = {
         "fit_recovery",
         "get_cells",
         "make_points",
+    ),
+    "sides": (
+        "BlockShape",
+        "LayerStack",
+        "make_stack",
     ),
     "sparse_factor": (
         "SparseFactor",

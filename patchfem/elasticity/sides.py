@@ -2,11 +2,13 @@
 
 A block between guides without friction responds to cosine waves in closed form (`contact.waves`). Free sides change its
 compliance by a smooth function, which is computed on a quarter of the block, for loads that are even or odd along each
-axis. The stiffness of the quarter is a sum of Kronecker products of matrices along x, y and z; it is condensed to the face
-from the far face up, one sheet of bricks at a time. The lengths of the elements decrease geometrically towards free sides
-and towards both faces, so the error falls exponentially with their number.
+axis. The displacement is a product of splines of order 4 along x and y, which have continuous third derivatives because
+the layers do not vary along the face, and of polynomials of order 4 in each sheet of bricks along z. The stiffness is a
+sum of Kronecker products of matrices along the axes; it is condensed to the face from the far face up, sheet by sheet. The
+lengths of the bricks decrease geometrically towards free sides and towards both faces, because the stress is singular at
+the edges of the block.
 
-The change is the difference of two finite-element results on the same elements, in which their errors near a load cancel.
+The change is the difference of two results on the same bricks, in which their errors near a load cancel.
 """
 
 import io
@@ -17,15 +19,15 @@ from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import legendre
+from scipy.interpolate import BSpline
 
 from ..disk import user_cache
 from .elasticity import Layers, lame_constants
 from .lapack import dpotrf, dtrsm
 
-ORDER = 4  # Polynomial order of the bricks
+ORDER = 4  # Order of the splines and polynomials
 DEPTH_RATIO = 0.25  # Ratio of the thicknesses of neighbouring bricks towards both faces
-# Smallest ratio of the depths of two element edges near an interface of layers; closer edges would make thin bricks
+# Smallest ratio of the depths of two edges of bricks near an interface of layers; closer edges would make thin bricks
 MIN_EDGE_DEPTH_RATIO = 2.0
 CACHE_FOLDER_NAME = "patchfem-sides"
 # Number in the names of cached files, which increases when the method changes
@@ -34,6 +36,10 @@ CACHE_VERSION = 1
 MAX_CACHED_BLOCKS = 100
 # Number of changes kept in memory, such as those of two pieces on three levels
 MAX_CHANGES_IN_MEMORY = 8
+# Displacements along an axis (0: x, 1: y, 2: inward) that guides hold on the sides across an axis, for normal loads and
+# for shear loads along x
+NORMAL_GUIDES = ((0, 0), (1, 1))
+SHEAR_GUIDES = ((1, 0), (2, 0), (1, 1))
 
 
 class LayerStack(NamedTuple):
@@ -80,154 +86,68 @@ class BlockShape(NamedTuple):
     free_sides: str = "xy"
 
 
-class SideChange(NamedTuple):
-    """Change of the compliance of a face by free sides, in polynomials on elements of a quarter of the face.
+class Axis(NamedTuple):
+    """Splines along an axis of a face, from one side to the other.
 
-    - x, y: Elements along both axes, from the middle of the face to its sides.
-    - normal, shear (2, p, m, m): Change [m/N] for normal tractions and for shear tractions along x. The first index is 0
-      for tractions even along x and 1 for odd ones, the second likewise along y; p is 1 for loads that do not vary along
-      y, else 2. The m nodes of the quarter are ordered by x, then y, and forces are those on the quarter.
+    - even, odd: n functions each, even and odd about the middle; the last one alone does not vanish at the sides. A
+      displacement that does not vary has one even function and no odd ones.
     """
 
-    x: "Elements"
-    y: "Elements"
+    even: BSpline
+    odd: BSpline
+
+    def integrate(self, cell_edges: np.ndarray) -> np.ndarray:
+        """Return the integrals (c, n) [m] of all functions over c cells with increasing edges (c + 1,) [m], even first."""
+        primitives = [spline.antiderivative()(cell_edges) for spline in self]
+        return np.diff(np.concatenate(primitives, axis=1), axis=0)
+
+
+class SideChange(NamedTuple):
+    """Change of the compliance of a face by free sides, for loads of one parity along each axis.
+
+    - x, y: Splines along both axes.
+    - normal, shear (2, p, m, m): Change [m/N] for normal tractions and for shear tractions along x. The first index is 0
+      for tractions even along x and 1 for odd ones, the second likewise along y; p is 1 for loads that do not vary along
+      y, else 2. The m functions are ordered by x, then y, and the forces are those on a quarter of the face.
+    """
+
+    x: Axis
+    y: Axis
     normal: np.ndarray
     shear: np.ndarray
 
 
-class Elements(NamedTuple):
-    """Elements of one order on an axis from 0 to half a length, and the matrices of their n shape functions N.
-
-    - edges (e + 1,): Edges of the elements [m].
-    - order: Polynomial order; 0 for a single function that is 1 everywhere.
-    - mass, mixed, stiffness (n, n): Integrals of N_i N_j [m], N_i' N_j [1] and N_i' N_j' [1/m].
-    """
-
-    edges: np.ndarray
-    order: int
-    mass: np.ndarray
-    mixed: np.ndarray
-    stiffness: np.ndarray
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of shape functions."""
-        return len(self.mass)
-
-    @property
-    def bricks(self) -> np.ndarray:
-        """Number of the element inside which each node (n,) lies; -1 on the edges between elements."""
-        if not self.order:
-            return np.zeros(1, int)
-        nodes = np.arange(self.n_nodes)
-        return np.where(nodes % self.order, nodes // self.order, -1)
-
-    def integrate(self, cell_edges: np.ndarray, *, is_even: bool) -> np.ndarray:
-        """Return the integrals (c, n) [m] of the shape functions over c cells.
-
-        Parameters
-        ----------
-        cell_edges : (c + 1,) ndarray
-            Increasing edges of the cells [m], on both sides of 0.
-        is_even : bool
-            Whether the functions continue as even ones on the other side of 0, else as odd ones.
-        """
-        distance = np.abs(cell_edges)
-        pieces = self._make_smooth_functions(is_even=is_even)
-        primitive = np.zeros((distance.size, self.n_nodes))
-        for start, stop, piece in zip(self.edges[:-1], self.edges[1:], pieces, strict=True):
-            local = np.clip((distance - start) / (stop - start) * 2 - 1, -1, 1)
-            nodes = np.flatnonzero(piece.any(axis=0))
-            integrals = legendre.legval(local, legendre.legint(piece[:, nodes], lbnd=-1)).T
-            primitive[:, nodes] += (stop - start) / 2 * integrals
-        # The primitive of an even function is odd
-        return np.diff(primitive * np.sign(cell_edges)[:, None] if is_even else primitive, axis=0)
-
-    def _make_smooth_functions(self, *, is_even: bool) -> list[np.ndarray]:
-        """Return the Legendre coefficients (order + 3, n) on each element of the shape functions with continuous slopes.
-
-        A kink of the displacement between two elements would cause a peak of the pressure there. Each function gets the
-        mean of its two slopes at an edge, that of the shorter element with the larger weight, by a polynomial that vanishes
-        at the nodes.
-        """
-        coefficients = _make_shape_functions(self.order)
-        if not self.order:
-            return [coefficients]
-        lengths = np.diff(self.edges)
-        reference_slopes = legendre.legval([-1.0, 1.0], legendre.legder(coefficients)).T
-
-        # Slopes (2, n) [1/m] of the functions at both ends of each element, and their means at the edges
-        slopes = np.zeros((lengths.size, 2, self.n_nodes))
-        values = np.zeros((lengths.size, self.order + 3, self.n_nodes))
-        for element, length in enumerate(lengths):
-            nodes = slice(element * self.order, (element + 1) * self.order + 1)
-            slopes[element, :, nodes] = reference_slopes * 2 / length
-            values[element, : self.order + 1, nodes] = coefficients
-        means = np.concatenate([slopes[:, 0], slopes[-1:, 1]])
-        weight = (lengths[1:] / (lengths[1:] + lengths[:-1]))[:, None]
-        means[1:-1] = weight * slopes[:-1, 1] + (1 - weight) * slopes[1:, 0]
-        if is_even:
-            means[0] = 0.0
-
-        # (1 - s) w/2 and (1 + s) w/2, where w vanishes at all nodes and has the slopes w'(-1) and w'(1)
-        bubble = legendre.legmul([1 / 3, 0, -1 / 3], legendre.legder([*self.order * [0], 1]))
-        bubble_slopes = legendre.legval([-1.0, 1.0], legendre.legder(bubble))
-        for element, length in enumerate(lengths):
-            changes = (means[element : element + 2] - slopes[element]) * length / 2
-            for end, side in enumerate((-1.0, 1.0)):
-                shape = legendre.legmul([0.5, 0.5 * side], bubble) / bubble_slopes[end]
-                values[element] += shape[:, None] * changes[end]
-        return list(values)
+def _make_axis(edges: np.ndarray) -> Axis:
+    """Make the splines on bricks with edges (e + 1,) [m] from the middle to a side."""
+    ends = np.repeat(edges[-1], ORDER)
+    knots = np.concatenate([-ends, -edges[:0:-1], edges, ends])
+    unit = np.eye(knots.size - ORDER - 1)
+    half = len(unit) // 2
+    upper = unit[:, half:]
+    mirrored = unit[::-1, half:]
+    return Axis(BSpline(knots, upper + mirrored, ORDER), BSpline(knots, upper - mirrored, ORDER))
 
 
-def _make_shape_functions(order: int) -> np.ndarray:
-    """Return the Legendre coefficients (order + 1, order + 1) of the shape functions of an element, in columns.
-
-    Each is 1 at one of the Gauss-Lobatto points of (-1, 1) and 0 at the others.
-    """
-    if not order:
-        return np.ones((1, 1))
-    inner_nodes = legendre.Legendre.basis(order).deriv().roots()
-    nodes = np.concatenate([[-1.0], inner_nodes, [1.0]])
-    return np.linalg.inv(legendre.legvander(nodes, order))
+def _make_uniform_axis(length: float) -> Axis:
+    """Make the single function 1 on an axis of a length [m]."""
+    knots = np.array([-0.5, -0.5, 0.5, 0.5]) * length
+    return Axis(BSpline(knots, np.ones((2, 1)), 1), BSpline(knots, np.ones((2, 0)), 1))
 
 
-def _make_elements(edges, order: int = ORDER) -> Elements:
-    """Make the elements between given edges (e + 1,) [m]."""
-    edges = np.asarray(edges, float)
-    coefficients = _make_shape_functions(order)
-    points, weights = legendre.leggauss(order + 1)
-    values = legendre.legval(points, coefficients)
-    slopes = legendre.legval(points, legendre.legder(coefficients))
-    mass = (values * weights) @ values.T
-    mixed = (slopes * weights) @ values.T
-    stiffness = (slopes * weights) @ slopes.T
-
-    n_nodes = (edges.size - 1) * order + 1
-    matrices = np.zeros((3, n_nodes, n_nodes))
-    for element, half in enumerate(np.diff(edges) / 2):
-        nodes = slice(element * order, (element + 1) * order + 1)
-        matrices[0, nodes, nodes] += half * mass
-        matrices[1, nodes, nodes] += mixed
-        matrices[2, nodes, nodes] += stiffness / half
-    return Elements(edges, order, *matrices)
+def _grade_edges(length: float, n_bricks: int, ratio: float) -> np.ndarray:
+    """Return edges (n + 1,) [m] from 0 to a length, between which each brick is shorter than the last one by a ratio."""
+    return length * (1 - np.append(ratio ** np.arange(n_bricks), 0.0))
 
 
-def _grade_edges(length: float, n_elements: int, ratio: float) -> np.ndarray:
-    """Return edges (n + 1,) [m] from 0 to a length, between which each element is shorter than the last one by a ratio."""
-    remainders = ratio ** np.arange(n_elements)
-    return length * (1 - np.append(remainders, 0.0))
-
-
-def _grade_depths(stack: LayerStack, n_elements: int) -> np.ndarray:
-    """Return the edges [m] of the elements along the depth, which shrink towards the face and towards the far face.
+def _grade_depths(stack: LayerStack, n_bricks: int) -> np.ndarray:
+    """Return the edges [m] of the bricks along the depth, whose thicknesses shrink towards the face and the far face.
 
     Every interface of two layers is an edge, and the other edges keep away from it.
     """
     height = sum(stack.thicknesses)
     interfaces = np.cumsum(stack.thicknesses)[:-1]
-    below_face = height * DEPTH_RATIO ** np.arange(n_elements, 0, -1)
-    above_far_face = _grade_edges(height, n_elements - 1, DEPTH_RATIO)[1:-1]
+    below_face = height * DEPTH_RATIO ** np.arange(n_bricks, 0, -1)
+    above_far_face = _grade_edges(height, n_bricks - 1, DEPTH_RATIO)[1:-1]
     depths = np.concatenate([below_face, above_far_face])
     for interface in interfaces:
         ratio = np.maximum(depths, interface) / np.minimum(depths, interface)
@@ -235,6 +155,7 @@ def _grade_depths(stack: LayerStack, n_elements: int) -> np.ndarray:
     return np.concatenate([[0.0], np.sort(np.append(depths, interfaces)), [height]])
 
 
+@lru_cache(maxsize=MAX_CHANGES_IN_MEMORY)
 def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) -> SideChange:
     """Compute the change of compliance by free sides, or read it from the user's cache.
 
@@ -245,33 +166,31 @@ def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) ->
     shape : BlockShape
         Face of the block and its free sides.
     level : int
-        Refinement of the elements. Between the middle and a free side lie level + 2 of them, or 4 (level + 1) in a plane
-        problem, whose lengths decrease by a ratio that grows from 1/4 with the level, so that all become shorter.
+        Refinement of the bricks. Between the middle and a free side lie 2 (level + 2) of them, or 8 (level + 1) in a plane
+        problem. Their lengths decrease by a ratio that grows from 1/2 with the level, so that all of them become shorter.
 
     Returns
     -------
     SideChange
     """
-    return _get_side_change(stack, shape, level)
-
-
-@lru_cache(maxsize=MAX_CHANGES_IN_MEMORY)
-def _get_side_change(stack: LayerStack, shape: BlockShape, level: int) -> SideChange:
-    """Return the result of `compute_side_change`, once per process."""
     is_plane = shape.free_sides == "x"
-    n_elements = 4 * (level + 1) if is_plane else level + 2
-    ratio = (level + 1) / (level + 4)
-    x = _make_elements(_grade_edges(shape.length / 2, n_elements, ratio))
-    y_edges = [0.0, shape.width / 2]
-    if not is_plane:
-        y_edges = _grade_edges(shape.width / 2, n_elements, ratio)
-    y = _make_elements(y_edges, 0 if is_plane else ORDER)
-    depths = _grade_depths(stack, level + 2)
+    n_bricks = 2 * (level + 2)
+    ratio = (level + 4) / (level + 8)
+    if is_plane:
+        n_bricks = 8 * (level + 1)
+        ratio = (level + 1) / (level + 2)
+    x = _make_axis(_grade_edges(shape.length / 2, n_bricks, ratio))
+    if is_plane:
+        y = _make_uniform_axis(shape.width)
+    else:
+        y = _make_axis(_grade_edges(shape.width / 2, n_bricks, ratio))
+    depths = _grade_depths(stack, level + 3)
 
     # A plane problem takes less time than a file
     if is_plane:
         return SideChange(x, y, *_compute_changes(x, y, depths, stack))
-    key = repr((CACHE_VERSION, ORDER, x.edges.tolist(), y.edges.tolist(), depths.tolist(), stack))
+    knots = [x.even.t.tolist(), y.even.t.tolist(), depths.tolist()]
+    key = repr((CACHE_VERSION, ORDER, knots, stack))
     folder = user_cache.find_cache_base() / CACHE_FOLDER_NAME
     path = folder / f"{sha256(key.encode()).hexdigest()}.npz"
     is_trusted = not user_cache.prepare_folder(folder)
@@ -296,22 +215,20 @@ def _remove_oldest_files(folder) -> None:
             path.unlink(missing_ok=True)
 
 
-def _compute_changes(x: Elements, y: Elements, depths, stack: LayerStack):
+def _compute_changes(x: Axis, y: Axis, depths, stack: LayerStack):
     """Compute the changes (2, p, m, m) [m/N] of the normal and of the shear compliance (see SideChange)."""
-    quarter = _Quarter(x, y, depths, stack)
-    n_parities = 2 if y.order else 1
-    n_nodes = x.n_nodes * y.n_nodes
-    normal = np.empty((2, n_parities, n_nodes, n_nodes))
+    n_parities = 1 + bool(y.odd.c.size)
+    n_functions = x.even.c.shape[1] * y.even.c.shape[1]
+    normal = np.empty((2, n_parities, n_functions, n_functions))
     shear = np.empty_like(normal)
-    for mirror_x in range(2):
-        for mirror_y in range(n_parities):
-            # One block with free sides serves normal loads and the shear loads of the other parity along x
-            held = quarter.hold_mirror_planes(mirror_x, mirror_y)
-            free = quarter.condense(held)
-            between_guides = quarter.condense(held | quarter.hold_sides([0], [1]))
-            normal[mirror_x, mirror_y] = (free - between_guides)[2, :, 2]
-            between_guides = quarter.condense(held | quarter.hold_sides([1, 2], [1]))
-            shear[1 - mirror_x, mirror_y] = (free - between_guides)[0, :, 0]
+    for parity_x, parity_y in np.ndindex(2, n_parities):
+        # One block with free sides serves normal loads and the shear loads of the other parity along x
+        block = _Quarter((x, y), (parity_x, parity_y), depths, stack)
+        free = block.condense(())
+        guided = block.condense(NORMAL_GUIDES)
+        normal[parity_x, parity_y] = block.select(free - guided, 2)
+        guided = block.condense(SHEAR_GUIDES)
+        shear[1 - parity_x, parity_y] = block.select(free - guided, 0)
     return normal, shear
 
 
@@ -320,100 +237,81 @@ class _Quarter:
 
     Parameters
     ----------
-    x, y : Elements
-        Elements from the middle of the face to its sides.
+    axes : tuple of Axis
+        Splines along x and y.
+    parities : tuple of int
+        Parity of the inward displacement along x and y: 0 for even, 1 for odd.
     depths : (l + 1,) ndarray
-        Edges of the elements along z [m].
+        Edges of the bricks along z [m].
     stack : LayerStack
         Layers of the block.
     """
 
-    def __init__(self, x: Elements, y: Elements, depths, stack: LayerStack):
-        self.x = x
-        self.y = y
+    def __init__(self, axes, parities, depths, stack: LayerStack):
         self.depths = depths
         layer = np.searchsorted(np.cumsum(stack.thicknesses), (depths[1:] + depths[:-1]) / 2)
         self.moduli = [stack.moduli[k] for k in layer]
-        self.reference = _make_elements([-1.0, 1.0])
-        self.in_plane = self._assemble_in_plane()
 
-    def hold_mirror_planes(self, mirror_x: int, mirror_y: int) -> np.ndarray:
-        """Return which displacements (3, n_x, n_y) vanish on the planes x = 0 and y = 0.
+        # The displacement along an axis has the other parity along it than the inward one
+        functions = []
+        for axis, (splines, parity) in enumerate(zip(axes, parities, strict=True)):
+            parts = [_evaluate(splines[(parity + (k == axis)) % 2]) for k in range(3)]
+            functions.append(parts)
+        self.shapes = [tuple(parts[k].values.shape[2] for parts in functions) for k in range(3)]
+        self.in_plane = self._assemble_in_plane(*functions)
 
-        A load that is even (0) about a plane holds the displacement across it, and one that is odd (1) those along it.
+    def select(self, compliance: np.ndarray, component: int) -> np.ndarray:
+        """Return the part (m, m) of a compliance of the face that belongs to displacements and forces along an axis."""
+        starts = np.cumsum([0, *(n_x * n_y for n_x, n_y in self.shapes)])
+        part = slice(starts[component], starts[component + 1])
+        return compliance[part, part]
+
+    def _assemble_in_plane(self, along_x, along_y) -> np.ndarray:
+        """Return the in-plane factors of the stiffness, (2, 2, 2, f, f).
+
+        They belong to the Lame constants lambda and mu, to a test function that is not or is differentiated along z, and to
+        such a trial function. `along_x` and `along_y` hold the functions of the three displacements.
         """
-        held = np.zeros((3, self.x.n_nodes, self.y.n_nodes), bool)
-        held[[1, 2] if mirror_x else [0], 0] = True
-        if not self.y.order:
-            held[1] = True
-        else:
-            held[[0, 2] if mirror_y else [1], :, 0] = True
-        return held
+        # lambda div v div u + mu (grad v + grad v^T) : grad u, as (modulus, components of v and u, axes of their slopes)
+        blocks = np.zeros((2, 2, 2, 3, 3), object)
+        for a, b in np.ndindex(3, 3):
+            terms = ((0, a, b, a, b), (1, a, b, b, a), (1, a, a, b, b))
+            for modulus, test, trial, test_axis, trial_axis in terms:
+                x_part, y_part = (
+                    functions[test].integrate(
+                        functions[trial], test_axis == axis, trial_axis == axis
+                    )
+                    for axis, functions in enumerate((along_x, along_y))
+                )
+                slot = (modulus, int(test_axis == 2), int(trial_axis == 2), test, trial)
+                blocks[slot] = blocks[slot] + np.kron(x_part, y_part)
+        sizes = [n_x * n_y for n_x, n_y in self.shapes]
+        out = np.zeros((2, 2, 2, sum(sizes), sum(sizes)))
+        starts = np.cumsum([0, *sizes])
+        for *slot, a, b in np.ndindex(blocks.shape):
+            rows = slice(starts[a], starts[a + 1])
+            columns = slice(starts[b], starts[b + 1])
+            out[*slot, rows, columns] = blocks[*slot, a, b]
+        return out
 
-    def hold_sides(self, components_x: list[int], components_y: list[int]) -> np.ndarray:
-        """Return which displacements (3, n_x, n_y) guides hold: components on the sides across x and across y."""
-        held = np.zeros((3, self.x.n_nodes, self.y.n_nodes), bool)
-        held[components_x, -1] = True
-        if self.y.order:
-            held[components_y, :, -1] = True
-        return held
-
-    def _assemble_in_plane(self) -> dict:
-        """Return the in-plane factors of the stiffness, (2, 3 m, 3 m) for lambda = 1 and for mu = 1.
-
-        Those named "mass", "mixed" and "stiffness" multiply the integrals of N_i N_j, N_i' N_j and N_i' N_j' along z,
-        where i is the test function.
-        """
-        x, y = self.x, self.y
-        n_nodes = x.n_nodes * y.n_nodes
-        slopes_x = np.kron(x.stiffness, y.mass)
-        slopes_y = np.kron(x.mass, y.stiffness)
-        values = np.kron(x.mass, y.mass)
-        test_slope_x = np.kron(x.mixed, y.mass)
-        test_slope_y = np.kron(x.mass, y.mixed)
-        test_x_trial_y = np.kron(x.mixed, y.mixed.T)
-
-        # The energy is lambda (div u)^2 / 2 + mu e : e
-        shape = (2, 3, n_nodes, 3, n_nodes)
-        mass = np.zeros(shape)
-        mass[0, 0, :, 0] = slopes_x
-        mass[0, 1, :, 1] = slopes_y
-        mass[0, 0, :, 1] = test_x_trial_y
-        mass[0, 1, :, 0] = test_x_trial_y.T
-        mass[1, 0, :, 0] = 2 * slopes_x + slopes_y
-        mass[1, 1, :, 1] = 2 * slopes_y + slopes_x
-        mass[1, 2, :, 2] = slopes_x + slopes_y
-        mass[1, 0, :, 1] = test_x_trial_y.T
-        mass[1, 1, :, 0] = test_x_trial_y
-        mixed = np.zeros(shape)
-        mixed[0, 2, :, 0] = test_slope_x.T
-        mixed[0, 2, :, 1] = test_slope_y.T
-        mixed[1, 0, :, 2] = test_slope_x.T
-        mixed[1, 1, :, 2] = test_slope_y.T
-        stiffness = np.zeros(shape)
-        stiffness[0, 2, :, 2] = values
-        stiffness[1, 0, :, 0] = values
-        stiffness[1, 1, :, 1] = values
-        stiffness[1, 2, :, 2] = 2 * values
-        named = {"mass": mass, "mixed": mixed, "stiffness": stiffness}
-        return {name: part.reshape(2, 3 * n_nodes, 3 * n_nodes) for name, part in named.items()}
-
-    def condense(self, held: np.ndarray) -> np.ndarray:
-        """Compute the compliance (3, m, 3, m) [m/N] of the face; 0 for held displacements.
+    def condense(self, guides) -> np.ndarray:
+        """Compute the compliance (f, f) [m/N] of the face; 0 for displacements that guides hold.
 
         Parameters
         ----------
-        held : (3, n_x, n_y) bool ndarray
-            Displacements that vanish at all depths; those of the far face vanish as well.
+        guides : sequence of tuple
+            Pairs of a displacement and of the axis across the sides on which it vanishes.
         """
-        free = np.flatnonzero(~held.ravel())
-        column = np.where(
-            (self.x.bricks[:, None] >= 0) & (self.y.bricks >= 0),
-            self.x.bricks[:, None] * self.y.n_nodes + self.y.bricks,
-            -1,
-        )
-        column = np.broadcast_to(column, held.shape).ravel()[free]
-        in_plane = {name: part[:, free[:, None], free] for name, part in self.in_plane.items()}
+        free = []
+        for component, (n_x, n_y) in enumerate(self.shapes):
+            is_free = np.ones((n_x, n_y), bool)
+            if (component, 0) in guides:
+                is_free[-1] = False
+            if (component, 1) in guides and n_y > 1:
+                is_free[:, -1] = False
+            free.append(is_free.ravel())
+        free = np.flatnonzero(np.concatenate(free))
+        in_plane = self.in_plane[..., free[:, None], free]
 
         # Sheets of bricks, from the far face up; the stiffness of those below acts on the foot of the next one
         below = None
@@ -423,64 +321,59 @@ class _Quarter:
                 stiffness = stiffness[: -free.size, : -free.size]
             else:
                 stiffness[-free.size :, -free.size :] += below
-            below = _condense_sheet(stiffness, column)
-
+            below = _condense_to_top(stiffness, free.size)
         compliance = np.linalg.inv(below)
-        out = np.zeros((held.size, held.size))
+        out = np.zeros(self.in_plane.shape[-2:])
         out[free[:, None], free] = (compliance + compliance.T) / 2
-        return out.reshape(3, held.size // 3, 3, held.size // 3)
-
-    def _assemble_sheet(self, in_plane: dict, sheet: int) -> np.ndarray:
-        """Return the stiffness (5 f, 5 f) [N/m] of a sheet of bricks, ordered by depth and then by in-plane unknowns.
-
-        `in_plane` holds the factors (2, f, f) of the unknowns that are not held.
-        """
-        half = (self.depths[sheet + 1] - self.depths[sheet]) / 2
-        weighted = {
-            name: np.tensordot(self.moduli[sheet], part, 1) for name, part in in_plane.items()
-        }
-        reference = self.reference
-        out = np.kron(half * reference.mass, weighted["mass"])
-        out += np.kron(reference.stiffness / half, weighted["stiffness"])
-        mixed = np.kron(reference.mixed, weighted["mixed"])
-        out += mixed
-        out += mixed.T
         return out
 
+    def _assemble_sheet(self, in_plane: np.ndarray, sheet: int) -> np.ndarray:
+        """Return the stiffness (5 f, 5 f) [N/m] of a sheet of bricks, ordered by depth and then by in-plane unknowns.
 
-def _condense_sheet(stiffness: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Eliminate all unknowns of a sheet of bricks but those of its top.
+        `in_plane` (2, 2, 2, f, f) holds the factors of the unknowns that are not held.
+        """
+        ends = np.repeat(self.depths[sheet : sheet + 2], ORDER + 1)
+        functions = _evaluate(BSpline(ends, np.eye(ORDER + 1), ORDER))
+        factors = np.tensordot(self.moduli[sheet], in_plane, 1)
+        return sum(
+            np.kron(functions.integrate(functions, test, trial), factors[test, trial])
+            for test, trial in np.ndindex(2, 2)
+        )
 
-    The unknowns inside each brick are eliminated first: they couple with those of the same brick alone.
 
-    Parameters
-    ----------
-    stiffness : (l f, l f) ndarray
-        Stiffness [N/m] at l depths, from the top down, which is changed.
-    column : (f,) int ndarray
-        Column of bricks inside which an unknown of one depth lies; -1 between columns.
+class _Functions(NamedTuple):
+    """Functions at the points of an integration.
 
-    Returns
-    -------
-    (f, f) ndarray
-        Stiffness [N/m] of the top.
+    - values (2, g, n): Values and slopes [1/m] of n functions at g points.
+    - weights (g,): Weights of the points [m].
     """
-    n_top = column.size
-    depth = np.arange(len(stiffness)) // n_top
-    is_inside = (depth > 0) & (depth < ORDER)
-    brick = np.where(is_inside, np.tile(column, len(stiffness) // n_top), -1)
-    for number in np.unique(column[column >= 0]):
-        inside = np.flatnonzero(brick == number)
-        is_coupled = stiffness[inside].any(axis=0)
-        is_coupled[inside] = False
-        coupled = np.flatnonzero(is_coupled)
-        coupling = stiffness[inside[:, None], coupled]
-        solved = np.linalg.solve(stiffness[inside[:, None], inside], coupling)
-        stiffness[coupled[:, None], coupled] -= coupling.T @ solved
 
-    others = np.flatnonzero(brick < 0)[n_top:]
-    factor, info = dpotrf(stiffness[others[:, None], others].T, lower=1, overwrite_a=1, clean=0)
+    values: np.ndarray
+    weights: np.ndarray
+
+    def integrate(self, other: "_Functions", slope: int, other_slope: int) -> np.ndarray:
+        """Return the integrals (n, n') of products of functions with others, or of their slopes where these are 1."""
+        weighted = self.values[int(slope)] * self.weights[:, None]
+        return weighted.T @ other.values[int(other_slope)]
+
+
+def _evaluate(spline: BSpline) -> _Functions:
+    """Evaluate splines at Gauss points between those of their knots that are not negative.
+
+    The points integrate products of two splines exactly.
+    """
+    edges = np.unique(np.maximum(spline.t, 0.0))
+    points, weights = np.polynomial.legendre.leggauss(spline.k + 1)
+    half = np.diff(edges)[:, None] / 2
+    places = (edges[:-1, None] + half * (1 + points)).ravel()
+    values = np.stack([spline(places), spline.derivative()(places)])
+    return _Functions(values, (half * weights).ravel())
+
+
+def _condense_to_top(stiffness: np.ndarray, n_top: int) -> np.ndarray:
+    """Return the stiffness (n_top, n_top) [N/m] of the first unknowns of a sheet after elimination of the others."""
+    factor, info = dpotrf(stiffness[n_top:, n_top:].T, lower=1, clean=0)
     if info:
         raise np.linalg.LinAlgError("the stiffness of a block is not positive definite")
-    half_solved = dtrsm(1.0, factor, stiffness[others, :n_top], lower=1)
+    half_solved = dtrsm(1.0, factor, stiffness[n_top:, :n_top], lower=1)
     return stiffness[:n_top, :n_top] - half_solved.T @ half_solved

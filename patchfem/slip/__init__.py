@@ -6,7 +6,8 @@ shear force against the displacement, and the traction and the slip of every nod
 `shear_modes` reduces the interface to parallel Jenkins elements, exact for laws that yield at a fixed force, or to a few
 modes of D^1/2 C D^1/2 for laws with memory. `fields` recovers traction and slip of the nodes from the states of the
 former. `mesh_correction` estimates the error of elements that yield node by node. `edge_springs` gives a patch a
-prescribed stiffness in full stick. Read `shear_modes` first.
+prescribed stiffness in full stick. `first_loading` does the same for the thousands of cells of a face. Read `shear_modes`
+first.
 """
 
 # Names that other folders use, by module

@@ -37,9 +37,9 @@ MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
 MAX_POINT_ITERATIONS = 2.5e7
 MIN_COARSEST_LEVEL_POINTS = 500  # Smallest number of points of the coarsest level.
-# Refinements of the elements of the free ends, from coarse to fine (`elasticity.sides`); the shortest element of the
-# last one is 5e-4 of the length of the interface.
-SIDE_LEVELS = (2, 3, 4)
+# Refinements of the elements of the free ends, from coarse to fine (`elasticity.sides`); the shortest brick of the
+# last one is 1e-3 of half the length of the interface.
+SIDE_LEVELS = (0, 1, 2)
 # Largest relative residual at which the contact problem counts as solved.
 CONTACT_RESIDUAL_TOL = 3e-8
 # Ratio of the length of the corner region to the length of the interface.
