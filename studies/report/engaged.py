@@ -2,8 +2,8 @@
 
 The normal stiffness of the flat pieces suppressed rocking: no test was strong enough to overcome it. Friction away from
 the axis suppressed yaw, completely before slip. While the block slides, the height of the yaw peak, divided by the
-height without friction, is nearly 1 with a single contact point, 0.20 with a patch of 12.7 mm, and 0.10 with two
-patches 20 mm apart. The coherence would have distinguished friction from a damper: its mean is 0.75 to 0.76 if friction
+height without friction, is nearly 1 with a single contact point, 0.20 with a patch of 12.7 mm, and 0.10 with a
+patch of 35 mm. The coherence would have distinguished friction from a damper: its mean is 0.75 to 0.76 if friction
 gives critical damping, and 0.99 if a damper does.
 
 Random base of 20 to 400 Hz for 8 s, H1 of the turn of each mode over the base, in windows of 1 s. Held is 1 g rms,
