@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
-from ..effects import law_has_trait, list_absent_effects
+from ..effects import law_has_trait, list_absent_effects, needs_bond_list
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction
@@ -287,6 +287,8 @@ def _find_max_cells(scene: Scene, patch_model: PatchModel) -> int:
     if scene.kind == "patch":
         return patch.MAX_STATIC_CELLS
     has_bonds = law_has_trait(scene.friction.law, "bonds")
+    if has_bonds and patch_model.interface.partial_slip and needs_bond_list(scene.friction):
+        return patch.MAX_LIST_CELLS
     if scene.wear is not None or (has_bonds and patch_model.interface.partial_slip):
         return patch.MAX_POINT_CELLS
     return patch.MAX_SLIP_CELLS

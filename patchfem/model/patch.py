@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from ..mesh.pieces import Mesh
 
 # Largest number of cells along the longer side of a face that is only pressed, of one whose slip is followed by parallel
-# elements, and of one whose cells are contact points of a law with memory or wear in many jumps; each takes about 10 CPU s.
+# elements, of one whose cells are contact points of a law with memory or wear in many jumps, and of one whose cells have
+# lists of bonds; each takes about 10 CPU s.
 MAX_STATIC_CELLS = 512
 MAX_SLIP_CELLS = 256
 MAX_POINT_CELLS = 64
+MAX_LIST_CELLS = 32
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 EQUAL_LENGTHS_TOL = 1e-9  # largest relative difference of equal lengths
 

@@ -44,6 +44,7 @@ class LevelForces:
 
     def __init__(self, displacement, force, stiffness, yields):
         self.displacement = displacement
+        self.limit = force[-1]
         self.change = np.diff(force, axis=0)
         # While elements stick up to their yield displacement, the slope of the curve is the stiffness that remains.
         self.slope = np.cumsum(stiffness[::-1])[::-1]
@@ -60,7 +61,8 @@ class LevelForces:
         """Return the forces (a,) [N] of the cells at stretches (t,) [m] of the elements."""
         carried = self._sum_by_level(np.diff(stretch, prepend=0.0))
         share = np.divide(carried, self.total, out=np.zeros(carried.size), where=self.total > 0)
-        return share @ self.change
+        # Beside a corner the traction of a sticking cell may fall a little while its neighbours slip.
+        return np.clip(share @ self.change, -self.limit, self.limit)
 
 
 @dataclass(frozen=True, eq=False)
