@@ -20,9 +20,9 @@ from .waves import compute_wave_compliance
 class SideCompliance(NamedTuple):
     """Change of the compliance of the cells by free sides: u = sum of N E N^T p over even and odd loads.
 
-    - along_x (nx, 2 m_x), along_y (ny, p m_y): Integrals [m] of the shape functions over columns and rows, the even ones
+    - along_x (nx, 2 m_x), along_y (ny, p m_y): Integrals [m] of the splines over columns and rows, the even ones
       first; p is 1 for loads that do not vary along y, else 2.
-    - change (2, p, m_x m_y, m_x m_y): Compliance E [m/N] of the nodes.
+    - change (2, p, m_x m_y, m_x m_y): Compliance E [m/N] of the splines.
     """
 
     along_x: np.ndarray
@@ -137,7 +137,7 @@ def make_block(
     cells : tuple of int
         Number of cells (nx, ny); ny = 1 for a face that does not vary across its width.
     side_level : int, optional
-        Refinement of the elements of the free sides (`elasticity.sides.compute_side_change`); None for guides at all
+        Refinement of the bricks of the free sides (`elasticity.sides.compute_side_change`); None for guides at all
         sides.
 
     Returns

@@ -32,7 +32,7 @@ MIN_EDGE_DEPTH_RATIO = 2.0
 CACHE_FOLDER_NAME = "patchfem-sides"
 # Number in the names of cached files, which increases when the method changes
 CACHE_VERSION = 1
-# Largest number of cached blocks; each needs about 2 MB
+# Largest number of cached blocks; each needs up to 1 MB
 MAX_CACHED_BLOCKS = 100
 # Number of changes kept in memory, such as those of two pieces on three levels
 MAX_CHANGES_IN_MEMORY = 8

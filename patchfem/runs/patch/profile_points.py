@@ -2,7 +2,7 @@
 
 In: a `PatchModel` with a profile. Out: static measures with error estimates, and the pressure at
 the points, which are one row of cells (`contact.cells`). The number of points is doubled from level to level. Errors
-follow from the changes when the points are doubled and when the elements of the free ends are refined.
+follow from the changes when the points are doubled and when the bricks of the free ends are refined.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
 MAX_POINT_ITERATIONS = 2.5e7
 MIN_COARSEST_LEVEL_POINTS = 500  # Smallest number of points of the coarsest level.
-# Refinements of the elements of the free ends, from coarse to fine (`elasticity.sides`); the shortest brick of the
+# Refinements of the bricks of the free ends, from coarse to fine (`elasticity.sides`); the shortest brick of the
 # last one is 1e-3 of half the length of the interface.
 SIDE_LEVELS = (0, 1, 2)
 # Largest relative residual at which the contact problem counts as solved.
@@ -115,7 +115,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     solution = None
     with use_one_blas_thread():
         try:
-            # Finer elements of the free ends on the coarsest points, then the last of them on more and more points
+            # Finer bricks of the free ends on the coarsest points, then the last of them on more and more points
             end_levels = [_solve_level(patch_model, level, count) for level in SIDE_LEVELS]
 
             # The points are doubled until the tolerance is met.
@@ -154,8 +154,8 @@ def _combine_refinement_series(
 ) -> Measures:
     """Combine two series of refinements into one estimate of each measure.
 
-    The first series (`end_levels`) refines the elements by which the compliance of the free ends is computed. The second
-    (`point_levels`) doubles the points, with the finest of these elements. With the limits p of the points and e of the
+    The first series (`end_levels`) refines the bricks by which the compliance of the free ends is computed. The second
+    (`point_levels`) doubles the points, with the finest of these bricks. With the limits p of the points and e of the
     ends, and the value e_n of the last end level, a measure is p + (e - e_n); the errors of both limits add up. A peak
     that may be at a free corner is left out, because the points do not resolve it.
     """
@@ -191,7 +191,7 @@ def make_point_compliances(patch_model, side_level: int, count: int) -> BlockCom
     patch_model : PatchModel
         Patch whose pieces and coatings the points are on.
     side_level : int
-        Refinement of the elements of the free ends.
+        Refinement of the bricks of the free ends.
     count : int
         Number of points.
     """
@@ -212,7 +212,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     patch_model : PatchModel
         Pieces and loading.
     side_level : int
-        Refinement of the elements of the free ends.
+        Refinement of the bricks of the free ends.
     count : int
         Number of points.
     start : (count/2,) array, optional
