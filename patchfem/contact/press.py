@@ -378,7 +378,7 @@ def _refuse_loose_holder(force, holder: Holder) -> None:
     is_rotation_free = holder.moment is not None and holder.spring == 0
     if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
         raise NotConverged(
-            "contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
+            "contact: the nodes that touch do not determine the rotation of the piece; lower "
             "contact.element_size or set contact.holder.rotational_stiffness"
         )
     if holder.roll_moment is not None and is_loaded.any(axis=1).sum() < 2:

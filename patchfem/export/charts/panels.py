@@ -72,7 +72,8 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     elif chart.style != "map" and any(
         _is_over_face(answer.data.get(chart.y)) for answer in answers.values()
     ):
-        chart = replace(chart, title=f"{chart.title}, cut at y = 0")
+        caption = chart.caption.replace("the elements beside a node", "cells")
+        chart = replace(chart, title=f"{chart.title}, cut at y = 0", caption=caption)
     selected = {name: data for name, data in selected.items() if data}
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
