@@ -134,6 +134,14 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
         "the patch slides along x alone",
     ),
+    "contact.strips": (
+        partial(load, COATED, {"contact.strips.count": 4}),
+        "use [contact.area]",
+    ),
+    "structure.interface.contact.strips": (
+        partial(load, MASSES, {"structure.interface.0.contact.strips.count": 4}),
+        "use [structure.interface.contact.area]",
+    ),
     "accuracy.harmonics": (
         partial(load, RIG, {"accuracy.harmonics": 9}),
         "leave it out: method 'harmonic' computes the motion over one period to the tolerance",

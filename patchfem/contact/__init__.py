@@ -49,7 +49,6 @@ PUBLIC = {
         "StripModel",
         "press_strips",
         "split_into_strips",
-        "compute_strip_offsets",
     ),
     "press_cells": (
         "FaceLoading",

@@ -176,14 +176,6 @@ class StripsState:
         return self.roll_moment / self.load if self.load else 0.0
 
 
-def compute_strip_offsets(width: float, count: int) -> np.ndarray:
-    """Return the centres y (count,) [m] of equal strips that divide the width [m] of a pair of pieces.
-
-    y is 0 in the middle of the width.
-    """
-    return (np.arange(count) + 0.5) * (width / count) - width / 2
-
-
 class StripProperties(NamedTuple):
     """Properties of one strip with m nodes.
 
