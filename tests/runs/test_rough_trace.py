@@ -45,12 +45,12 @@ def result(folder):
 
 
 def test_exact_peak_pressure_of_rough_trace_is_that_of_its_pressure_field(result):
-    """The peak pressure is the largest pressure of the points, and its error is smaller than it.
+    """The peak pressure is that of the parabola at the largest pressure of the points, and its error is smaller than it.
 
     The largest pressure of the mesh, which smooths the trace, is 141 MPa.
     """
     peak = result.measures["pressure_peak"]
-    assert result.fields["normal_stress"].max() == pytest.approx(peak.value, rel=1e-4)
+    assert 1 <= peak.value / result.fields["normal_stress"].max() < 1.01
     assert 141e6 < peak.value - peak.error / 2 < peak.value
 
 
