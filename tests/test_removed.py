@@ -30,6 +30,8 @@ law = "coulomb"
 static = 0.3
 load = "10 N"
 """
+JOINT = MASSES.replace('load = "10 N"\n', "") + DRIVE
+JOINT += COATED.replace("[contact", "[structure.interface.contact")
 
 
 def load(text: str, keys: dict, folder) -> None:
@@ -139,7 +141,7 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         "use [contact.area]",
     ),
     "structure.interface.contact.strips": (
-        partial(load, MASSES, {"structure.interface.0.contact.strips.count": 4}),
+        partial(load, JOINT, {"structure.interface.0.contact.strips.count": 4}),
         "use [structure.interface.contact.area]",
     ),
     "accuracy.harmonics": (
